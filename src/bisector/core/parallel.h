@@ -1,0 +1,93 @@
+// The one place that decides how loops are scheduled. Chunks never depend on the number of threads, and sums follow a
+// fixed tree, so results are the same bit for bit however many cores take part.
+#pragma once
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#if defined(__SANITIZE_THREAD__)
+#include <sanitizer/tsan_interface.h>
+#endif
+
+namespace bisector {
+
+// Limits the threads of all loops while it lives; 0 means all cores.
+class ThreadLimit {
+ public:
+  explicit ThreadLimit(unsigned threads)
+      : control_(tbb::global_control::max_allowed_parallelism,
+                 threads ? threads : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)) {}
+
+ private:
+  tbb::global_control control_;
+};
+
+inline unsigned thread_count() {
+  return static_cast<unsigned>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+}
+
+namespace detail {
+// TBB's own library is not instrumented, so the thread sanitizer has to be told that a loop's start happens before
+// its bodies and they before its end; races between bodies are still found.
+struct LoopFence {
+#if defined(__SANITIZE_THREAD__)
+  char token = 0;
+  void publish() { __tsan_release(&token); }
+  void observe() { __tsan_acquire(&token); }
+#else
+  void publish() {}
+  void observe() {}
+#endif
+};
+}  // namespace detail
+
+// Calls body(chunk, begin, end) for every chunk of `size` consecutive items of [0, n).
+template <class Body>
+void parallel_chunks(std::size_t n, std::size_t size, const Body& body) {
+  const std::size_t chunks = (n + size - 1) / size;
+  if (chunks <= 1) {
+    if (n) body(std::size_t{0}, std::size_t{0}, n);
+    return;
+  }
+  detail::LoopFence start, finish;
+  start.publish();
+  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
+    start.observe();
+    body(c, c * size, std::min(n, (c + 1) * size));
+    finish.publish();
+  });
+  finish.observe();
+}
+
+// Calls body(i) for every i of [0, n).
+template <class Body>
+void parallel_each(std::size_t n, const Body& body, std::size_t grain = 1024) {
+  parallel_chunks(n, grain, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  });
+}
+
+// Sum of term(i) over [0, n): blocks in order, then the blocks' sums in order.
+template <class Term>
+double fixed_sum(std::size_t n, const Term& term) {
+  constexpr std::size_t kBlock = 4096;
+  std::vector<double> partial((n + kBlock - 1) / kBlock);
+  parallel_chunks(n, kBlock, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    double s = 0;
+    for (std::size_t i = begin; i < end; ++i) s += term(i);
+    partial[c] = s;
+  });
+  double sum = 0;
+  for (double s : partial) sum += s;
+  return sum;
+}
+
+template <class T>
+using ThreadLocal = tbb::enumerable_thread_specific<T>;
+
+}  // namespace bisector

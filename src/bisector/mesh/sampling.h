@@ -1,0 +1,22 @@
+// Random points on a surface.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bisector/core/types.h"
+
+namespace bisector {
+
+struct SurfaceSample {
+  Vec3 point;
+  Index triangle;
+};
+
+// `count` independent points with probability proportional to area times a density that is linear on each triangle
+// (Turk 1990; thesis 4.4.1). `density` holds one positive value per vertex, or is empty for uniform. The same
+// random_seed gives the same points on every platform. Throws Error if the mesh has no area.
+std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t count, std::uint64_t random_seed,
+                                          const std::vector<double>& density = {});
+
+}  // namespace bisector

@@ -1,0 +1,24 @@
+// Combinatorial facts of a triangle mesh: manifold, closed, oriented, Euler characteristic, components.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "bisector/core/types.h"
+
+namespace bisector {
+
+struct MeshTopology {
+  bool manifold = false;       // every edge has one or two triangles and every vertex one fan or disk of them
+  bool closed = false;         // every edge has at least two triangles
+  bool oriented = false;       // across every edge of two triangles they run in opposite directions
+  long long euler = 0;         // V - E + F over the vertices that triangles use
+  std::size_t components = 0;  // connected through vertices
+  std::size_t boundary_edges = 0;
+  std::size_t non_manifold_edges = 0;
+  std::size_t non_manifold_vertices = 0;
+};
+
+MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count);
+
+}  // namespace bisector
