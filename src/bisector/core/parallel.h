@@ -5,6 +5,7 @@
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -85,6 +86,16 @@ double fixed_sum(std::size_t n, const Term& term) {
   double sum = 0;
   for (double s : partial) sum += s;
   return sum;
+}
+
+// Sorts by a strict total order.
+template <class T, class Less>
+void sort_in_parallel(std::vector<T>& values, const Less& less) {
+#if defined(__SANITIZE_THREAD__)
+  std::sort(values.begin(), values.end(), less);
+#else
+  tbb::parallel_sort(values.begin(), values.end(), less);
+#endif
 }
 
 template <class T>

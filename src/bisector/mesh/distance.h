@@ -8,8 +8,8 @@
 namespace bisector {
 
 struct DistanceReport {
-  // Over the samples of both sides, in percent of the reference's bounding-box diagonal. `mean` and `rms` are the
-  // larger of the two one-sided values, `max` approximates the Hausdorff distance from below.
+  // In percent of the diagonal of the reference's bounding box. `mean` and `rms` are over area and the larger of the
+  // two one-sided values; `max`, over the samples and vertices of both sides, is the Hausdorff distance from below.
   double mean = 0, rms = 0, max = 0;
   double rms_to_reference = 0, rms_from_reference = 0;
   std::size_t samples = 0;   // on each side

@@ -15,13 +15,15 @@ struct QualityReport {
   double valence6 = 0;                   // fraction of interior vertices with six neighbours
   double edge_min = 0, edge_ave = 0, edge_max = 0;  // lengths, in the mesh's unit
   double area = 0;
-  std::size_t zero_area = 0;             // triangles without area; left out of the angle and Q figures' means only
+  std::size_t zero_area = 0;             // triangles without area: Q 0, angles 0 and 180, left out of the two means
   MeshTopology topology;
 };
 
+// All zeros if there are no triangles.
 QualityReport measure_quality(const TriangleMesh& mesh);
 
-// Pairs of triangles that intersect other than in a shared vertex or edge (exact predicates).
+// Pairs of triangles that intersect other than in a shared vertex or edge (exact predicates). Vertices at the same
+// point count as one; triangles without area are ignored; two that fold onto each other at their edge do count.
 std::size_t count_self_intersections(const TriangleMesh& mesh);
 
 }  // namespace bisector

@@ -15,10 +15,18 @@ struct MeshTopology {
   long long euler = 0;         // V - E + F over the vertices that triangles use
   std::size_t components = 0;  // connected through vertices
   std::size_t boundary_edges = 0;
-  std::size_t non_manifold_edges = 0;
-  std::size_t non_manifold_vertices = 0;
+  std::size_t non_manifold_edges = 0;     // of more than two triangles, or from a vertex to itself
+  std::size_t non_manifold_vertices = 0;  // whose triangles, linked through edges, fall apart into several fans
 };
 
+// All false and 0 if there are no triangles. Every index must be below `vertex_count`.
 MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count);
+
+// The undirected edges in lexicographic order. Half-edge 3 t + k runs from corner k of triangle t to the next corner.
+struct EdgeTable {
+  std::vector<std::array<Index, 2>> edges;  // lower vertex first
+  Csr<std::size_t> half_edges;              // of each edge, ascending
+};
+EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
 }  // namespace bisector

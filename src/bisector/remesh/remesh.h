@@ -1,0 +1,61 @@
+// Isotropic surface remeshing by centroidal Voronoi tessellation (thesis, chapter 4).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bisector/core/context.h"
+#include "bisector/core/types.h"
+#include "bisector/mesh/topology.h"
+#include "bisector/voronoi/restricted.h"
+
+namespace bisector {
+
+enum class TopologyControl {
+  enforce,  // move seeds to where the dual is not a manifold like the input, and optimise again
+  check,    // report only
+  off,
+};
+
+enum class Energy {
+  constrained,  // seeds end on the surface (CCVT)
+  restricted,   // seeds may leave the surface (RCVT)
+};
+
+struct RemeshOptions {
+  std::size_t vertices = 0;                // wanted; at least 4
+  std::vector<Vec3> seeds;                 // start from these instead of random ones, in one level; empty: random
+  std::uint64_t random_seed = 1;
+  int iterations = 100;                    // at most, per level
+  double tolerance = 1e-4;                 // stop when the gradient norm falls below this share of its first value
+  int levels = 0;                          // of the multilevel start; 0: as many as the count allows, at most 3
+  Energy energy = Energy::constrained;
+  TopologyControl topology = TopologyControl::enforce;
+  NeighbourSource neighbours = NeighbourSource::nearest;
+  unsigned threads = 0;                    // 0: all cores
+};
+
+struct RemeshSeconds {
+  double total = 0, delaunay = 0, neighbours = 0, pairs = 0, clip = 0, lbfgs = 0, extract = 0;
+};
+
+struct RemeshResult {
+  TriangleMesh mesh;              // the restricted Delaunay triangulation of the seeds that own a cell
+  MeshTopology topology;          // of mesh
+  MeshTopology input_topology;
+  bool topology_matches = false;  // manifold, and closed and of Euler characteristic and components as the input
+  int iterations = 0;             // accepted steps, all levels
+  int evaluations = 0;
+  double energy = 0;              // CVT energy of the final seeds
+  double gradient_norm = 0;       // Euclidean norm over all seeds (tangential where constrained)
+  Certification certification;    // of the final diagram
+  std::size_t untiled = 0;        // triangles that fail the tiling check of the final diagram: 0, or the run is wrong
+  RemeshSeconds seconds;
+};
+
+// Remeshes a surface with `options.vertices` vertices. Throws Error on input without area or fewer than 4 vertices, and
+// Cancelled.
+RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context = {});
+
+}  // namespace bisector

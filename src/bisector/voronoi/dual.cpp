@@ -1,0 +1,78 @@
+#include "bisector/voronoi/dual.h"
+
+#include <algorithm>
+
+#include "bisector/core/parallel.h"
+
+namespace bisector {
+namespace {
+
+struct Triple {
+  Triangle ascending;
+  Index mesh_triangle;
+  bool flipped;  // the oriented triple is an odd permutation of `ascending`
+};
+
+bool operator<(const Triple& a, const Triple& b) {
+  return a.ascending != b.ascending ? a.ascending < b.ascending : a.mesh_triangle < b.mesh_triangle;
+}
+
+}  // namespace
+
+Dual extract_dual(const RestrictedPolygons& polygons) {
+  std::vector<Triple> triples;
+  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+    const auto [triangle, cell] = polygons.pairs[k];
+    const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
+    for (std::size_t e = 0; e < size; ++e) {
+      const Index b = polygons.labels[first + (e + size - 1) % size], c = polygons.labels[first + e];
+      // Each vertex is seen from its three cells; the lowest reports it.
+      if (is_edge(b) || is_edge(c) || b < cell || c < cell) continue;
+      // Walking around the cell, the neighbour before the vertex precedes the one after it.
+      triples.push_back({{cell, std::min(b, c), std::max(b, c)}, triangle, b > c});
+    }
+  }
+  sort_in_parallel(triples, [](const Triple& a, const Triple& b) { return a < b; });
+  Dual dual;
+  for (std::size_t k = 0; k < triples.size(); ++k) {
+    const Triangle& t = triples[k].ascending;
+    if (k && triples[k - 1].ascending == t) {
+      ++dual.multiplicity.back();
+      continue;
+    }
+    dual.triangles.push_back(triples[k].flipped ? Triangle{t[0], t[2], t[1]} : t);
+    dual.multiplicity.push_back(1);
+  }
+  return dual;
+}
+
+std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons) {
+  std::vector<DualEdge> pieces;
+  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+    const Index cell = polygons.pairs[k].cell;
+    const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
+    for (std::size_t e = 0; e < size; ++e) {
+      const Index label = polygons.labels[first + e];
+      if (is_edge(label) || label < cell) continue;
+      const Vec3 &p = polygons.vertices[first + e], &q = polygons.vertices[first + (e + 1) % size];
+      pieces.push_back({cell, label, 0.5 * (p + q), norm(q - p)});
+    }
+  }
+  std::stable_sort(pieces.begin(), pieces.end(), [](const DualEdge& x, const DualEdge& y) {
+    return x.a != y.a ? x.a < y.a : x.b < y.b;
+  });
+  std::vector<DualEdge> edges;
+  for (std::size_t k = 0; k < pieces.size();) {
+    DualEdge sum{pieces[k].a, pieces[k].b, {}, 0};
+    for (; k < pieces.size() && pieces[k].a == sum.a && pieces[k].b == sum.b; ++k) {
+      sum.midpoint += pieces[k].length * pieces[k].midpoint;
+      sum.length += pieces[k].length;
+    }
+    if (sum.length == 0) continue;
+    sum.midpoint *= 1 / sum.length;
+    edges.push_back(sum);
+  }
+  return edges;
+}
+
+}  // namespace bisector

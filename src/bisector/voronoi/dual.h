@@ -1,0 +1,31 @@
+// The restricted Delaunay triangulation, read off the labels of the restricted Voronoi diagram (thesis 4.4.4).
+#pragma once
+
+#include <vector>
+
+#include "bisector/core/types.h"
+#include "bisector/voronoi/restricted.h"
+
+namespace bisector {
+
+struct Dual {
+  // Triples of cells that share a vertex of the diagram, each oriented as the surface at its first such vertex. Sorted as
+  // ascending triples, without repeats.
+  std::vector<Triangle> triangles;
+  // How many vertices of the diagram each triple has; 1 where the topological ball property holds.
+  std::vector<Index> multiplicity;
+};
+
+Dual extract_dual(const RestrictedPolygons& polygons);
+
+// A pair of cells that share an edge of the diagram.
+struct DualEdge {
+  Index a, b;       // a < b
+  Vec3 midpoint;    // of the restricted Voronoi edge: the mean of its points by length
+  double length;    // of the restricted Voronoi edge
+};
+
+// Every pair of cells that share an edge of positive length, sorted.
+std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons);
+
+}  // namespace bisector

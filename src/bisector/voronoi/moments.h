@@ -1,0 +1,36 @@
+// Closed-form moments of triangles with a linear density: mass, first moment and second moment about the origin.
+#pragma once
+
+#include "bisector/core/types.h"
+
+namespace bisector {
+
+struct Moments {
+  double mass = 0;    // integral of rho
+  Vec3 first;         // integral of rho p
+  double second = 0;  // integral of rho |p|^2
+
+  Moments& operator+=(const Moments& b) {
+    mass += b.mass;
+    first += b.first;
+    second += b.second;
+    return *this;
+  }
+};
+
+// Moments of the triangle (a, b, c) of signed area `area` with density 1.
+inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, double area) {
+  const Vec3 s = a + b + c;
+  return {area, (area / 3) * s, (area / 12) * (norm2(s) + (norm2(a) + norm2(b) + norm2(c)))};
+}
+
+// The same with the density linear, ra, rb and rc at the corners.
+inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, double ra, double rb, double rc, double area) {
+  const double s = ra + rb + rc;
+  const Vec3 first = (s + ra) * a + (s + rb) * b + (s + rc) * c;
+  const double squares = (s + ra + ra) * norm2(a) + (s + rb + rb) * norm2(b) + (s + rc + rc) * norm2(c);
+  const double products = (s + ra + rb) * dot(a, b) + (s + rb + rc) * dot(b, c) + (s + rc + ra) * dot(c, a);
+  return {(area / 3) * s, (area / 12) * first, (area / 30) * (squares + products)};
+}
+
+}  // namespace bisector

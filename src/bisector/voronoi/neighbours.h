@@ -1,0 +1,75 @@
+// Candidate neighbours of every seed, from either source, each list with its own certificate of what it leaves out.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "bisector/core/types.h"
+
+namespace bisector {
+
+enum class NeighbourSource {
+  nearest,   // nearest seeds by distance, grown where they prove too few
+  delaunay,  // Delaunay 1-ring; falls back to `nearest` for seeds in a plane
+};
+
+// The distinct seeds in a spatial order. Internal indices ("slots") index `x`; `id` maps them to the caller's indices,
+// which alone decide ties. A seed equal to one of lower index owns nothing and has no slot.
+struct SortedSeeds {
+  std::vector<Vec3> x;
+  std::vector<Index> id;
+  std::vector<Index> slot;  // of each caller index, or kNone
+};
+
+SortedSeeds sort_seeds(const std::vector<Vec3>& seeds);
+
+// A list of neighbours (slots) in ascending distance. Every seed that is not listed and could bound the cell lies at
+// `radius` or more from the seed; infinite if there is none. `level` counts how often the list was grown.
+struct NeighbourList {
+  const Index* begin = nullptr;
+  const Index* end = nullptr;
+  double radius = 0;
+  int level = 0;
+};
+
+class Neighbours {
+ public:
+  Neighbours();
+  ~Neighbours();
+
+  // Builds the lists of all slots. `seeds` must outlive their use.
+  void build(const SortedSeeds& seeds, NeighbourSource source);
+
+  NeighbourList list(Index slot) const;
+  // A list that reaches farther than `shorter` did. Safe to call from many threads; depends on the seeds alone.
+  NeighbourList wider(Index slot, const NeighbourList& shorter) const;
+  // A slot whose distance to q is the least up to rounding.
+  Index nearest(const Vec3& q) const;
+  // All slots within squared distance r2 (1 + 1e-9) of q.
+  std::vector<Index> within(const Vec3& q, double r2) const;
+
+  // Lists grown since build().
+  std::size_t grown() const { return grown_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Tree;
+  struct Grown;
+  struct LastRung;
+  const LastRung& last_rung() const;
+  std::unique_ptr<Grown> grow(Index slot, int level) const;
+  void drop_grown();
+
+  const SortedSeeds* seeds_ = nullptr;
+  std::unique_ptr<Tree> tree_;
+  std::size_t stride_ = 0;       // entries per list of first_
+  std::vector<Index> first_;
+  std::vector<double> radius_;   // of the lists of first_
+  bool use_rings_ = false;       // the first lists are Delaunay rings
+  std::unique_ptr<LastRung> last_rung_;
+  std::unique_ptr<std::atomic<Grown*>[]> heads_;  // grown lists of each slot, the longest first
+  std::size_t head_count_ = 0;
+  mutable std::atomic<std::size_t> grown_{0};
+};
+
+}  // namespace bisector

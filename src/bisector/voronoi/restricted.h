@@ -1,0 +1,74 @@
+// Restricted Voronoi diagrams of surfaces: exact combinatorics, closed-form moments (thesis 4.3, 5.4.2).
+//
+// The diagram is that of exact arithmetic on the given coordinates, made unique by simulation of simplicity (see
+// exact.h): it depends on the seeds and the mesh alone, not on the source of neighbours, the clipping order or the number
+// of threads.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "bisector/core/types.h"
+#include "bisector/voronoi/moments.h"
+#include "bisector/voronoi/neighbours.h"
+#include "bisector/voronoi/surface.h"
+
+namespace bisector {
+
+// The non-empty intersections of cells and triangles, sorted by (triangle, cell).
+struct RestrictedPolygons {
+  struct Pair {
+    Index triangle, cell;
+  };
+  std::vector<Pair> pairs;
+  std::vector<std::size_t> offsets{0};  // polygon k has the entries offsets[k] .. offsets[k + 1)
+  // Entry e: the counter-clockwise polygon's vertex and the label of the edge that starts there. The vertex is where the
+  // preceding label and this one meet.
+  std::vector<Index> labels;
+  std::vector<Vec3> vertices;
+};
+
+struct DiagramSeconds {
+  double delaunay = 0, neighbours = 0, pairs = 0, clip = 0;
+};
+
+// How the pairs of a diagram were certified.
+struct Certification {
+  std::size_t pairs = 0;
+  std::size_t uncertain = 0;  // a decision was within the filter's error bound and taken in exact arithmetic
+  std::size_t wider = 0;      // needed a longer list of neighbours
+};
+
+// Integrals over the restricted cells; positions are relative to the seed.
+struct CellMoments {
+  std::vector<Moments> cells;      // by seed; zero for an empty cell
+  double mass = 0;                 // sum over the cells
+  double energy = 0;               // sum of the second moments: the CVT energy
+  Csr<Index> triangles;            // incident triangles of each cell, ascending
+  Certification certification;
+  DiagramSeconds seconds;
+};
+
+class RestrictedVoronoi {
+ public:
+  // The surface must outlive the object.
+  explicit RestrictedVoronoi(const Surface& surface);
+  ~RestrictedVoronoi();
+
+  // The moments of every cell. Between calls memory is kept, and the owners of the last diagram serve as first guesses.
+  void evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result);
+  // The same, and the polygons.
+  void evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
+                RestrictedPolygons& polygons);
+
+ private:
+  struct Work;
+  std::unique_ptr<Work> work_;
+};
+
+// Verifies that the polygons tile every triangle: each inner edge occurs once on either side with equal ends, and the
+// triangle's edges are covered end to end. Returns the number of triangles where that fails.
+std::size_t count_untiled(const Surface& surface, const RestrictedPolygons& polygons);
+
+}  // namespace bisector
