@@ -45,35 +45,49 @@ double blend(double a, double b, double k) {
   return std::min(a, b) - h * h * h * k / 6;
 }
 
+// The tail's axis: a Catmull-Rom curve that leaves at the back, swings out and comes up again to the shoulder.
+std::vector<Vec3> tail_axis() {
+  const std::array<Vec3, 9> control{{{6, 14, -14}, {0, 10, -26}, {-11, 7, -39}, {-26, 11, -44}, {-36, 25, -37},
+                                     {-36, 42, -23}, {-25, 53, -9}, {-10, 53, 0}, {4, 50, 4}}};
+  constexpr int kSteps = 8;
+  std::vector<Vec3> axis;
+  for (std::size_t i = 1; i + 2 < control.size(); ++i)
+    for (int step = 0; step < kSteps; ++step) {
+      const double t = 1.0 * step / kSteps;
+      const Vec3 &a = control[i - 1], &b = control[i], &c = control[i + 1], &d = control[i + 2];
+      axis.push_back(b + 0.5 * t * ((c - a) + t * ((2 * a - 5 * b + 4 * c - d) + t * (3 * (b - c) + d - a))));
+    }
+  axis.push_back(control[control.size() - 2]);
+  return axis;
+}
+
 // Below zero inside. y is up, the cat looks along +z; x is its left.
 double cat(const Vec3& p) {
+  static const std::vector<Vec3> tail = tail_axis();
   const Vec3 m{std::abs(p.x), p.y, p.z};  // limbs in pairs
-  double d = limb(p, {0, 22, -12}, {0, 48, 3}, 21, 13);                               // body
-  d = blend(d, ball(m, {13, 13, -8}, {11, 14, 17}), 8);                               // haunches
-  d = blend(d, limb(m, {7, 44, 9}, {7.5, 5, 17}, 6.5, 4.2), 7);                       // fore legs
-  d = blend(d, ball(m, {7.5, 3.6, 20}, {4.6, 3.6, 6.5}), 3);                          // fore paws
-  d = blend(d, ball(m, {14, 3.6, 8}, {5, 3.6, 8.5}), 4);                              // hind paws
-  double head = ball(p, {0, 69, 10}, {16, 13.5, 14});
-  head = blend(head, ball(m, {4.2, 63.5, 21.5}, {5, 4.2, 4.4}), 4);                   // muzzle
-  head = blend(head, ball(p, {0, 66.6, 25}, {2, 1.5, 1.6}), 1.5);                     // nose
-  head = blend(head, limb(m, {8.5, 78, 8}, {12.5, 89, 6.5}, 6, 1.6), 4);              // ears
+  double d = limb(p, {0, 22, -12}, {0, 48, 4}, 20, 13);                               // body
+  d = blend(d, ball(m, {14, 14, -11}, {11, 14, 16}), 8);                              // haunches
+  d = blend(d, limb(m, {7, 44, 11}, {8.7, 5, 22}, 6.5, 4.4), 7);                      // fore legs
+  d = blend(d, ball(m, {8.8, 4, 25.5}, {4.8, 4, 6.5}), 3);                            // fore paws
+  d = blend(d, ball(m, {16, 4, 0}, {5.4, 4, 9}), 4);                                  // hind paws
+  double head = ball(p, {0, 69, 11}, {16, 13.5, 14});
+  head = blend(head, ball(m, {4.2, 63.5, 22.5}, {5, 4.2, 4.6}), 4);                   // muzzle
+  head = blend(head, limb(m, {8.5, 78, 9}, {12.3, 88, 7.5}, 6.5, 2.8), 4);            // ears
   d = blend(d, head, 9);
-  // The tail leaves at the back, swings out and comes up again to rest on the shoulder.
-  const std::array<Vec3, 7> tail{{{0, 9, -28}, {-13, 7, -42}, {-30, 14, -43}, {-37, 30, -32}, {-33, 46, -19},
-                                  {-22, 53, -7}, {-9, 51, 0}}};
-  double t = limb(p, tail[0], tail[1], 6, 5.6);
-  for (std::size_t i = 1; i + 1 < tail.size(); ++i) t = blend(t, limb(p, tail[i], tail[i + 1], 5.6, 5.2), 3);
-  return blend(d, t, 5);
+  double t = limb(p, tail[0], tail[1], 6, 6);
+  for (std::size_t i = 1; i + 1 < tail.size(); ++i) t = std::min(t, limb(p, tail[i], tail[i + 1], 6, 6));
+  return blend(d, t, 7);
 }
 
 // A lattice that is finer towards the head and the middle, so that triangles differ in size as in a scan.
 class Lattice {
  public:
-  static constexpr int kX = 46, kY = 58, kZ = 46;
+  static constexpr int kX = 29, kY = 36, kZ = 29;
 
   static Vec3 point(int i, int j, int k) {
     const double u = 2.0 * i / kX - 1, v = 1.0 * j / kY, w = 2.0 * k / kZ - 1;
-    return {-6 + 44 * u * (0.65 + 0.35 * u * u), -1.7 + 95.4 * v * (1.35 - 0.35 * v), -9 + 46 * w * (0.75 + 0.25 * w * w)};
+    return {-7 + 43 * u * (0.65 + 0.35 * u * u), -1.7 + 95.4 * v * (1.35 - 0.35 * v),
+            -8 + 46 * w * (0.75 + 0.25 * w * w)};
   }
   static Index id(int i, int j, int k) { return static_cast<Index>((k * (kY + 1) + j) * (kX + 1) + i); }
 };
@@ -123,7 +137,8 @@ class Polygoniser {
     } else if (inside == 3) {
       mesh_.triangles.push_back({crossing(v[0], v[3]), crossing(v[1], v[3]), crossing(v[2], v[3])});
     } else {
-      const Index a = crossing(v[0], v[2]), b = crossing(v[0], v[3]), c = crossing(v[1], v[3]), d = crossing(v[1], v[2]);
+      const Index a = crossing(v[0], v[2]), b = crossing(v[0], v[3]);
+      const Index c = crossing(v[1], v[3]), d = crossing(v[1], v[2]);
       mesh_.triangles.push_back({a, b, c});
       mesh_.triangles.push_back({a, c, d});
     }
@@ -240,7 +255,7 @@ std::vector<Triangle> clip_ears(Outline outline) {
 
 class Part {
  public:
-  // The wall between a loop at height z0 and one with as many points at z1 > z0, material on the loops' inside or outside.
+  // The wall from a loop at z0 up to one with as many points at z1, around material or around a hole.
   void wall(const Loop& lower, double z0, const Loop& upper, double z1, bool material_inside) {
     const std::size_t n = lower.size();
     for (std::size_t k = 0; k < n; ++k) {
@@ -272,7 +287,8 @@ class Part {
  private:
   Index vertex(const Plane& p, double z) {
     const auto [found, is_new] = vertices_.try_emplace({p, z}, static_cast<Index>(mesh_.vertices.size()));
-    if (is_new) mesh_.vertices.push_back({static_cast<double>(p[0]) * kUnit, static_cast<double>(p[1]) * kUnit, z});
+    // The drawing's z is the file's y: up, as for the cat.
+    if (is_new) mesh_.vertices.push_back({static_cast<double>(p[0]) * kUnit, z, static_cast<double>(-p[1]) * kUnit});
     return found->second;
   }
 
@@ -289,12 +305,12 @@ TriangleMesh make_part() {
   add_arc(outline, 0, 0, 30, tangent, 360 - tangent, 26);
   add_arc(outline, kFar, 0, 17, -tangent, tangent, 12);
 
-  const Loop boss = circle(0, 0, 20, 36), boss_top = circle(0, 0, 18, 36), counterbore = circle(0, 0, 16, 32);
+  const Loop boss = circle(0, 0, 20, 36), boss_top = circle(0, 0, 18.5, 36), counterbore = circle(0, 0, 15.5, 32);
   Loop bore;  // radius 12 with a keyway 6 wide towards +x
   const double key = std::asin(3.0 / 12) * 180 / std::numbers::pi;
   add_arc(bore, 0, 0, 12, key, 360 - key, 25);
-  bore.push_back(at(14.5, -3));
-  bore.push_back(at(14.5, 3));
+  bore.push_back(at(14, -3));
+  bore.push_back(at(14, 3));
   const Loop far_boss = circle(kFar, 0, 12, 24), far_bore = circle(kFar, 0, 7, 20);
   const Loop bolt = circle(-12.5, 21.65, 2.5, 12), other_bolt = circle(-12.5, -21.65, 2.5, 12);
   const Loop pocket{at(32, -9), at(68, -6), at(68, 6), at(32, 9)};
@@ -307,8 +323,8 @@ TriangleMesh make_part() {
   part.cap(pocket, {}, 5, true);
   part.wall(bolt, 0, bolt, 12, false);
   part.wall(other_bolt, 0, other_bolt, 12, false);
-  part.wall(boss, 12, boss, 30, true);
-  part.wall(boss, 30, boss_top, 32, true);
+  part.wall(boss, 12, boss, 30.5, true);
+  part.wall(boss, 30.5, boss_top, 32, true);
   part.cap(boss_top, {counterbore}, 32, true);
   part.wall(counterbore, 24, counterbore, 32, false);
   part.cap(counterbore, {bore}, 24, true);

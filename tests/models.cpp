@@ -347,4 +347,25 @@ std::vector<SmallCase> small_cases() {
   return cases;
 }
 
+SmallCase integer_case(std::uint64_t random_seed) {
+  SplitMix64 random(random_seed);
+  const auto point = [&] {
+    const std::uint64_t bits = random.next();
+    return Vec3{static_cast<double>(bits & 3), static_cast<double>(bits >> 2 & 3), static_cast<double>(bits >> 4 & 3)};
+  };
+  SmallCase problem{"integers " + std::to_string(random_seed), {}, {}};
+  const std::size_t vertices = 3 + random.below(6);
+  for (std::size_t k = 0; k < vertices; ++k) problem.mesh.vertices.push_back(point());
+  const std::size_t triangles = 1 + random.below(8);
+  for (std::size_t k = 0; k < triangles; ++k) {
+    const std::size_t a = random.below(vertices), b = (a + 1 + random.below(vertices - 1)) % vertices;
+    std::size_t c = random.below(vertices);
+    while (c == a || c == b) c = (c + 1) % vertices;
+    problem.mesh.triangles.push_back({index_of(a), index_of(b), index_of(c)});
+  }
+  const std::size_t seeds = 1 + random.below(16);
+  for (std::size_t k = 0; k < seeds; ++k) problem.seeds.push_back(point());
+  return problem;
+}
+
 }  // namespace bisector::test

@@ -63,4 +63,8 @@ struct SmallCase {
 };
 std::vector<SmallCase> small_cases();
 
+// Random triangles (some collinear, some sharing edges) and seeds (some equal) at points of a 4 x 4 x 4 grid, where
+// nearly every decision is a tie. Any number gives another one.
+SmallCase integer_case(std::uint64_t random_seed);
+
 }  // namespace bisector::test

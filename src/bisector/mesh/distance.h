@@ -15,8 +15,8 @@ struct DistanceReport {
   std::size_t samples = 0;   // on each side
 };
 
-// Area-uniform stratified samples plus the vertices of each side; reproducible from `random_seed`, for any thread count.
-// Throws Error if a mesh has no area.
+// Area-uniform stratified samples plus the vertices of each side; reproducible from `random_seed`, for any thread
+// count. Throws Error if a mesh has no area.
 DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference, std::size_t samples = 200'000,
                                 std::uint64_t random_seed = 1);
 

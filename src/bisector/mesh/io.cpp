@@ -116,7 +116,8 @@ std::string read_bytes(const std::string& path) {
     size += static_cast<std::size_t>(n);
   }
   bytes.resize(size);
-  if (bytes.find_first_not_of(" \t\r\n") == std::string::npos) fail(path, std::string("the file is empty; ") + kExportAgain);
+  if (bytes.find_first_not_of(" \t\r\n") == std::string::npos)
+    fail(path, std::string("the file is empty; ") + kExportAgain);
   return bytes;
 }
 
@@ -326,7 +327,8 @@ Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t verti
   if (v == 0) in.fail("index 0 is out of range, OBJ counts from 1; mend the face");
   const std::int64_t index = v > 0 ? v - 1 : static_cast<std::int64_t>(vertices) + v;
   if (index < 0 || index >= kNone)
-    in.fail(fmt::format("index {} is out of range after {}; mend the face", v, quantity(vertices, "vertex", "vertices")));
+    in.fail(fmt::format("index {} is out of range after {}; mend the face", v,
+                        quantity(vertices, "vertex", "vertices")));
   return static_cast<Index>(index);
 }
 
@@ -462,7 +464,8 @@ PlyHeader read_ply_header(TextReader& in) {
     } else if (keyword == "element") {
       PlyElement element;
       element.name = in.word();
-      if (header.find(element.name)) in.fail("element '" + printable(element.name) + "' appears twice; " + kExportAgain);
+      if (header.find(element.name))
+        in.fail("element '" + printable(element.name) + "' appears twice; " + kExportAgain);
       element.count = in.count("items");
       header.elements.push_back(std::move(element));
     } else if (keyword == "property") {
@@ -481,7 +484,8 @@ class PlyText {
  public:
   explicit PlyText(TextReader& in) : in_(in) {}
   void begin_item(const PlyElement& element, std::size_t item) {
-    if (!in_.next_line()) in_.fail_truncated(fmt::format("{} of {} '{}'", item, element.count, printable(element.name)));
+    if (!in_.next_line())
+      in_.fail_truncated(fmt::format("{} of {} items of '{}'", item, element.count, printable(element.name)));
   }
   double value(Scalar) { return in_.number(); }
   void skip(Scalar, std::size_t n) {
@@ -993,11 +997,12 @@ void check_points(const std::string& path, const std::vector<Vec3>& vertices) {
         fail(path, fmt::format("vertex {}: a coordinate is not finite; nothing was written", v));
 }
 
-void check_face(const std::string& path, std::size_t face, const Index* begin, const Index* end, std::size_t vertices) {
+void check_face(const std::string& path, std::size_t face, const Index* begin, const Index* end,
+                std::size_t vertices) {
   for (const Index* v = begin; v != end; ++v)
     if (*v >= vertices)
-      fail(path, fmt::format("face {}: index {} is out of range, the mesh has {} vertices; nothing was written", face, *v,
-                             vertices));
+      fail(path, fmt::format("face {}: index {} is out of range, the mesh has {} vertices; nothing was written", face,
+                             *v, vertices));
 }
 
 std::string format_off(const TriangleMesh& mesh) {
@@ -1063,15 +1068,18 @@ std::string format_stl(const std::string& path, const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) append_bytes(out, static_cast<float>(p[k]));
   };
   for (const Triangle& t : mesh.triangles) {
-    for (const Index v : t)
-      for (int k = 0; k < 3; ++k)
-        if (std::abs(mesh.vertices[v][k]) > std::numeric_limits<float>::max())
-          fail(path, fmt::format("vertex {}: a coordinate is beyond STL's range; write OFF, OBJ or PLY", v));
-    const Vec3& a = mesh.vertices[t[0]];
-    const Vec3 normal = cross(mesh.vertices[t[1]] - a, mesh.vertices[t[2]] - a);
+    std::array<Vec3, 3> rounded;  // so that the normal is that of the corners in the file
+    for (std::size_t i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const double x = mesh.vertices[t[i]][k];
+        if (std::abs(x) > std::numeric_limits<float>::max())
+          fail(path, fmt::format("vertex {}: a coordinate is beyond STL's range; write OFF, OBJ or PLY", t[i]));
+        rounded[i][k] = static_cast<float>(x);
+      }
+    const Vec3 normal = cross(rounded[1] - rounded[0], rounded[2] - rounded[0]);
     const double length = norm(normal);
     append_floats(std::isnormal(length) ? (1 / length) * normal : Vec3{});
-    for (const Index v : t) append_floats(mesh.vertices[v]);
+    for (const Vec3& p : rounded) append_floats(p);
     append_bytes(out, std::uint16_t{0});
   }
   return out;

@@ -19,7 +19,7 @@ void check_density(const TriangleMesh& mesh, const std::vector<double>& density)
                 std::to_string(mesh.vertices.size()) + " vertices; give one per vertex");
   for (std::size_t v = 0; v < density.size(); ++v)
     if (!(std::isfinite(density[v]) && density[v] >= 0))
-      throw Error("sampling: the density of vertex " + std::to_string(v) + " is not a positive number; mend the density");
+      throw Error("sampling: the density of vertex " + std::to_string(v) + " is no positive number; mend the density");
 }
 
 // Running sums of the triangles' integrals of density, up to the common factor 1/3.

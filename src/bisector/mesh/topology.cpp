@@ -122,4 +122,23 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
   return topology;
 }
 
+std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  DisjointSets sets(vertex_count);
+  std::vector<Index> label(vertex_count, kNone);
+  for (const Triangle& t : triangles)
+    for (int k = 0; k < 3; ++k) {
+      sets.join(t[0], t[k]);
+      label[t[k]] = 0;
+    }
+  std::vector<Index> of_root(vertex_count, kNone);
+  Index count = 0;
+  for (std::size_t v = 0; v < vertex_count; ++v) {
+    if (label[v] == kNone) continue;
+    Index& component = of_root[sets.root(v)];
+    if (component == kNone) component = count++;
+    label[v] = component;
+  }
+  return label;
+}
+
 }  // namespace bisector

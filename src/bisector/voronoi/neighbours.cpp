@@ -185,6 +185,11 @@ Index Neighbours::nearest(const Vec3& q) const {
   return found;
 }
 
+std::size_t Neighbours::nearest(const Vec3& q, std::size_t count, Index* slots) const {
+  std::vector<double> squared(count);
+  return tree_->index.knnSearch(&q.x, count, slots, squared.data());
+}
+
 std::vector<Index> Neighbours::within(const Vec3& q, double r2) const {
   std::vector<std::pair<Index, double>> found;
   tree_->index.radiusSearch(&q.x, r2 * (1 + 1e-9), found, nanoflann::SearchParams(0, 0, false));

@@ -46,6 +46,8 @@ class Neighbours {
   NeighbourList wider(Index slot, const NeighbourList& shorter) const;
   // A slot whose distance to q is the least up to rounding.
   Index nearest(const Vec3& q) const;
+  // The `count` slots nearest to q in ascending distance, or all if there are fewer. Returns how many.
+  std::size_t nearest(const Vec3& q, std::size_t count, Index* slots) const;
   // All slots within squared distance r2 (1 + 1e-9) of q.
   std::vector<Index> within(const Vec3& q, double r2) const;
 

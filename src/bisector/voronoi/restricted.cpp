@@ -11,6 +11,7 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kSumBlock = 32;
+constexpr std::size_t kStepNeighbours = 6;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -142,6 +143,7 @@ struct RestrictedVoronoi::Work {
   void clip_facet(const Facet& facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
   void emit(const Facet& facet, Index slot, Clipper& clipper, Chunk& chunk, bool want_polygons) const;
   void sum_cells(std::size_t seed_count, CellMoments& result);
+  void set_step_masses(CellMoments& result) const;
   void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_polygons);
 };
 
@@ -261,6 +263,7 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
       result.cells[seeds.id[s]] = fixed_tree_sum(terms);
     }
   });
+  set_step_masses(result);
   result.mass = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].second; });
   result.certification = {};
@@ -269,6 +272,27 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
     result.certification.uncertain += chunk.certification.uncertain;
     result.certification.wider += chunk.certification.wider;
   }
+}
+
+void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
+  const std::size_t n = result.cells.size();
+  double largest = 0;
+  for (const Moments& cell : result.cells) largest = std::max(largest, cell.mass);
+  result.step_mass.resize(n);
+  parallel_each(n, [&](std::size_t i) {
+    const double mass = result.cells[i].mass;
+    result.step_mass[i] = mass;
+    const Index s = seeds.slot[i];
+    if (mass >= 0.25 * largest || s == kNone) return;
+    double around[kStepNeighbours];
+    std::size_t count = 0;
+    Index near[kStepNeighbours + 1];
+    const std::size_t found = neighbours.nearest(seeds.x[s], kStepNeighbours + 1, near);
+    for (std::size_t k = 0; k < found && count < kStepNeighbours; ++k)
+      if (near[k] != s) around[count++] = result.cells[seeds.id[near[k]]].mass;
+    std::sort(around, around + count);
+    if (count) result.step_mass[i] = std::max(mass, 0.25 * around[count / 2]);
+  });
 }
 
 void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,

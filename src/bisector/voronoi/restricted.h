@@ -43,6 +43,9 @@ struct Certification {
 // Integrals over the restricted cells; positions are relative to the seed.
 struct CellMoments {
   std::vector<Moments> cells;      // by seed; zero for an empty cell
+  // The mass, or a quarter of the median mass of the six nearest seeds where that is more: a scale for steps that does
+  // not vanish with the cell.
+  std::vector<double> step_mass;
   double mass = 0;                 // sum over the cells
   double energy = 0;               // sum of the second moments: the CVT energy
   Csr<Index> triangles;            // incident triangles of each cell, ascending

@@ -1,0 +1,21 @@
+// Keeping seeds on the surface: projection to the triangles of a seed's own cell, gradients in the tangent plane
+// (thesis 4.4.2, equation 4.7).
+#pragma once
+
+#include <vector>
+
+#include "bisector/core/types.h"
+#include "bisector/voronoi/surface.h"
+
+namespace bisector {
+
+// Moves every seed to the nearest point of the triangles of its cell, and not to the globally nearest triangle, which may
+// lie on another sheet of a thin part. `normals` receives the unit normal there. A seed without triangles stays, and has
+// the normal it had.
+void project_to_cells(const Surface& surface, const Csr<Index>& cells, std::vector<Vec3>& seeds,
+                      std::vector<Vec3>& normals);
+
+// Nearest point to p of the triangle (a, b, c).
+Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
+
+}  // namespace bisector

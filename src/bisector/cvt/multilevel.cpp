@@ -1,0 +1,155 @@
+#include "bisector/cvt/multilevel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "bisector/mesh/sampling.h"
+#include "bisector/mesh/topology.h"
+#include "bisector/voronoi/dual.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kPerComponent = 4;      // a tetrahedron
+constexpr std::size_t kCoarsest = 100;        // seeds on the coarsest level, at least
+constexpr int kLevels = 3;
+
+}  // namespace
+
+std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::uint64_t random_seed) {
+  std::vector<double> weight(surface.density.size());
+  std::transform(surface.density.begin(), surface.density.end(), weight.begin(), [](double r) { return std::sqrt(r); });
+  std::vector<SurfaceSample> samples = sample_surface(surface.mesh, count, random_seed, weight);
+
+  // Components that chance left too few move seeds over from the others.
+  const std::vector<Index> label = label_components(surface.mesh.triangles, surface.mesh.vertices.size());
+  std::vector<std::vector<Triangle>> parts;
+  for (const Facet& facet : surface.facets) {
+    const Triangle& t = surface.mesh.triangles[facet.triangle];
+    if (label[t[0]] >= parts.size()) parts.resize(label[t[0]] + 1);
+    parts[label[t[0]]].push_back(t);
+  }
+  const auto component = [&](const SurfaceSample& s) { return label[surface.mesh.triangles[s.triangle][0]]; };
+  std::vector<std::size_t> have(parts.size(), 0);
+  for (const SurfaceSample& s : samples) ++have[component(s)];
+  std::vector<Vec3> added;
+  for (Index c = 0; c < parts.size() && count >= kPerComponent * parts.size(); ++c) {
+    if (parts[c].empty() || have[c] >= kPerComponent) continue;
+    const TriangleMesh part{surface.mesh.vertices, parts[c], {}};
+    for (const SurfaceSample& s : sample_surface(part, kPerComponent - have[c], random_seed + c + 1, weight))
+      added.push_back(s.point);
+  }
+  std::size_t surplus = added.size();
+  std::vector<Vec3> seeds = std::move(added);
+  for (const SurfaceSample& s : samples) {
+    std::size_t& left = have[component(s)];
+    if (surplus > 0 && left > kPerComponent) {
+      --surplus;
+      --left;
+    } else {
+      seeds.push_back(s.point);
+    }
+  }
+  return seeds;
+}
+
+std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::size_t components, int levels) {
+  const std::size_t least = std::max(kCoarsest, kPerComponent * components);
+  std::vector<std::size_t> counts{count};
+  const int most = levels > 0 ? levels : kLevels;
+  while (static_cast<int>(counts.size()) < most) {
+    const long long coarser = (static_cast<long long>(counts.back()) + 3 * euler + 2) / 4;
+    if (coarser < static_cast<long long>(levels > 0 ? kPerComponent * components : least)) break;
+    counts.push_back(static_cast<std::size_t>(coarser));
+  }
+  std::reverse(counts.begin(), counts.end());
+  return counts;
+}
+
+std::vector<Vec3> refine(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds) {
+  std::vector<Vec3> finer = seeds;
+  for (const DualEdge& edge : extract_dual_edges(polygons)) finer.push_back(edge.midpoint);
+  return finer;
+}
+
+std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds,
+                                   const CellMoments& moments, std::size_t count) {
+  std::vector<double> squared(seeds.size(), -1);
+  std::vector<Vec3> corner(seeds.size());
+  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+    const Index cell = polygons.pairs[k].cell;
+    for (std::size_t e = polygons.offsets[k]; e < polygons.offsets[k + 1]; ++e) {
+      const double d = norm2(polygons.vertices[e] - seeds[cell]);
+      if (d > squared[cell]) {
+        squared[cell] = d;
+        corner[cell] = polygons.vertices[e];
+      }
+    }
+  }
+  std::vector<Index> order(seeds.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
+    return moments.cells[a].second > moments.cells[b].second;
+  });
+  std::vector<std::vector<Index>> around(seeds.size());
+  for (const DualEdge& e : extract_dual_edges(polygons)) {
+    around[e.a].push_back(e.b);
+    around[e.b].push_back(e.a);
+  }
+  std::vector<char> taken(seeds.size(), 0);
+  std::vector<Vec3> points;
+  for (bool spread : {true, false}) {
+    std::vector<char> blocked(seeds.size(), 0);
+    for (Index i : order) {
+      if (points.size() == count) return points;
+      if (squared[i] <= 0 || taken[i] || blocked[i]) continue;
+      taken[i] = 1;
+      points.push_back(corner[i]);
+      if (spread)
+        for (Index j : around[i]) blocked[j] = 1;
+    }
+  }
+  return points;
+}
+
+void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, std::size_t count,
+               std::vector<Vec3>& seeds) {
+  if (seeds.size() < count) {
+    const std::vector<Vec3> more = insertion_points(polygons, seeds, moments, count - seeds.size());
+    seeds.insert(seeds.end(), more.begin(), more.end());
+  }
+  if (seeds.size() <= count) return;
+  std::vector<DualEdge> edges = extract_dual_edges(polygons);
+  std::vector<double> squared(edges.size());
+  std::vector<std::size_t> order(edges.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  for (std::size_t k = 0; k < edges.size(); ++k) squared[k] = norm2(seeds[edges[k].a] - seeds[edges[k].b]);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return squared[a] < squared[b]; });
+  std::vector<char> removed(seeds.size(), 0);
+  std::size_t left = seeds.size();
+  const auto remove = [&](Index i) {
+    if (left > count && !removed[i]) {
+      removed[i] = 1;
+      --left;
+    }
+  };
+  for (Index i = 0; i < seeds.size(); ++i)
+    if (moments.cells[i].mass <= 0) remove(i);
+  for (bool spread : {true, false}) {
+    std::vector<char> blocked(seeds.size(), 0);
+    for (std::size_t k : order) {
+      const DualEdge& e = edges[k];
+      if (left == count) break;
+      if (removed[e.a] || removed[e.b] || (spread && (blocked[e.a] || blocked[e.b]))) continue;
+      remove(e.b);
+      blocked[e.a] = blocked[e.b] = 1;
+    }
+  }
+  std::size_t n = 0;
+  for (Index i = 0; i < seeds.size(); ++i)
+    if (!removed[i]) seeds[n++] = seeds[i];
+  seeds.resize(n);
+}
+
+}  // namespace bisector

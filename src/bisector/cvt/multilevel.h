@@ -1,0 +1,32 @@
+// Seeds to start from, and from one level of seeds to the next finer one.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bisector/cvt/backend.h"
+
+namespace bisector {
+
+// `count` random points, density-weighted by sqrt(rho) (thesis 4.4.1), at least four on each closed component of the
+// surface where the count allows it.
+std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::uint64_t random_seed);
+
+// Seeds per level, coarse to fine, the last being `count`: refining by edge midpoints turns V vertices into 4 V - 3 chi on
+// a closed surface of Euler characteristic chi. `levels` 0 means as many as leave the coarsest enough seeds, at most 3.
+std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::size_t components, int levels);
+
+// The seeds and one new seed on every restricted Voronoi edge between two of them.
+std::vector<Vec3> refine(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds);
+
+// Removes one end of the shortest dual edges, or adds seeds where the energy is highest, until there are `count`; at most
+// doubles the seeds. `polygons` and `moments` are those of the seeds given.
+void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, std::size_t count,
+               std::vector<Vec3>& seeds);
+
+// Up to `count` points to insert: corners of cells farthest from their seeds, cells of highest energy first, no two points
+// from neighbouring cells before every cell had its turn.
+std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds,
+                                   const CellMoments& moments, std::size_t count);
+
+}  // namespace bisector

@@ -1,0 +1,164 @@
+#include "bisector/cvt/optimise.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "bisector/core/parallel.h"
+#include "bisector/cvt/constrain.h"
+#include "bisector/cvt/lbfgs.h"
+#include "bisector/cvt/multilevel.h"
+
+namespace bisector {
+namespace {
+
+constexpr double kMassTolerance = 1e-12;   // relative; a diagram whose cells do not add up is never used
+constexpr double kArmijo = 1e-4;
+constexpr int kLineSearchTrials = 8;
+constexpr std::size_t kDecreaseWindow = 5;
+constexpr int kReseedTrials = 10;
+
+void evaluate(Backend& backend, bool constrained, CvtState& state, OptimiseTotals& totals) {
+  backend.evaluate(state.seeds, state.moments);
+  totals.count(state.moments);
+  const double total = backend.surface().mass;
+  const bool covers = std::abs(state.moments.mass - total) <= kMassTolerance * total;
+  state.energy = covers ? state.moments.energy : std::numeric_limits<double>::infinity();
+  state.gradient.resize(state.seeds.size());
+  parallel_each(state.seeds.size(), [&](std::size_t i) {
+    Vec3 g = -2.0 * state.moments.cells[i].first;
+    if (constrained) g -= dot(g, state.normals[i]) * state.normals[i];
+    state.gradient[i] = g;
+  });
+  state.gradient_norm = std::sqrt(inner(state.gradient, state.gradient));
+}
+
+bool has_empty_cell(const CvtState& state) {
+  return std::any_of(state.moments.cells.begin(), state.moments.cells.end(), [](const Moments& m) { return m.mass <= 0; });
+}
+
+// Puts the seeds of empty cells at far corners of the cells of highest energy.
+void reseed(Backend& backend, CvtState& state) {
+  RestrictedPolygons polygons;
+  backend.evaluate(state.seeds, state.moments, polygons);
+  std::vector<Index> empty;
+  for (Index i = 0; i < state.seeds.size(); ++i)
+    if (state.moments.cells[i].mass <= 0) empty.push_back(i);
+  const std::vector<Vec3> points = insertion_points(polygons, state.seeds, state.moments, empty.size());
+  for (std::size_t k = 0; k < points.size(); ++k) state.seeds[empty[k]] = points[k];
+}
+
+void start(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals) {
+  if (options.constrained) {
+    backend.evaluate(state.seeds, state.moments);
+    totals.count(state.moments);
+    state.normals.assign(state.seeds.size(), Vec3{});
+    project_to_cells(backend.surface(), state.moments.triangles, state.seeds, state.normals);
+  }
+  evaluate(backend, options.constrained, state, totals);
+  for (int trial = 0; trial < kReseedTrials && has_empty_cell(state); ++trial) {
+    reseed(backend, state);
+    evaluate(backend, options.constrained, state, totals);
+    if (options.constrained) project_to_cells(backend.surface(), state.moments.triangles, state.seeds, state.normals);
+  }
+  if (!std::isfinite(state.energy))
+    throw Error("the diagram does not cover the surface; its coordinates may span too many magnitudes");
+}
+
+std::vector<double> preconditioner(const CellMoments& moments) {
+  const double mean = moments.mass / static_cast<double>(moments.cells.size());
+  std::vector<double> d(moments.step_mass.size());
+  for (std::size_t i = 0; i < d.size(); ++i) d[i] = 2 * (moments.step_mass[i] > 0 ? moments.step_mass[i] : mean);
+  return d;
+}
+
+// Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then `next`
+// is not to be used.
+bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3>& direction, bool constrained,
+                 CvtState& next, OptimiseTotals& totals) {
+  const double slope = inner(state.gradient, direction);
+  if (!(slope < 0)) return false;
+  double step = 1;
+  for (int trial = 0; trial < kLineSearchTrials; ++trial) {
+    next.seeds = state.seeds;
+    parallel_each(next.seeds.size(), [&](std::size_t i) { next.seeds[i] += step * direction[i]; });
+    if (constrained) {
+      next.normals = state.normals;
+      project_to_cells(backend.surface(), state.moments.triangles, next.seeds, next.normals);
+    }
+    evaluate(backend, constrained, next, totals);
+    if (next.energy <= state.energy + kArmijo * step * slope) return true;
+    const double excess = next.energy - state.energy - step * slope;
+    const double vertex = std::isfinite(excess) ? -0.5 * slope * step * step / excess : 0;
+    step = std::clamp(vertex, 0.1 * step, 0.5 * step);
+  }
+  return false;
+}
+
+}  // namespace
+
+void OptimiseTotals::count(const CellMoments& moments) {
+  ++evaluations;
+  seconds.delaunay += moments.seconds.delaunay;
+  seconds.neighbours += moments.seconds.neighbours;
+  seconds.pairs += moments.seconds.pairs;
+  seconds.clip += moments.seconds.clip;
+}
+
+void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
+              const Context& context) {
+  const auto begin = std::chrono::steady_clock::now();
+  const DiagramSeconds before = totals.seconds;
+  start(backend, state, options, totals);
+
+  Lbfgs history;
+  CvtState next;
+  std::vector<double> energies{state.energy};
+  const double first_norm = state.gradient_norm;
+  bool restarted = false;
+  for (int iteration = 0; iteration < options.iterations; ++iteration) {
+    context.check();
+    if (state.gradient_norm <= options.tolerance * first_norm) break;
+    const std::vector<Vec3> direction = history.direction(state.gradient, preconditioner(state.moments));
+    if (!line_search(backend, state, direction, options.constrained, next, totals)) {
+      // Once from scratch along the gradient; if that finds nothing either, this is the minimum to rounding.
+      if (restarted) break;
+      restarted = true;
+      history.clear();
+      continue;
+    }
+    restarted = false;
+    ++totals.iterations;
+    if (has_empty_cell(next)) {
+      std::swap(state, next);
+      start(backend, state, options, totals);
+      history.clear();
+    } else {
+      std::vector<Vec3> s = next.seeds, y = next.gradient;
+      parallel_each(s.size(), [&](std::size_t i) {
+        s[i] -= state.seeds[i];
+        y[i] -= state.gradient[i];
+      });
+      history.push(std::move(s), std::move(y));
+      std::swap(state, next);
+    }
+    energies.push_back(state.energy);
+    Progress progress = options.progress;
+    progress.iteration = iteration + 1;
+    progress.iterations = options.iterations;
+    progress.energy = state.energy;
+    progress.gradient_norm = state.gradient_norm;
+    context.report(progress);
+    const std::size_t n = energies.size();
+    if (n > kDecreaseWindow &&
+        energies[n - 1 - kDecreaseWindow] - energies[n - 1] < kDecreaseWindow * options.decrease * energies[n - 1])
+      break;
+  }
+  const double total = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const DiagramSeconds& after = totals.seconds;
+  totals.seconds_lbfgs += total - (after.delaunay - before.delaunay) - (after.neighbours - before.neighbours) -
+                          (after.pairs - before.pairs) - (after.clip - before.clip);
+}
+
+}  // namespace bisector

@@ -1,0 +1,43 @@
+// The optimisation loop: minimises the CVT energy F = sum_i int rho |x - x_i|^2 by L-BFGS (thesis 4.4.2; Liu et al. 2009).
+#pragma once
+
+#include <vector>
+
+#include "bisector/core/context.h"
+#include "bisector/cvt/backend.h"
+
+namespace bisector {
+
+struct OptimiseOptions {
+  int iterations = 100;        // accepted steps at most
+  double tolerance = 1e-4;     // stop when the gradient norm is below this share of that of one Lloyd step's start
+  double decrease = 0;         // stop when the energy falls by less than this share per step, over five steps
+  bool constrained = false;    // CCVT: seeds stay on the surface, gradients in its tangent planes
+  Progress progress;           // phase and total; iteration, energy and gradient are filled in
+};
+
+struct OptimiseTotals {
+  int iterations = 0;
+  int evaluations = 0;
+  DiagramSeconds seconds;
+  double seconds_lbfgs = 0;
+
+  void count(const CellMoments& moments);
+};
+
+// Seeds with all that is known about their diagram. `moments`, `gradient` and `energy` belong to `seeds`.
+struct CvtState {
+  std::vector<Vec3> seeds;
+  CellMoments moments;
+  std::vector<Vec3> gradient;  // dF/dx_i = 2 m_i (x_i - c_i), tangential if constrained
+  std::vector<Vec3> normals;   // of the surface at each seed, if constrained
+  double energy = 0;
+  double gradient_norm = 0;
+};
+
+// Moves state.seeds downhill; reads nothing else of the state, and leaves it complete. Seeds whose cells are empty are put
+// where the energy is highest. Throws Cancelled between evaluations, and Error if a diagram does not cover the surface.
+void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
+              const Context& context);
+
+}  // namespace bisector

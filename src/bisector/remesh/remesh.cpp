@@ -1,0 +1,85 @@
+#include "bisector/remesh/remesh.h"
+
+#include <chrono>
+#include <optional>
+
+#include "bisector/core/parallel.h"
+#include "bisector/cvt/cpu_backend.h"
+#include "bisector/cvt/multilevel.h"
+#include "bisector/cvt/optimise.h"
+#include "bisector/remesh/topology_control.h"
+#include "bisector/voronoi/dual.h"
+
+namespace bisector {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+void check_options(const RemeshOptions& options) {
+  if (options.seeds.empty() && options.vertices < 4)
+    throw Error("a remeshed surface needs at least 4 vertices; ask for more");
+  if (!options.seeds.empty() && options.seeds.size() < 4)
+    throw Error("a remeshed surface needs at least 4 seeds; give more");
+}
+
+}  // namespace
+
+RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
+  const auto begin = Clock::now();
+  check_options(options);
+  std::optional<ThreadLimit> limit;
+  if (options.threads) limit.emplace(options.threads);
+  RemeshResult result;
+  result.input_topology = analyse_topology(input.triangles, input.vertices.size());
+
+  const Surface surface(input);
+  CpuBackend backend(surface, options.neighbours);
+  CvtState state;
+  OptimiseTotals totals;
+  RestrictedPolygons polygons;
+
+  const std::vector<std::size_t> counts =
+      options.seeds.empty() ? level_counts(options.vertices, result.input_topology.euler,
+                                           result.input_topology.components, options.levels)
+                            : std::vector<std::size_t>{options.seeds.size()};
+  state.seeds = options.seeds.empty() ? initial_seeds(surface, counts.front(), options.random_seed) : options.seeds;
+
+  OptimiseOptions step;
+  step.iterations = options.iterations;
+  step.tolerance = options.tolerance;
+  for (std::size_t level = 0; level < counts.size(); ++level) {
+    optimise(backend, state, step, totals, context);
+    if (level + 1 == counts.size()) break;
+    backend.evaluate(state.seeds, state.moments, polygons);
+    state.seeds = refine(polygons, state.seeds);
+    while (state.seeds.size() != counts[level + 1]) {
+      backend.evaluate(state.seeds, state.moments, polygons);
+      set_count(polygons, state.moments, counts[level + 1], state.seeds);
+    }
+  }
+  if (options.energy == Energy::constrained) {
+    step.constrained = true;
+    optimise(backend, state, step, totals, context);
+  }
+  if (options.topology == TopologyControl::enforce)
+    enforce_topology(backend, state, result.input_topology, step, totals, context);
+
+  const auto extraction = Clock::now();
+  backend.evaluate(state.seeds, state.moments, polygons);
+  result.untiled = count_untiled(surface, polygons);
+  result.mesh = dual_mesh(state.seeds, polygons);
+  result.topology = analyse_topology(result.mesh.triangles, result.mesh.vertices.size());
+  result.topology_matches = same_topology(result.topology, result.input_topology);
+  result.iterations = totals.iterations;
+  result.evaluations = totals.evaluations;
+  result.energy = state.energy;
+  result.gradient_norm = state.gradient_norm;
+  result.certification = state.moments.certification;
+  result.seconds = {seconds_since(begin), totals.seconds.delaunay, totals.seconds.neighbours, totals.seconds.pairs,
+                    totals.seconds.clip, totals.seconds_lbfgs, seconds_since(extraction)};
+  return result;
+}
+
+}  // namespace bisector

@@ -1,0 +1,23 @@
+// Seeds for the places where the dual is not a manifold like the input (thesis 4.4.4).
+#pragma once
+
+#include <vector>
+
+#include "bisector/cvt/optimise.h"
+#include "bisector/mesh/topology.h"
+
+namespace bisector {
+
+// The restricted Delaunay triangulation with the seeds that have triangles as vertices, in their order.
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons& polygons);
+
+// Whether `dual` is manifold and oriented, and closed and of Euler characteristic and components as the input.
+bool same_topology(const MeshTopology& dual, const MeshTopology& input);
+
+// While the dual differs in topology from a manifold input: moves seeds from where the energy is lowest to the cells that
+// break it, and optimises again. The number of seeds stays. Returns whether the topology is the input's; gives up after
+// a bounded number of rounds.
+bool enforce_topology(Backend& backend, CvtState& state, const MeshTopology& input, OptimiseOptions options,
+                      OptimiseTotals& totals, const Context& context);
+
+}  // namespace bisector
