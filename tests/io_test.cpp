@@ -345,7 +345,7 @@ TEST_F(Io, SplitsPolygons) {
       for (std::size_t i = 0; i < 4; ++i) turned.push_back(dart[(start + (back ? 4 - i : i)) % 4]);
       const TriangleMesh mesh = polygon(turned);
       EXPECT_EQ(mesh.triangles.size(), 2u);
-      expect_tiles(mesh, 2);
+      expect_tiles(mesh, 1);
     }
   // A comb with collinear points on its back, tilted in space.
   std::vector<Vec3> comb;
@@ -420,7 +420,7 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
       {"a.off", "OFF\n-4 2 0\n", ":2: the number of vertices is negative"},
       {"a.off", "OFF\n4 -2 0\n", ":2: the number of faces is negative"},
       {"a.off", "OFF\n4.5 2 0\n", ":2: '4.5' is not an integer"},
-      {"a.off", replaced(off, "4 2 0", "4294967294 2 0"), ":7: "},
+      {"a.off", replaced(off, "4 2 0", "4294967294 2 0"), ":9: the file ends after 6 of 4294967294 vertices"},
       {"a.off", replaced(off, "4 2 0", "4294967295 2 0"), ":2: "},
       {"a.off", replaced(off, "4 2 0", "99999999999999999999 2 0"), ":2: "},
       {"a.off", replaced(off, "4 2 0", "4 4000000000 0"), ":9: the file ends after 2 of 4000000000 faces"},
@@ -441,7 +441,7 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
       {"a.off", replaced(off, "1 1 0", "1 1 +-1"), ":5: '+-1' is not a number"},
       {"a.off", replaced(off, "1 1 0", std::string("1 1 \0\x1b\xff", 7)), ":5: "},
       {"a.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", ": face 0: there is no face"},
-      {"a.off", off.substr(0, off.size() / 2), ":6: the file ends after 3 of 4 vertices"},
+      {"a.off", off.substr(0, off.find("0 1 0")), ":6: the file ends after 3 of 4 vertices"},
       // OBJ
       {"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", ": face 0: there is no face"},
       {"a.obj", "nothing of use\n", ": face 0: there is no face"},
@@ -465,7 +465,7 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
       {"a.ply", replaced(ply, "format ascii 1.0\n", ""), ":8: the header has no format line"},
       {"a.ply", replaced(ply, "vertex 4", "vertex -4"), ":3: the number of items is negative"},
       {"a.ply", replaced(ply, "vertex 4", "vertex 4e9"), ":3: '4e9' is not an integer"},
-      {"a.ply", replaced(ply, "vertex 4", "vertex 4000000000"), ":14: "},
+      {"a.ply", replaced(ply, "vertex 4", "vertex 4000000000"), ":16: the file ends after 6 of 4000000000 items"},
       {"a.ply", replaced(ply, "face 2", "face 4000000000"), ":16: the file ends after 2 of 4000000000 items of 'face'"},
       {"a.ply", replaced(ply, "face 2", "face 0"), ": face 0: there is no face"},
       {"a.ply", replaced(ply, "face", "fact"), ":9: the header has no element 'face'"},
@@ -499,8 +499,8 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
       // STL
       {"a.stl", "solid nothing\nendsolid nothing\n", ": face 0: there is no face"},
       {"a.stl", "solid", ":1: the file ends after 0 faces"},
-      {"a.stl", stl.substr(0, stl.size() - 18), ":16: the file ends after 2 faces"},
-      {"a.stl", stl.substr(0, stl.size() / 2), ":9: the file ends after 1 face"},
+      {"a.stl", stl.substr(0, stl.find("endsolid")), ":16: the file ends after 2 faces"},
+      {"a.stl", stl.substr(0, stl.find("endfacet") + 9), ":9: the file ends after 1 face"},
       {"a.stl", replaced(stl, "vertex 1 0 0", "vertex 1 0"), ":5: a number is missing"},
       {"a.stl", replaced(stl, "vertex 1 0 0", "vertex 1 0 nan"), ":5: a coordinate is not finite"},
       {"a.stl", replaced(stl, "vertex 1 0 0\n", ""), ":7: a facet has 2 corners"},
@@ -510,7 +510,7 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
       {"a.stl", replaced(stl, "endfacet", "endfacet\nvertex 0 0 0"), ":9: a vertex outside any facet"},
       {"a.stl", replaced(stl, "endloop", "endlop"), ":7: 'endlop' is not an STL keyword"},
       {"a.stl", "too short for a header", ": byte 22: the file ends in the header"},
-      {"a.stl", bstl.substr(0, 83), ": byte 83: the file ends in the header"},
+      {"a.stl", replaced(bstl.substr(0, 83), "solid", "shell"), ": byte 83: the file ends in the header"},
       {"a.stl", bstl.substr(0, bstl.size() - 1), ": face 1: the file ends here, of 2 declared"},
       {"a.stl", bstl_many, ": face 2: the file ends here, of 4294967295 declared"},
       {"a.stl", bstl_with(nan), ": face 1: a coordinate is not finite"},

@@ -107,8 +107,7 @@ std::string read_bytes(const std::string& path) {
   for (;;) {
     // One byte more than expected shows the end; a pipe does not tell its size and is read in growing pieces.
     if (size == bytes.size())
-      bytes.resize(std::max({2 * size, static_cast<std::size_t>(std::max<off_t>(status.st_size, 0)) + 1,
-                             std::size_t{1} << 16}));
+      bytes.resize(size > 0 ? 2 * size : status.st_size > 0 ? static_cast<std::size_t>(status.st_size) + 1 : 1 << 16);
     const ssize_t n = ::read(file.descriptor(), bytes.data() + size, bytes.size() - size);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) fail(path, fmt::format("cannot be read: {}; check the disk", std::strerror(errno)));

@@ -16,6 +16,17 @@ constexpr double kSteep = 1e-8;
 
 }  // namespace
 
+Clipper::Clipper() : lines_(3) {
+  for (unsigned k = 0; k < 3; ++k) {
+    Line& line = lines_[k];
+    for (unsigned m = 0; m < 3; ++m) line.h[m] = m == (k + 2) % 3;
+    line.scale = 1;
+    line.squared = 0;
+    line.slot = kEdgeLabel | k;
+    line.id = kNone;
+  }
+}
+
 void Clipper::start(const SortedSeeds& seeds, const Facet& facet, Index slot) {
   seeds_ = &seeds;
   facet_ = &facet;
@@ -23,31 +34,29 @@ void Clipper::start(const SortedSeeds& seeds, const Facet& facet, Index slot) {
   uncertain_ = wider_ = false;
   lines_.resize(3);
   edges_.assign({0, 1, 2});
-  vertices_.resize(3);
-  largest_ = facet_squared_ = 0;
-  for (unsigned k = 0; k < 3; ++k) {
-    const Vec3 p = facet.corners[k] - seeds.x[slot];
-    local_[k] = p;
-    largest_ = std::max({largest_, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-    Line& line = lines_[k];
-    const unsigned opposite = (k + 2) % 3;
-    for (unsigned m = 0; m < 3; ++m) {
-      line.h[m] = m == opposite;
-      vertices_[k].lambda[m] = m == k;
-    }
-    line.scale = 1;
-    line.slot = kEdgeLabel | k;
-    vertices_[k].bound = 12 * kUnit;
-    vertices_[k].squared = norm2(p) * (1 + 1e-12);
-    facet_squared_ = std::max(facet_squared_, vertices_[k].squared);
+  largest_ = 0;
+  for (int k = 0; k < 3; ++k) {
+    local_[k] = facet.corners[k] - seeds.x[slot];
+    largest_ = std::max({largest_, std::abs(local_[k].x), std::abs(local_[k].y), std::abs(local_[k].z)});
   }
-  reach_ = facet_squared_;
 }
 
 void Clipper::take(const SortedSeeds& seeds, const Facet& facet, Index slot) { start(seeds, facet, slot); }
 
 bool Clipper::clip(const SortedSeeds& seeds, const Neighbours& neighbours, const Facet& facet, Index slot) {
   start(seeds, facet, slot);
+  vertices_.resize(3);
+  facet_squared_ = 0;
+  for (unsigned k = 0; k < 3; ++k) {
+    Vertex& v = vertices_[k];
+    for (unsigned m = 0; m < 3; ++m) v.lambda[m] = m == k;
+    v.bound = 12 * kUnit;
+    v.at = local_[k];
+    v.slack = 8 * kUnit * largest_;
+    v.squared = norm2(v.at) * (1 + 1e-12);
+    facet_squared_ = std::max(facet_squared_, v.squared);
+  }
+  reach_ = facet_squared_;
   const Vec3 x = seeds.x[slot];
   NeighbourList list = neighbours.list(slot);
   for (;;) {
@@ -67,9 +76,16 @@ bool Clipper::clip(const SortedSeeds& seeds, const Neighbours& neighbours, const
 }
 
 void Clipper::cut(Index other, const Vec3& d, double squared) {
+  const std::size_t n = edges_.size();
+  const double taxicab = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
+  const double half = 0.5 * squared * (1 - 1e-12);
+  bool apart = true;
+  for (const Vertex& v : vertices_) apart &= dot(v.at, d) + v.slack * taxicab < half;
+  if (apart) return;
+
   Line line;
   const double extent = std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) + 2 * largest_;
-  line.scale = (std::abs(d.x) + std::abs(d.y) + std::abs(d.z)) * extent;
+  line.scale = taxicab * extent;
   if (!(line.scale > kSmallestScale && line.scale < kLargestScale)) line.scale = kInfinity;
   for (int m = 0; m < 3; ++m) {
     const Vec3& p = local_[m];
@@ -78,8 +94,8 @@ void Clipper::cut(Index other, const Vec3& d, double squared) {
   line.towards = d;
   line.squared = squared;
   line.slot = other;
+  line.id = seeds_->id[other];
 
-  const std::size_t n = edges_.size();
   sides_.resize(n);
   int outside = 0;
   for (std::size_t k = 0; k < n; ++k) {
@@ -130,7 +146,7 @@ int Clipper::side(std::size_t k, const Line& line) {
 
 // The bounds follow from |h| <= scale and the error 7 u scale of h: each component of the product a x b is off by at most
 // 33 u S_a S_b, and so the value of a further line c by 99 u S_a S_b S_c + 10 u S_c sum |lambda|, to first order.
-Vertex Clipper::meet(const Line& a, const Line& b) const {
+Clipper::Vertex Clipper::meet(const Line& a, const Line& b) const {
   Vertex v;
   v.lambda[0] = a.h[1] * b.h[2] - a.h[2] * b.h[1];
   v.lambda[1] = a.h[2] * b.h[0] - a.h[0] * b.h[2];
@@ -139,13 +155,15 @@ Vertex Clipper::meet(const Line& a, const Line& b) const {
   const double sum = std::abs(v.lambda[0]) + std::abs(v.lambda[1]) + std::abs(v.lambda[2]);
   v.bound = kUnit * (100 * scales + 12 * sum);
   const double total = v.lambda[0] + v.lambda[1] + v.lambda[2];
-  // Error of the position below, relative to the largest coordinate; every point of the facet is within it anyway.
+  // Error of the position, relative to the largest coordinate. Every point of the facet is within facet_squared_ anyway.
   const double error = kUnit * (200 * scales / total + 12);
   v.squared = facet_squared_;
+  v.slack = kInfinity;
   if (total > 0 && error < 1e-4) {
-    const Vec3 p = v.lambda[0] * local_[0] + v.lambda[1] * local_[1] + v.lambda[2] * local_[2];
-    const double off = 4 * error * largest_;
-    v.squared = std::min(v.squared, norm2(p) / (total * total) * (1 + 1e-6) + 2e6 * (off * off));
+    v.at = (1 / total) * (v.lambda[0] * local_[0] + v.lambda[1] * local_[1] + v.lambda[2] * local_[2]);
+    v.slack = (error + 16 * kUnit) * largest_;
+    const double off = 2 * v.slack;
+    v.squared = std::min(v.squared, norm2(v.at) * (1 + 1e-6) + 2e6 * (off * off));
   }
   return v;
 }
@@ -161,9 +179,9 @@ ExactLine Clipper::exact(const Line& line) const {
 
 // The facet's plane and the two lines' planes, all within the cell's scale of the seed, meet at the vertex: edges as the planes
 // through them along the normal, the lower label first.
-Vec3 Clipper::position(const Line& before, const Line& after) {
+Vec3 Clipper::position(const Line& before, const Line& after) const {
   if (is_edge(before.slot) && is_edge(after.slot)) return local_[after.slot & ~kEdgeLabel];
-  const bool swap = is_edge(after.slot) || (!is_edge(before.slot) && seeds_->id[after.slot] < seeds_->id[before.slot]);
+  const bool swap = is_edge(after.slot) || (!is_edge(before.slot) && after.id < before.id);
   const Line& low = swap ? after : before;
   const Line& high = swap ? before : after;
   const Vec3& n = facet_->normal;
@@ -185,20 +203,19 @@ Vec3 Clipper::position(const Line& before, const Line& after) {
   return inverse * p;
 }
 
-double Clipper::density(std::size_t k) const {
+double Clipper::density(const Line& before, const Line& after, const Vec3& point) const {
   const double* r = facet_->density;
-  const Index after = lines_[edges_[k]].slot, before = lines_[edges_[k ? k - 1 : edges_.size() - 1]].slot;
-  if (is_edge(before) && is_edge(after)) return r[after & ~kEdgeLabel];
-  const double value = r[facet_->anchor] + dot(facet_->gradient, points_[k] - local_[facet_->anchor]);
+  if (is_edge(before.slot) && is_edge(after.slot)) return r[after.slot & ~kEdgeLabel];
+  const double value = r[facet_->anchor] + dot(facet_->gradient, point - local_[facet_->anchor]);
   return std::min(std::max(value, std::min({r[0], r[1], r[2]})), std::max({r[0], r[1], r[2]}));
 }
 
 // The entry of the edge with the smallest label: facet edges by their vertices' indices, then seeds.
 std::size_t Clipper::first_entry() const {
   const auto key = [&](std::size_t k) {
-    const Index slot = lines_[edges_[k]].slot;
-    return is_edge(slot) ? static_cast<std::uint64_t>(facet_->rank[slot & ~kEdgeLabel])
-                         : std::uint64_t{3} + seeds_->id[slot];
+    const Line& line = lines_[edges_[k]];
+    return is_edge(line.slot) ? static_cast<std::uint64_t>(facet_->rank[line.slot & ~kEdgeLabel])
+                              : std::uint64_t{3} + line.id;
   };
   std::size_t first = 0;
   for (std::size_t k = 1; k < edges_.size(); ++k)
@@ -209,22 +226,24 @@ std::size_t Clipper::first_entry() const {
 template <bool kUniform>
 Moments Clipper::integrate() {
   const std::size_t n = edges_.size();
-  const std::size_t first = first_entry();
-  std::rotate(edges_.begin(), edges_.begin() + static_cast<std::ptrdiff_t>(first), edges_.end());
-  std::rotate(vertices_.begin(), vertices_.begin() + static_cast<std::ptrdiff_t>(first), vertices_.end());
   points_.resize(n);
-  densities_.resize(n);
+  if constexpr (!kUniform) densities_.resize(n);
+  const Line* before = &lines_[edges_[n - 1]];
   for (std::size_t k = 0; k < n; ++k) {
-    points_[k] = position(lines_[edges_[k ? k - 1 : n - 1]], lines_[edges_[k]]);
-    if constexpr (!kUniform) densities_[k] = density(k);
+    const Line* after = &lines_[edges_[k]];
+    points_[k] = position(*before, *after);
+    if constexpr (!kUniform) densities_[k] = density(*before, *after, points_[k]);
+    before = after;
   }
+  const std::size_t apex = first_entry();
+  const auto next = [n](std::size_t k) { return k + 1 == n ? 0 : k + 1; };
   Moments sum;
-  for (std::size_t k = 1; k + 1 < n; ++k) {
-    const double area = 0.5 * dot(facet_->normal, cross(points_[k] - points_[0], points_[k + 1] - points_[0]));
+  for (std::size_t b = next(apex), c = next(b); c != apex; b = c, c = next(c)) {
+    const double area = 0.5 * dot(facet_->normal, cross(points_[b] - points_[apex], points_[c] - points_[apex]));
     if constexpr (kUniform)
-      sum += triangle_moments(points_[0], points_[k], points_[k + 1], area);
+      sum += triangle_moments(points_[apex], points_[b], points_[c], area);
     else
-      sum += triangle_moments(points_[0], points_[k], points_[k + 1], densities_[0], densities_[k], densities_[k + 1], area);
+      sum += triangle_moments(points_[apex], points_[b], points_[c], densities_[apex], densities_[b], densities_[c], area);
   }
   return sum;
 }

@@ -18,6 +18,12 @@ struct Moments {
   }
 };
 
+// The moments about x of a shape whose moments about `origin` are m; `to_origin` is origin - x.
+inline Moments moved(const Moments& m, const Vec3& to_origin) {
+  return {m.mass, m.mass * to_origin + m.first,
+          m.mass * norm2(to_origin) + 2 * dot(to_origin, m.first) + m.second};
+}
+
 // Moments of the triangle (a, b, c) of signed area `area` with density 1.
 inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, double area) {
   const Vec3 s = a + b + c;

@@ -141,7 +141,7 @@ struct RestrictedVoronoi::Work {
   void find_owners(std::size_t seed_count);
   void clip_facets(bool want_polygons);
   void clip_facet(const Facet& facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
-  void emit(const Facet& facet, Index slot, Clipper& clipper, Chunk& chunk, bool want_polygons) const;
+  void emit(const Clipper& clipper, const Facet& facet, Index slot, Chunk& chunk) const;
   void sum_cells(std::size_t seed_count, CellMoments& result);
   void set_step_masses(CellMoments& result) const;
   void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_polygons);
@@ -164,11 +164,7 @@ void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
   });
 }
 
-void RestrictedVoronoi::Work::emit(const Facet& facet, Index slot, Clipper& clipper, Chunk& chunk,
-                                   bool want_polygons) const {
-  const Moments moments = surface.density.empty() ? clipper.integrate<true>() : clipper.integrate<false>();
-  chunk.contributions.push_back({slot, facet.triangle, moments});
-  if (!want_polygons) return;
+void RestrictedVoronoi::Work::emit(const Clipper& clipper, const Facet& facet, Index slot, Chunk& chunk) const {
   RestrictedPolygons& out = chunk.polygons;
   out.pairs.push_back({facet.triangle, seeds.id[slot]});
   for (std::size_t k = 0; k < clipper.size(); ++k) {
@@ -180,24 +176,33 @@ void RestrictedVoronoi::Work::emit(const Facet& facet, Index slot, Clipper& clip
 }
 
 void RestrictedVoronoi::Work::clip_facet(const Facet& facet, Walker& walker, Chunk& chunk, bool want_polygons) const {
+  Clipper& clipper = walker.clipper;
+  const bool uniform = surface.density.empty();
   const Index first = owner[facet.site[0]];
+  // A cell is convex: it holds the facet if it owns the corners.
   if (first == owner[facet.site[1]] && first == owner[facet.site[2]]) {
-    walker.clipper.take(seeds, facet, first);
-    emit(facet, first, walker.clipper, chunk, want_polygons);
+    chunk.contributions.push_back(
+        {first, facet.triangle, moved(facet.moments, facet.corners[facet.anchor] - seeds.x[first])});
+    if (want_polygons) {
+      clipper.take(seeds, facet, first);
+      clipper.integrate<true>();
+      emit(clipper, facet, first, chunk);
+    }
     return;
   }
   walker.begin(seeds.x.size());
   for (Index site : facet.site) walker.meet(owner[site]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index slot = walker.queue[head];
-    Clipper& clipper = walker.clipper;
     const bool found = clipper.clip(seeds, neighbours, facet, slot);
     chunk.certification.uncertain += clipper.uncertain();
     chunk.certification.wider += clipper.wider();
     if (!found) continue;
     for (std::size_t k = 0; k < clipper.size(); ++k)
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
-    emit(facet, slot, clipper, chunk, want_polygons);
+    chunk.contributions.push_back(
+        {slot, facet.triangle, uniform ? clipper.integrate<true>() : clipper.integrate<false>()});
+    if (want_polygons) emit(clipper, facet, slot, chunk);
   }
 }
 

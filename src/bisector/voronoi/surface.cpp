@@ -87,19 +87,19 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     f.gradient = (1 / twice_area) * cross(f.normal, (f.density[1] - f.density[0]) * (f.corners[0] - f.corners[2]) +
                                                         (f.density[2] - f.density[0]) * (f.corners[1] - f.corners[0]));
     f.anchor = static_cast<unsigned char>(std::min_element(v.begin(), v.end()) - v.begin());
+    const Vec3 origin = f.corners[f.anchor];
+    f.moments = triangle_moments(f.corners[0] - origin, f.corners[1] - origin, f.corners[2] - origin, f.density[0],
+                                 f.density[1], f.density[2], 0.5 * twice_area);
     std::sort(edges.begin(), edges.end());
     for (unsigned char r = 0; r < 3; ++r) f.rank[edges[r][2]] = r;
     facet_of[t] = static_cast<Index>(facets.size());
     facets.push_back(f);
   }
-  const auto facet_area = [&](const Facet& f) {
-    return 0.5 * dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
-  };
-  area = fixed_sum(facets.size(), [&](std::size_t k) { return facet_area(facets[k]); });
-  mass = density.empty() ? area : fixed_sum(facets.size(), [&](std::size_t k) {
+  area = fixed_sum(facets.size(), [&](std::size_t k) {
     const Facet& f = facets[k];
-    return facet_area(f) * ((f.density[0] + f.density[1] + f.density[2]) / 3);
+    return 0.5 * dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
   });
+  mass = fixed_sum(facets.size(), [&](std::size_t k) { return facets[k].moments.mass; });
 }
 
 }  // namespace bisector

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bisector/core/types.h"
+#include "bisector/voronoi/moments.h"
 
 namespace bisector {
 
@@ -17,6 +18,7 @@ struct Facet {
   Vec3 normal;              // unit length
   double density[3];        // at the corners
   Vec3 gradient;            // of the density
+  Moments moments;          // of the whole facet, about the anchor
   Index site[3];            // of the corners, in Surface::sites
   Index triangle;           // index in the mesh
   unsigned char anchor;     // the corner of lowest vertex index

@@ -1,0 +1,434 @@
+#include "commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bisector/core/parallel.h"
+#include "bisector/mesh/io.h"
+#include "bisector/mesh/preview.h"
+#include "bisector/mesh/sampling.h"
+#include "bisector/voronoi/dual.h"
+#include "cells.h"
+#include "console.h"
+#include "outputs.h"
+#include "report.h"
+
+namespace bisector::cli {
+namespace {
+
+// Only the CPU computes so far; what asks for another device is refused rather than served by it.
+Device choose_device(const ComputeOptions& options) {
+  if (options.device != "auto" && options.device != "cpu")
+    throw Error(fmt::format("--device {}: this version computes on the CPU only; use --device cpu", options.device));
+  if (options.precision == "single")
+    throw Error("--precision single: the CPU computes in double precision only; use --precision double");
+  return cpu_device();
+}
+
+NeighbourSource choose_neighbours(const ComputeOptions& options) {
+  return options.neighbours == "delaunay" ? NeighbourSource::delaunay : NeighbourSource::nearest;
+}
+
+Json seconds_json(const DiagramSeconds& seconds) {
+  return {{"delaunay", seconds.delaunay},
+          {"neighbors", seconds.neighbours},
+          {"pairs", seconds.pairs},
+          {"clip", seconds.clip}};
+}
+
+const char* yes_no(bool b) { return b ? "yes" : "no"; }
+
+// "1 face", "2 faces".
+std::string counted(std::size_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
+
+std::string size_of(const Json& mesh) {
+  return counted(mesh["vertices"], "vertex", "vertices") + ", " + counted(mesh["faces"], "face", "faces");
+}
+
+std::string describe(const MeshTopology& topology) {
+  return fmt::format("{}, {}, {}, {}, Euler characteristic {}", topology.manifold ? "manifold" : "not manifold",
+                     topology.closed ? "closed" : "open", topology.oriented ? "oriented" : "not oriented",
+                     counted(topology.components, "component", "components"), topology.euler);
+}
+
+void print_seconds(Console& console, const Json& seconds) {
+  std::string line = "seconds   ";
+  for (const auto& [phase, value] : seconds.items()) line += fmt::format(" {} {:.3f} ", phase, value.get<double>());
+  console.print(line);
+}
+
+void print_written(Console& console, const std::vector<std::string>& paths) {
+  std::string line;
+  for (const std::string& path : paths)
+    if (!path.empty() && path != "-") line += (line.empty() ? "written    " : ", ") + path;
+  if (!line.empty()) console.print(line);
+}
+
+std::vector<Vec3> read_seeds(const std::string& path, std::size_t count) {
+  std::vector<Vec3> seeds = read_points(path);
+  if (count != 0 && count != seeds.size())
+    throw Error(fmt::format("{}: {} in the file, but -n asks for {}; leave -n out", path,
+                            counted(seeds.size(), "seed", "seeds"), count));
+  return seeds;
+}
+
+// --- remesh ---
+
+RemeshOptions remesh_options(const RemeshCommand& command) {
+  RemeshOptions options = command.options;
+  options.threads = command.common.threads;
+  options.neighbours = choose_neighbours(command.compute);
+  options.energy = command.energy == "rcvt" ? Energy::restricted : Energy::constrained;
+  options.topology = command.topology == "enforce" ? TopologyControl::enforce
+                     : command.topology == "check" ? TopologyControl::check
+                                                   : TopologyControl::off;
+  if (!command.seeds.empty()) {
+    options.seeds = read_seeds(command.seeds, options.vertices);
+    options.vertices = options.seeds.size();
+  }
+  return options;
+}
+
+void require_sound(const RemeshResult& result) {
+  if (result.untiled > 0)
+    throw Error(fmt::format("the final diagram does not tile {} of the input; please report this as a bug",
+                            counted(result.untiled, "triangle", "triangles")));
+  if (result.mesh.triangles.empty())
+    throw Error("the seeds are too few to span a triangle of this surface; ask for more vertices");
+}
+
+void warn_of_topology(Console& console, const RemeshResult& result) {
+  if (result.topology_matches) return;
+  console.warn(fmt::format("the output's topology ({}) is not the input's ({}); ask for more vertices",
+                           describe(result.topology), describe(result.input_topology)));
+}
+
+Json remesh_report(const RemeshResult& result, const TriangleMesh& input, const Device& device) {
+  Json report = start_report("remesh");
+  report["device"] = device_json(device);
+  report["input"] = input_json(input);
+  report["output"] = output_json(result.mesh);
+  report["iterations"] = result.iterations;
+  report["evaluations"] = result.evaluations;
+  report["energy"] = result.energy;
+  report["gradient_norm"] = result.gradient_norm;
+  return report;
+}
+
+Json remesh_seconds(const RemeshSeconds& seconds) {
+  Json json{{"total", seconds.total}};
+  json.update(seconds_json({seconds.delaunay, seconds.neighbours, seconds.pairs, seconds.clip}));
+  json["lbfgs"] = seconds.lbfgs;
+  json["extract"] = seconds.extract;
+  json["remesh"] = seconds.total;
+  return json;
+}
+
+void print_summary(Console& console, const RemeshCommand& command, const RemeshResult& result,
+                   const QualityReport& quality, const Json& input, const Json& seconds) {
+  console.print(fmt::format("input      {}: {}", command.input, size_of(input)));
+  console.print(fmt::format("output     {}: {}", command.output, size_of(output_json(result.mesh))));
+  console.print(fmt::format("quality    q_min {:.4f}, theta_min {:.2f} degrees, {:.3g} % of the triangles below 30 degrees",
+                            quality.q_min, quality.theta_min, quality.theta_below_30));
+  console.print(fmt::format("           on average q {:.4f}, theta_min {:.2f}; {:.1f} % of the vertices have 6 neighbors",
+                            quality.q_ave, quality.theta_min_ave, 100 * quality.valence6));
+  console.print(fmt::format("topology   {}{}", describe(result.topology),
+                            result.topology_matches ? "; as the input" : "; NOT as the input"));
+  console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));
+  console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
+  if (command.common.verbose) print_seconds(console, seconds);
+  print_written(console, {command.output, command.preview, command.common.report});
+}
+
+// --- rvd ---
+
+struct Diagram {
+  CellMoments moments;
+  RestrictedPolygons polygons;
+  Dual dual;
+};
+
+Diagram compute_diagram(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source) {
+  Diagram diagram;
+  RestrictedVoronoi(surface).evaluate(seeds, source, diagram.moments, diagram.polygons);
+  if (const std::size_t untiled = count_untiled(surface, diagram.polygons); untiled > 0)
+    throw Error(fmt::format("the diagram does not tile {} of the input; please report this as a bug",
+                            counted(untiled, "triangle", "triangles")));
+  diagram.dual = extract_dual(diagram.polygons);
+  return diagram;
+}
+
+Json cells_json(const CellMoments& moments, const std::vector<Vec3>& seeds) {
+  Json cells = Json::array();
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    const Moments& m = moments.cells[i];
+    const Json centroid = m.mass > 0 ? point_json(seeds[i] + (1 / m.mass) * m.first) : Json(nullptr);
+    cells.push_back({{"mass", m.mass}, {"centroid", centroid}, {"energy", m.second}});
+  }
+  return cells;
+}
+
+Json rdt_json(const Dual& dual) {
+  std::vector<Triangle> triples = dual.triangles;
+  for (Triangle& t : triples) std::sort(t.begin(), t.end());
+  std::sort(triples.begin(), triples.end());
+  return triples;
+}
+
+// Lines "face seed", sorted, each once.
+std::string format_pairs(const RestrictedPolygons& polygons, const TriangleMesh& mesh) {
+  std::vector<std::pair<Index, Index>> pairs;
+  for (const auto& [triangle, cell] : polygons.pairs)
+    pairs.emplace_back(mesh.face_of_triangle.empty() ? triangle : mesh.face_of_triangle[triangle], cell);
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  fmt::memory_buffer text;
+  for (const auto& [face, cell] : pairs) fmt::format_to(std::back_inserter(text), "{} {}\n", face, cell);
+  return fmt::to_string(text);
+}
+
+// --- quality ---
+
+struct QualityMeasures {
+  QualityReport quality;
+  std::size_t self_intersections = 0;
+  DistanceReport distance;  // if there is a reference
+};
+
+void print_quality(Console& console, const QualityCommand& command, const QualityMeasures& measures, const Json& input) {
+  const QualityReport& q = measures.quality;
+  const MeshTopology& t = q.topology;
+  const auto row = [&](const char* name, const std::string& value, const char* meaning = "") {
+    console.print(fmt::format("{:<20}{:>14}{}{}", name, value, *meaning ? "   " : "", meaning));
+  };
+  const auto number = [](double x) { return fmt::format("{:.6g}", x); };
+  console.print(command.mesh);
+  row("vertices", fmt::to_string(input["vertices"].get<std::size_t>()));
+  row("faces", fmt::to_string(input["faces"].get<std::size_t>()));
+  row("q_min", number(q.q_min), "worst triangle quality; 1 is equilateral");
+  row("q_ave", number(q.q_ave), "average");
+  row("theta_min", number(q.theta_min), "smallest angle, degrees");
+  row("theta_min_ave", number(q.theta_min_ave), "average of each triangle's smallest");
+  row("theta_max", number(q.theta_max), "largest angle, degrees");
+  row("theta_below_30", number(q.theta_below_30), "% of triangles with an angle below 30 degrees");
+  row("valence6", number(q.valence6), "share of interior vertices with six neighbors");
+  row("edge_min", number(q.edge_min), "shortest edge");
+  row("edge_ave", number(q.edge_ave));
+  row("edge_max", number(q.edge_max), "longest edge");
+  row("area", number(q.area));
+  row("zero_area", fmt::to_string(q.zero_area), "triangles without area");
+  row("manifold", yes_no(t.manifold));
+  if (!t.manifold) {
+    row("", fmt::to_string(t.non_manifold_edges), "non-manifold edges");
+    row("", fmt::to_string(t.non_manifold_vertices), "non-manifold vertices");
+  }
+  row("closed", yes_no(t.closed));
+  if (!t.closed) row("", fmt::to_string(t.boundary_edges), "boundary edges");
+  row("oriented", yes_no(t.oriented), "neighboring triangles agree");
+  row("euler", fmt::to_string(t.euler), "Euler characteristic V - E + F");
+  row("components", fmt::to_string(t.components));
+  row("self_intersections", fmt::to_string(measures.self_intersections), "pairs of triangles");
+  if (command.reference.empty()) return;
+  console.print("two-sided distance to " + command.reference + ", % of its diagonal");
+  row("distance_mean", number(measures.distance.mean));
+  row("distance_rms", number(measures.distance.rms));
+  row("distance_max", number(measures.distance.max), "Hausdorff distance, from below");
+}
+
+}  // namespace
+
+void run(const RemeshCommand& command) {
+  const Stopwatch total;
+  const Device device = choose_device(command.compute);
+  const std::string& report_path = command.common.report;
+  check_outputs({{command.output, kMeshFormats}, {command.preview, {".png"}}, {report_path, {}}},
+                {command.input, command.seeds});
+  const ThreadLimit limit(command.common.threads);
+  Console console(command.common.quiet, report_path == "-");
+  const Context context = console.context();
+
+  console.phase("reading " + command.input);
+  Stopwatch reading;
+  const TriangleMesh input = read_mesh(command.input, context);
+  const RemeshOptions options = remesh_options(command);
+  double io = reading.seconds();
+
+  console.phase("preparing");
+  const RemeshResult result = remesh(input, options, context);
+  require_sound(result);
+  if (options.topology != TopologyControl::off) warn_of_topology(console, result);
+
+  const Stopwatch measuring;
+  const QualityReport quality = measure_quality(result.mesh);
+  Json report;
+  if (!report_path.empty()) {
+    report = remesh_report(result, input, device);
+    Json measures = quality_json(quality);
+    console.phase("looking for self-intersections");
+    measures["self_intersections"] = count_self_intersections(result.mesh);
+    console.phase("measuring the distance to the input");
+    add_distance(measures, measure_distance(result.mesh, input));
+    report["seconds"] = nullptr;
+    report["certification"] = certification_json(result.certification);
+    report["quality"] = std::move(measures);
+    report["topology"] = topology_json(result.topology);
+    report["topology"]["matches_input"] = result.topology_matches;
+  }
+  Json seconds = remesh_seconds(result.seconds);
+  seconds["quality"] = measuring.seconds();
+
+  console.phase("writing " + command.output);
+  stop_watching_interrupts();
+  const Stopwatch writing;
+  write_mesh(command.output, result.mesh);
+  io += writing.seconds();
+  const Stopwatch drawing;
+  if (!command.preview.empty()) write_preview(command.preview, result.mesh);
+  seconds["preview"] = drawing.seconds();
+  seconds["io"] = io;
+  seconds["total"] = total.seconds();
+  if (!report_path.empty()) {
+    report["seconds"] = seconds;
+    write_report(report_path, report);
+  }
+  print_summary(console, command, result, quality, input_json(input), seconds);
+}
+
+void run(const RvdCommand& command) {
+  const Stopwatch total;
+  const Device device = choose_device(command.compute);
+  const std::string& report_path = command.common.report;
+  check_outputs({{command.output, {".ply"}}, {command.preview, {".png"}}, {command.pairs, {}}, {report_path, {}}},
+                {command.input, command.seeds});
+  const ThreadLimit limit(command.common.threads);
+  Console console(command.common.quiet, report_path == "-");
+
+  console.phase("reading " + command.input);
+  const Stopwatch reading;
+  const TriangleMesh input = read_mesh(command.input, console.context());
+  std::vector<Vec3> seeds;
+  if (!command.seeds.empty()) seeds = read_seeds(command.seeds, command.count);
+  else for (const SurfaceSample& s : sample_surface(input, command.count, command.random_seed)) seeds.push_back(s.point);
+  double io = reading.seconds();
+
+  console.phase("computing the diagram");
+  const Surface surface(input);
+  const Stopwatch computing;
+  const Diagram diagram = compute_diagram(surface, seeds, choose_neighbours(command.compute));
+  const CellMoments& moments = diagram.moments;
+  const DiagramSeconds& phases = moments.seconds;
+  const double extract =
+      computing.seconds() - (phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
+  if (std::abs(moments.mass - surface.mass) > 1e-12 * surface.mass)
+    console.warn(fmt::format("the masses of the cells sum to {}, the area is {}", moments.mass, surface.mass));
+  const auto empty = std::count_if(moments.cells.begin(), moments.cells.end(),
+                                   [](const Moments& m) { return m.mass == 0; });
+
+  console.phase("writing");
+  stop_watching_interrupts();
+  const Stopwatch writing;
+  if (!command.output.empty() || !command.preview.empty()) {
+    const PolygonMesh cells = coloured_cells(diagram.polygons, seeds.size());
+    if (!command.output.empty()) write_polygons(command.output, cells);
+    PreviewOptions picture;
+    picture.edges = false;
+    picture.outlines = true;
+    picture.colours = cells.colours;
+    if (!command.preview.empty()) write_preview(command.preview, cells.vertices, cells.polygons, picture);
+  }
+  if (!command.pairs.empty()) write_file(command.pairs, format_pairs(diagram.polygons, input));
+  io += writing.seconds();
+
+  Json seconds{{"total", total.seconds()}};
+  seconds.update(seconds_json(phases));
+  seconds["extract"] = extract;
+  seconds["io"] = io;
+  if (!report_path.empty()) {
+    Json report = start_report("rvd");
+    report["device"] = device_json(device);
+    report["input"] = input_json(input);
+    report["energy"] = moments.energy;
+    report["mass"] = moments.mass;
+    report["untiled"] = 0;
+    report["seconds"] = seconds;
+    report["certification"] = certification_json(moments.certification);
+    report["cells"] = cells_json(moments, seeds);
+    report["rdt"] = rdt_json(diagram.dual);
+    write_report(report_path, report);
+  }
+  console.print(fmt::format("input      {}: {}", command.input, size_of(input_json(input))));
+  console.print(fmt::format("cells      {}, {} of them empty; energy {:.6e}", seeds.size(), empty, moments.energy));
+  console.print(fmt::format("pairs      {} of a cell and a triangle, {} decided in exact arithmetic",
+                            moments.certification.pairs, moments.certification.uncertain));
+  console.print(fmt::format("dual       {}", counted(diagram.dual.triangles.size(), "triangle", "triangles")));
+  if (command.common.verbose) print_seconds(console, seconds);
+  print_written(console, {command.output, command.preview, command.pairs, report_path});
+}
+
+void run(const QualityCommand& command) {
+  const Stopwatch total;
+  const std::string& report_path = command.common.report;
+  check_outputs({{}, {report_path, {}}}, {command.mesh, command.reference});
+  const ThreadLimit limit(command.common.threads);
+  Console console(command.common.quiet, report_path == "-");
+  const Context context = console.context();
+
+  console.phase("reading " + command.mesh);
+  const Stopwatch reading;
+  const TriangleMesh mesh = read_mesh(command.mesh, context);
+  TriangleMesh reference;
+  if (!command.reference.empty()) reference = read_mesh(command.reference, context);
+  Json seconds{{"total", 0.0}, {"io", reading.seconds()}};
+
+  const Stopwatch measuring;
+  QualityMeasures measures;
+  measures.quality = measure_quality(mesh);
+  console.phase("looking for self-intersections");
+  measures.self_intersections = count_self_intersections(mesh);
+  if (!command.reference.empty()) {
+    console.phase("measuring the distance to " + command.reference);
+    measures.distance = measure_distance(mesh, reference);
+  }
+  console.phase("done");
+  seconds["quality"] = measuring.seconds();
+  seconds["total"] = total.seconds();
+
+  if (!report_path.empty()) {
+    stop_watching_interrupts();
+    Json report = start_report("quality");
+    report["input"] = input_json(mesh);
+    if (!command.reference.empty()) report["reference"] = input_json(reference);
+    report["seconds"] = seconds;
+    Json quality = quality_json(measures.quality);
+    quality["self_intersections"] = measures.self_intersections;
+    if (!command.reference.empty()) add_distance(quality, measures.distance);
+    report["quality"] = std::move(quality);
+    report["topology"] = topology_json(measures.quality.topology);
+    write_report(report_path, report);
+  }
+  print_quality(console, command, measures, input_json(mesh));
+  if (command.common.verbose) print_seconds(console, seconds);
+  print_written(console, {report_path});
+}
+
+void run(const DevicesCommand& command) {
+  check_outputs({{}, {command.report, {}}}, {});
+  const Device device = cpu_device();
+  if (!command.report.empty()) {
+    Json entry = device_json(device);
+    entry["threads"] = device.threads;
+    entry["memory"] = device.memory;
+    Json report = start_report("devices");
+    report["devices"] = Json::array({entry});
+    write_report(command.report, report);
+  }
+  Console console(false, command.report == "-");
+  console.print(fmt::format("cpu   {}: {}, {:.1f} GiB of memory, double precision", device.name,
+                            counted(device.threads, "thread", "threads"), device.memory / 0x1p30));
+  print_written(console, {command.report});
+}
+
+}  // namespace bisector::cli

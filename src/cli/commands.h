@@ -1,0 +1,57 @@
+// The subcommands: each reads its input, calls the library, and writes and prints the result.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "bisector/remesh/remesh.h"
+
+namespace bisector::cli {
+
+struct CommonOptions {
+  std::string report;       // file name, "-" for stdout, or empty
+  unsigned threads = 0;     // 0: all cores
+  bool quiet = false;
+  bool verbose = false;
+};
+
+// What computes diagrams, as the words of the command line.
+struct ComputeOptions {
+  std::string device = "auto";
+  std::string precision = "auto";
+  std::string neighbours = "auto";
+};
+
+struct RemeshCommand {
+  std::string input, output, seeds, preview;
+  std::string topology = "enforce", energy = "ccvt";
+  RemeshOptions options;
+  ComputeOptions compute;
+  CommonOptions common;
+};
+
+struct RvdCommand {
+  std::string input, output, seeds, pairs, preview;
+  std::size_t count = 0;
+  std::uint64_t random_seed = 1;
+  ComputeOptions compute;
+  CommonOptions common;
+};
+
+struct QualityCommand {
+  std::string mesh, reference;
+  CommonOptions common;
+};
+
+struct DevicesCommand {
+  std::string report;
+};
+
+// All throw Error and Cancelled; then no output was written.
+void run(const RemeshCommand& command);
+void run(const RvdCommand& command);
+void run(const QualityCommand& command);
+void run(const DevicesCommand& command);
+
+}  // namespace bisector::cli

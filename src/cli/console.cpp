@@ -1,0 +1,119 @@
+#include "console.h"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+
+namespace bisector::cli {
+namespace {
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+extern "C" void on_interrupt(int) {
+  if (interrupted.exchange(true)) _exit(kInterrupted);
+}
+
+void handle_interrupts(void (*handler)(int)) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART;
+  for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
+}
+
+std::string one_line(std::string_view text) {
+  std::string line(text);
+  for (char& c : line)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  return line;
+}
+
+std::size_t terminal_width() {
+  winsize size{};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+std::string time_left(double seconds) {
+  if (seconds < 60) return fmt::format("{:.0f} s left", seconds);
+  if (seconds < 3600) return fmt::format("{:.0f} min left", seconds / 60);
+  return fmt::format("{:.1f} h left", seconds / 3600);
+}
+
+}  // namespace
+
+const std::atomic<bool>& watch_interrupts() {
+  handle_interrupts(on_interrupt);
+  return interrupted;
+}
+
+void stop_watching_interrupts() {
+  handle_interrupts(SIG_IGN);
+  if (interrupted) throw Cancelled();
+}
+
+void print_error(std::string_view message) { fmt::print(stderr, "bisector: error: {}\n", one_line(message)); }
+
+Console::Console(bool quiet, bool stdout_is_taken)
+    : quiet_(quiet), live_(!quiet && isatty(STDERR_FILENO)), out_(stdout_is_taken ? stderr : stdout) {}
+
+Console::~Console() { clear_line(); }
+
+Context Console::context() {
+  Context context;
+  if (live_) context.progress = [this](const Progress& progress) { show(progress); };
+  context.warning = [this](const std::string& line) { warn(line); };
+  context.cancel = &interrupted;
+  return context;
+}
+
+void Console::phase(const std::string& what) {
+  if (interrupted) throw Cancelled();
+  if (live_) show_line(what);
+}
+
+void Console::warn(std::string_view message) {
+  if (quiet_) return;
+  clear_line();
+  fmt::print(stderr, "bisector: warning: {}\n", one_line(message));
+}
+
+void Console::print(std::string_view line) {
+  if (quiet_) return;
+  clear_line();
+  fmt::print(out_, "{}\n", line);
+}
+
+void Console::show(const Progress& progress) {
+  const Clock::time_point now = Clock::now();
+  if (now - last_shown_ < std::chrono::milliseconds(100)) return;
+  last_shown_ = now;
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
+  std::string line = fmt::format("{}  iteration {}/{}  energy {:.6e}  gradient {:.2e}  {:.0f} %", progress.phase,
+                                 progress.iteration, progress.iterations, progress.energy, progress.gradient_norm,
+                                 100 * fraction);
+  if (fraction > 0.02) line += "  " + time_left(elapsed * (1 - fraction) / fraction);
+  show_line(std::move(line));
+}
+
+// The line must not reach the last column, or the terminal would wrap it.
+void Console::show_line(std::string line) {
+  line = one_line(line).substr(0, terminal_width() - 1);
+  const std::size_t length = line.size();
+  if (length < shown_) line.append(shown_ - length, ' ');
+  fmt::print(stderr, "\r{}", line);
+  std::fflush(stderr);
+  shown_ = length;
+}
+
+void Console::clear_line() {
+  if (shown_ == 0) return;
+  fmt::print(stderr, "\r{}\r", std::string(shown_, ' '));
+  std::fflush(stderr);
+  shown_ = 0;
+}
+
+}  // namespace bisector::cli

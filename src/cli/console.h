@@ -1,0 +1,58 @@
+// What a run says on the terminal, and Ctrl-C.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+#include "bisector/core/context.h"
+
+namespace bisector::cli {
+
+// Exit codes, part of the program's contract.
+inline constexpr int kSuccess = 0;
+inline constexpr int kFailure = 1;      // bad input or a failed run
+inline constexpr int kUsage = 2;        // bad usage
+inline constexpr int kInterrupted = 130;  // Ctrl-C or SIGTERM: nothing was written
+
+// From here on Ctrl-C and SIGTERM set the flag that is returned; a second one ends the program at once.
+const std::atomic<bool>& watch_interrupts();
+// From here on they are ignored, so that outputs are written together. Throws Cancelled if one came before.
+void stop_watching_interrupts();
+
+// One line on stderr: "bisector: error: ...". Control characters in it are replaced.
+void print_error(std::string_view message);
+
+class Console {
+ public:
+  // `quiet` leaves errors only. With `stdout_is_taken`, text for people goes to stderr.
+  Console(bool quiet, bool stdout_is_taken);
+  ~Console();
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+
+  // For the library; refers to this console.
+  Context context();
+  // Shows what is being done. Throws Cancelled after Ctrl-C.
+  void phase(const std::string& what);
+  void warn(std::string_view message);
+  // One line of the summary.
+  void print(std::string_view line);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void show(const Progress& progress);
+  void show_line(std::string line);
+  void clear_line();
+
+  bool quiet_;
+  bool live_;             // stderr is a terminal and may show progress
+  std::FILE* out_;
+  std::size_t shown_ = 0;  // characters of the progress line
+  Clock::time_point start_ = Clock::now(), last_shown_{};
+};
+
+}  // namespace bisector::cli

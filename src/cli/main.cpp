@@ -1,0 +1,290 @@
+// The program: command line to commands, exceptions to exit codes.
+#include <CLI/CLI.hpp>
+
+#include <charconv>
+#include <cmath>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "console.h"
+
+namespace {
+
+using namespace bisector::cli;
+
+constexpr std::uint64_t kMostSeeds = 100'000'000;
+
+// The help of one command, with its usage written out.
+class Help : public CLI::Formatter {
+ public:
+  explicit Help(std::string usage) : usage_(std::move(usage)) {
+    column_width(32);
+    label("REQUIRED", "(required)");
+  }
+  std::string make_usage(const CLI::App*, std::string) const override { return "\nUsage: " + usage_ + "\n"; }
+
+ private:
+  std::string usage_;
+};
+
+// Decimal digits only: CLI11 alone would read 010 as eight and skip over much else.
+CLI::Validator whole_number(std::uint64_t least, std::uint64_t most) {
+  return CLI::Validator(
+      [=](std::string& text) -> std::string {
+        std::uint64_t value = 0;
+        const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error != std::errc{} || stop != text.data() + text.size() || value < least || value > most)
+          return "'" + text + "' is not a whole number from " + std::to_string(least) + " to " + std::to_string(most);
+        text = std::to_string(value);
+        return {};
+      },
+      "");
+}
+
+CLI::Validator number_below(double most) {
+  return CLI::Validator(
+      [=](std::string& text) -> std::string {
+        double value = 0;
+        const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error == std::errc{} && stop == text.data() + text.size() && value >= 0 && value < most) return {};
+        return "'" + text + "' is not a number of at least 0 and less than " + CLI::detail::to_string(most);
+      },
+      "");
+}
+
+CLI::Validator one_of(const std::vector<std::string>& words) {
+  return CLI::Validator(
+      [=](std::string& text) -> std::string {
+        for (const std::string& word : words)
+          if (text == word) return {};
+        return "'" + text + "' is none of " + CLI::detail::join(words, ", ");
+      },
+      "");
+}
+
+CLI::Validator device_name() {
+  return CLI::Validator(
+      [](std::string& text) -> std::string {
+        if (text == "auto" || text == "cpu" || text == "vulkan" || text.rfind("vulkan:", 0) == 0) return {};
+        return "'" + text + "' is none of auto, cpu, vulkan, vulkan:INDEX, vulkan:UUID";
+      },
+      "");
+}
+
+CLI::Validator not_empty() {
+  return CLI::Validator([](std::string& text) { return std::string(text.empty() ? "the name is empty" : ""); }, "");
+}
+
+CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const char* type, const char* help) {
+  return app->add_option(name, path, help)->type_name(type)->check(not_empty());
+}
+
+void add_compute_options(CLI::App* app, ComputeOptions& options) {
+  app->add_option("--device", options.device,
+                  "what computes: auto, cpu, vulkan, vulkan:INDEX or\n"
+                  "vulkan:UUID; this version has cpu only")
+      ->type_name("DEVICE")->check(device_name())->group("Computation");
+  app->add_option("--precision", options.precision, "auto, single or double; cpu has double only")
+      ->type_name("WORD")->check(one_of({"auto", "single", "double"}))->group("Computation");
+  app->add_option("--neighbors", options.neighbours,
+                  "where neighbors of seeds come from: auto, nearest or\n"
+                  "delaunay; the result is the same")
+      ->type_name("WORD")->check(one_of({"auto", "delaunay", "nearest"}))->group("Computation");
+}
+
+void add_common_options(CLI::App* app, CommonOptions& options, const char* about) {
+  app->add_option("--threads", options.threads, "at most so many; default: all cores. The result is the same")
+      ->type_name("N")->check(whole_number(1, 1024))->group("Computation");
+  add_file(app, "--report", options.report, "FILE", about)->group("Output");
+  app->add_flag("--quiet", options.quiet, "print errors only")->group("Output");
+  app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
+}
+
+void add_random_seed(CLI::App* app, std::uint64_t& random_seed) {
+  app->add_option("--random-seed", random_seed, "another number, another start; default 1")
+      ->type_name("N")->check(whole_number(0, UINT64_MAX))->group("Seeds");
+}
+
+CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer) {
+  CLI::App* app = program.add_subcommand(name, about);
+  app->group("Commands")->footer(footer);
+  app->formatter(std::make_shared<Help>(usage));
+  app->get_help_ptr()->description("print this and exit")->group("Output");
+  return app;
+}
+
+CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
+  CLI::App* app = add_command(
+      program, "remesh", "Make a high-quality triangle mesh of a surface, with as many vertices as you ask for.",
+      "bisector remesh IN -o OUT -n N [options]",
+      "Examples:\n"
+      "  bisector remesh bunny.off -o out.obj -n 10000\n"
+      "  bisector remesh part.stl -o out.ply -n 5000 --report out.json --preview out.png\n\n"
+      "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written.");
+  add_file(app, "IN", command.input, "FILE", "surface to remesh")->required();
+  add_file(app, "-o,--output", command.output, "FILE", "mesh to write")->required()->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the result")->group("Output");
+  app->add_option("-n,--vertices", command.options.vertices, "vertices of the result, at least 4")
+      ->type_name("N")->check(whole_number(4, kMostSeeds))->group("Seeds");
+  add_file(app, "--seeds", command.seeds, "FILE.xyz",
+           "start from these points (\"x y z\" lines) in one level;\n"
+           "-n is then not needed")
+      ->group("Seeds");
+  add_random_seed(app, command.options.random_seed);
+  app->add_option("--topology", command.topology,
+                  "where the result's topology is not the input's:\n"
+                  "enforce (mend it; default), check (warn) or off")
+      ->type_name("WORD")->check(one_of({"enforce", "check", "off"}))->group("Optimisation");
+  app->add_option("--energy", command.energy, "ccvt (seeds on the surface; default) or rcvt (free)")
+      ->type_name("WORD")->check(one_of({"rcvt", "ccvt"}))->group("Optimisation");
+  app->add_option("--iterations", command.options.iterations, "at most so many per level; default 100")
+      ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
+  app->add_option("--tolerance", command.options.tolerance,
+                  "stop when the gradient has fallen to this share;\n"
+                  "default 1e-4")
+      ->type_name("T")->check(number_below(1))->group("Optimisation");
+  app->add_option("--levels", command.options.levels,
+                  "coarse-to-fine levels, 1 to 8; default: as many as the\n"
+                  "count allows, at most 3")
+      ->type_name("N")->check(whole_number(1, 8))->group("Optimisation");
+  add_compute_options(app, command.compute);
+  add_common_options(app, command.common,
+                     "write a JSON report with quality, distance to the\n"
+                     "input and timings; - for stdout");
+  return app;
+}
+
+CLI::App* add_rvd(CLI::App& program, RvdCommand& command) {
+  CLI::App* app = add_command(
+      program, "rvd", "Compute one restricted Voronoi diagram of a surface, without optimisation.",
+      "bisector rvd IN --seeds FILE.xyz|-n N [-o CELLS.ply] [options]",
+      "Examples:\n"
+      "  bisector rvd bunny.off -n 500 -o cells.ply --preview cells.png\n"
+      "  bisector rvd bunny.off --seeds points.xyz --report -");
+  add_file(app, "IN", command.input, "FILE", "surface: .off, .obj, .ply or .stl")->required();
+  add_file(app, "-o,--output", command.output, "FILE.ply", "write the cells as coloured polygons")->group("Output");
+  add_file(app, "--pairs", command.pairs, "FILE",
+           "write \"face seed\" lines, one for each face (counted\n"
+           "from 0 in the input) and cell that meet, sorted")
+      ->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the cells")->group("Output");
+  add_file(app, "--seeds", command.seeds, "FILE.xyz", "the seeds, as \"x y z\" lines")->group("Seeds");
+  app->add_option("-n,--count", command.count, "so many random seeds instead")
+      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Seeds");
+  add_random_seed(app, command.random_seed);
+  add_compute_options(app, command.compute);
+  add_common_options(app, command.common,
+                     "write a JSON report with all cells and the restricted\n"
+                     "Delaunay triangulation (rdt); - for stdout");
+  return app;
+}
+
+CLI::App* add_quality(CLI::App& program, QualityCommand& command) {
+  CLI::App* app = add_command(
+      program, "quality", "Measure a mesh: angles, valences, topology, self-intersections, distance to another.",
+      "bisector quality MESH [--reference IN] [options]",
+      "Example:\n"
+      "  bisector quality out.obj --reference bunny.off");
+  add_file(app, "MESH", command.mesh, "FILE", "mesh to measure: .off, .obj, .ply or .stl")->required();
+  add_file(app, "--reference", command.reference, "IN", "also measure the two-sided distance to this mesh")
+      ->group("Output");
+  add_common_options(app, command.common, "write a JSON report; - for stdout");
+  return app;
+}
+
+CLI::App* add_devices(CLI::App& program, DevicesCommand& command) {
+  CLI::App* app = add_command(program, "devices", "List what Bisector can compute on here.",
+                              "bisector devices [--report FILE]", "Example:\n  bisector devices");
+  add_file(app, "--report", command.report, "FILE", "write a JSON report; - for stdout")->group("Output");
+  return app;
+}
+
+// What options ask of each other.
+void check_usage(const RemeshCommand& command) {
+  if (command.seeds.empty() && command.options.vertices == 0)
+    throw CLI::RequiredError("how many vertices? -n N or --seeds FILE.xyz");
+  if (!command.seeds.empty() && command.options.levels > 1)
+    throw CLI::ValidationError("--levels: seeds from a file imply one level");
+}
+
+void check_usage(const RvdCommand& command) {
+  if (command.seeds.empty() && command.count == 0) throw CLI::RequiredError("which seeds? --seeds FILE.xyz or -n N");
+}
+
+int fail_usage(const std::string& message, const CLI::App* command) {
+  const std::string help = command ? "bisector " + command->get_name() + " --help" : "bisector --help";
+  print_error(message + "; see " + help);
+  return kUsage;
+}
+
+// Runs the command and maps what it throws to an exit code.
+int run_guarded(const std::function<void()>& command) {
+  try {
+    command();
+    return kSuccess;
+  } catch (const bisector::Cancelled&) {
+    std::fputs("bisector: cancelled\n", stderr);
+    return kInterrupted;
+  } catch (const std::bad_alloc&) {
+    print_error("not enough memory; ask for fewer vertices or use a larger machine");
+  } catch (const std::exception& error) {
+    print_error(error.what());
+  }
+  return kFailure;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App program{"Bisector makes high-quality triangle meshes of surfaces by optimising certified Voronoi diagrams."};
+  program.name("bisector");
+  program.formatter(std::make_shared<Help>("bisector COMMAND ..."));
+  program.footer(
+      "Start with:\n"
+      "  bisector remesh IN.off -o OUT.obj -n 10000     remesh with 10,000 vertices\n"
+      "  bisector quality OUT.obj --reference IN.off    see how good the result is\n"
+      "  bisector remesh --help                         all options of a command\n\n"
+      "Exit codes: 0 success, 1 bad input or a failed run, 2 bad usage, 130 cancelled. On failure nothing is written.");
+  program.set_version_flag("--version", std::string("bisector ") + BISECTOR_VERSION, "print the version and exit");
+  program.get_help_ptr()->description("print this and exit");
+  program.require_subcommand(0, 1);
+
+  RemeshCommand remesh;
+  RvdCommand rvd;
+  QualityCommand quality;
+  DevicesCommand devices;
+  CLI::App* const remesh_app = add_remesh(program, remesh);
+  CLI::App* const rvd_app = add_rvd(program, rvd);
+  CLI::App* const quality_app = add_quality(program, quality);
+  CLI::App* const devices_app = add_devices(program, devices);
+  const auto chosen = [&]() -> const CLI::App* {
+    const auto parsed = program.get_subcommands();
+    return parsed.empty() ? nullptr : parsed.front();
+  };
+
+  try {
+    program.parse(argc, argv);
+    if (remesh_app->parsed()) check_usage(remesh);
+    if (rvd_app->parsed()) check_usage(rvd);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.exit(error);
+    return fail_usage(error.what(), chosen());
+  }
+  if (!chosen()) {
+    std::fputs(program.help().c_str(), stdout);
+    return fail_usage("no command given", nullptr);
+  }
+
+  watch_interrupts();
+  return run_guarded([&] {
+    if (remesh_app->parsed()) run(remesh);
+    if (rvd_app->parsed()) run(rvd);
+    if (quality_app->parsed()) run(quality);
+    if (devices_app->parsed()) run(devices);
+  });
+}

@@ -1,0 +1,80 @@
+#include "outputs.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "bisector/core/error.h"
+
+namespace bisector::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Where the bytes go: links are followed.
+fs::path target_of(const std::string& path) {
+  std::error_code error;
+  const fs::path target = fs::weakly_canonical(path, error);
+  return error ? fs::path(path) : target;
+}
+
+bool is_special(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+void check_extension(const Output& output) {
+  if (output.extensions.empty()) return;
+  std::string extension = fs::path(output.path).extension();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  if (std::find(output.extensions.begin(), output.extensions.end(), extension) == output.extensions.end())
+    throw Error(fmt::format("{}: '{}' is not a format that can be written here; use {}", output.path, extension,
+                            fmt::join(output.extensions, ", ")));
+}
+
+void check_writable(const std::string& path) {
+  const fs::path target = target_of(path);
+  std::error_code error;
+  if (path.back() == '/' || fs::is_directory(target, error))
+    throw Error(path + ": is a directory; name a file");
+  if (is_special(target)) {
+    if (access(target.c_str(), W_OK) != 0)
+      throw Error(fmt::format("{}: cannot be written: {}; name another file", path, std::strerror(errno)));
+    return;
+  }
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, error))
+    throw Error(fmt::format("{}: the folder {} does not exist; create it first", path, folder.string()));
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    throw Error(fmt::format("{}: the folder {} cannot be written to: {}; choose another", path, folder.string(),
+                            std::strerror(errno)));
+}
+
+}  // namespace
+
+void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs) {
+  std::vector<fs::path> taken;
+  for (std::size_t k = 0; k < outputs.size(); ++k) {
+    const std::string& path = outputs[k].path;
+    if (path.empty() || path == "-") continue;
+    check_extension(outputs[k]);
+    check_writable(path);
+    const fs::path target = target_of(path);
+    if (is_special(target)) continue;
+    if (std::find(taken.begin(), taken.end(), target) != taken.end())
+      throw Error(path + ": two outputs have this name; choose another");
+    taken.push_back(target);
+    for (const std::string& input : inputs)
+      if (k > 0 && !input.empty() && target_of(input) == target)
+        throw Error(path + ": would replace an input; choose another name");
+  }
+}
+
+}  // namespace bisector::cli

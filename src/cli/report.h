@@ -1,0 +1,48 @@
+// JSON reports of runs. Their keys are a stable contract.
+#pragma once
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "bisector/core/types.h"
+#include "bisector/mesh/distance.h"
+#include "bisector/mesh/quality.h"
+#include "bisector/remesh/remesh.h"
+
+namespace bisector::cli {
+
+using Json = nlohmann::ordered_json;
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// What computes: the processor of this machine.
+struct Device {
+  std::string name;
+  unsigned threads;
+  double memory;  // bytes; 0 if unknown
+};
+Device cpu_device();
+
+Json start_report(const char* command);  // command and version
+Json device_json(const Device& device);
+Json input_json(const TriangleMesh& mesh);   // faces as in the file
+Json output_json(const TriangleMesh& mesh);
+// Pairs that the filter did not decide are all settled by the CPU's exact arithmetic.
+Json certification_json(const Certification& certification);
+Json topology_json(const MeshTopology& topology);
+Json quality_json(const QualityReport& quality);
+void add_distance(Json& quality, const DistanceReport& distance);
+// A point, or null if a coordinate is not finite.
+Json point_json(const Vec3& p);
+
+// Writes to a file, or to stdout if the path is "-". Throws Error.
+void write_report(const std::string& path, const Json& report);
+
+}  // namespace bisector::cli
