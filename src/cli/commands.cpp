@@ -42,7 +42,9 @@ Json seconds_json(const DiagramSeconds& seconds) {
 const char* yes_no(bool b) { return b ? "yes" : "no"; }
 
 // "1 face", "2 faces".
-std::string counted(std::size_t n, const char* one, const char* many) { return fmt::format("{} {}", n, n == 1 ? one : many); }
+std::string counted(std::size_t n, const char* one, const char* many) {
+  return fmt::format("{} {}", n, n == 1 ? one : many);
+}
 
 std::string size_of(const Json& mesh) {
   return counted(mesh["vertices"], "vertex", "vertices") + ", " + counted(mesh["faces"], "face", "faces");
@@ -131,10 +133,10 @@ void print_summary(Console& console, const RemeshCommand& command, const RemeshR
                    const QualityReport& quality, const Json& input, const Json& seconds) {
   console.print(fmt::format("input      {}: {}", command.input, size_of(input)));
   console.print(fmt::format("output     {}: {}", command.output, size_of(output_json(result.mesh))));
-  console.print(fmt::format("quality    q_min {:.4f}, theta_min {:.2f} degrees, {:.3g} % of the triangles below 30 degrees",
-                            quality.q_min, quality.theta_min, quality.theta_below_30));
-  console.print(fmt::format("           on average q {:.4f}, theta_min {:.2f}; {:.1f} % of the vertices have 6 neighbors",
-                            quality.q_ave, quality.theta_min_ave, 100 * quality.valence6));
+  console.print(fmt::format("quality    q_min {:.4f}, theta_min {:.2f} degrees; theta_below_30 {:.3g} %", quality.q_min,
+                            quality.theta_min, quality.theta_below_30));
+  console.print(fmt::format("           q_ave {:.4f}, theta_min_ave {:.2f} degrees; valence6 {:.1f} %", quality.q_ave,
+                            quality.theta_min_ave, 100 * quality.valence6));
   console.print(fmt::format("topology   {}{}", describe(result.topology),
                             result.topology_matches ? "; as the input" : "; NOT as the input"));
   console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));
@@ -198,7 +200,8 @@ struct QualityMeasures {
   DistanceReport distance;  // if there is a reference
 };
 
-void print_quality(Console& console, const QualityCommand& command, const QualityMeasures& measures, const Json& input) {
+void print_quality(Console& console, const QualityCommand& command, const QualityMeasures& measures,
+                   const Json& input) {
   const QualityReport& q = measures.quality;
   const MeshTopology& t = q.topology;
   const auto row = [&](const char* name, const std::string& value, const char* meaning = "") {
@@ -214,7 +217,7 @@ void print_quality(Console& console, const QualityCommand& command, const Qualit
   row("theta_min_ave", number(q.theta_min_ave), "average of each triangle's smallest");
   row("theta_max", number(q.theta_max), "largest angle, degrees");
   row("theta_below_30", number(q.theta_below_30), "% of triangles with an angle below 30 degrees");
-  row("valence6", number(q.valence6), "share of interior vertices with six neighbors");
+  row("valence6", number(q.valence6), "share of interior vertices with six neighbours");
   row("edge_min", number(q.edge_min), "shortest edge");
   row("edge_ave", number(q.edge_ave));
   row("edge_max", number(q.edge_max), "longest edge");
@@ -227,7 +230,7 @@ void print_quality(Console& console, const QualityCommand& command, const Qualit
   }
   row("closed", yes_no(t.closed));
   if (!t.closed) row("", fmt::to_string(t.boundary_edges), "boundary edges");
-  row("oriented", yes_no(t.oriented), "neighboring triangles agree");
+  row("oriented", yes_no(t.oriented), "neighbouring triangles agree");
   row("euler", fmt::to_string(t.euler), "Euler characteristic V - E + F");
   row("components", fmt::to_string(t.components));
   row("self_intersections", fmt::to_string(measures.self_intersections), "pairs of triangles");
@@ -310,8 +313,12 @@ void run(const RvdCommand& command) {
   const Stopwatch reading;
   const TriangleMesh input = read_mesh(command.input, console.context());
   std::vector<Vec3> seeds;
-  if (!command.seeds.empty()) seeds = read_seeds(command.seeds, command.count);
-  else for (const SurfaceSample& s : sample_surface(input, command.count, command.random_seed)) seeds.push_back(s.point);
+  if (!command.seeds.empty()) {
+    seeds = read_seeds(command.seeds, command.count);
+  } else {
+    for (const SurfaceSample& sample : sample_surface(input, command.count, command.random_seed))
+      seeds.push_back(sample.point);
+  }
   double io = reading.seconds();
 
   console.phase("computing the diagram");

@@ -25,8 +25,14 @@ class Help : public CLI::Formatter {
   explicit Help(std::string usage) : usage_(std::move(usage)) {
     column_width(32);
     label("REQUIRED", "(required)");
+    label("Positionals", "Arguments");
   }
-  std::string make_usage(const CLI::App*, std::string) const override { return "\nUsage: " + usage_ + "\n"; }
+  std::string make_usage(const CLI::App*, std::string) const override { return "\nUsage: " + usage_ + "\n\n"; }
+  // One blank line between groups, where CLI11 leaves two.
+  std::string make_group(std::string name, bool is_positional, std::vector<const CLI::Option*> options) const override {
+    const std::string group = CLI::Formatter::make_group(name, is_positional, options).substr(1);
+    return is_positional ? group + "\n" : group;
+  }
 
  private:
   std::string usage_;
@@ -92,7 +98,7 @@ void add_compute_options(CLI::App* app, ComputeOptions& options) {
   app->add_option("--precision", options.precision, "auto, single or double; cpu has double only")
       ->type_name("WORD")->check(one_of({"auto", "single", "double"}))->group("Computation");
   app->add_option("--neighbors", options.neighbours,
-                  "where neighbors of seeds come from: auto, nearest or\n"
+                  "where neighbours of seeds come from: auto, nearest or\n"
                   "delaunay; the result is the same")
       ->type_name("WORD")->check(one_of({"auto", "delaunay", "nearest"}))->group("Computation");
 }
@@ -120,16 +126,16 @@ CLI::App* add_command(CLI::App& program, const char* name, const char* about, co
 
 CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
   CLI::App* app = add_command(
-      program, "remesh", "Make a high-quality triangle mesh of a surface, with as many vertices as you ask for.",
+      program, "remesh", "Make a high-quality triangle mesh of a surface.",
       "bisector remesh IN -o OUT -n N [options]",
       "Examples:\n"
       "  bisector remesh bunny.off -o out.obj -n 10000\n"
       "  bisector remesh part.stl -o out.ply -n 5000 --report out.json --preview out.png\n\n"
       "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written.");
   add_file(app, "IN", command.input, "FILE", "surface to remesh")->required();
-  add_file(app, "-o,--output", command.output, "FILE", "mesh to write")->required()->group("Output");
+  add_file(app, "-o", command.output, "FILE", "mesh to write")->required()->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the result")->group("Output");
-  app->add_option("-n,--vertices", command.options.vertices, "vertices of the result, at least 4")
+  app->add_option("-n", command.options.vertices, "vertices of the result, at least 4")
       ->type_name("N")->check(whole_number(4, kMostSeeds))->group("Seeds");
   add_file(app, "--seeds", command.seeds, "FILE.xyz",
            "start from these points (\"x y z\" lines) in one level;\n"
@@ -161,20 +167,20 @@ CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
 
 CLI::App* add_rvd(CLI::App& program, RvdCommand& command) {
   CLI::App* app = add_command(
-      program, "rvd", "Compute one restricted Voronoi diagram of a surface, without optimisation.",
+      program, "rvd", "Compute one restricted Voronoi diagram of a surface.",
       "bisector rvd IN --seeds FILE.xyz|-n N [-o CELLS.ply] [options]",
       "Examples:\n"
       "  bisector rvd bunny.off -n 500 -o cells.ply --preview cells.png\n"
       "  bisector rvd bunny.off --seeds points.xyz --report -");
   add_file(app, "IN", command.input, "FILE", "surface: .off, .obj, .ply or .stl")->required();
-  add_file(app, "-o,--output", command.output, "FILE.ply", "write the cells as coloured polygons")->group("Output");
+  add_file(app, "-o", command.output, "FILE.ply", "write the cells as coloured polygons")->group("Output");
   add_file(app, "--pairs", command.pairs, "FILE",
            "write \"face seed\" lines, one for each face (counted\n"
            "from 0 in the input) and cell that meet, sorted")
       ->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the cells")->group("Output");
   add_file(app, "--seeds", command.seeds, "FILE.xyz", "the seeds, as \"x y z\" lines")->group("Seeds");
-  app->add_option("-n,--count", command.count, "so many random seeds instead")
+  app->add_option("-n", command.count, "so many random seeds instead")
       ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Seeds");
   add_random_seed(app, command.random_seed);
   add_compute_options(app, command.compute);
@@ -186,7 +192,7 @@ CLI::App* add_rvd(CLI::App& program, RvdCommand& command) {
 
 CLI::App* add_quality(CLI::App& program, QualityCommand& command) {
   CLI::App* app = add_command(
-      program, "quality", "Measure a mesh: angles, valences, topology, self-intersections, distance to another.",
+      program, "quality", "Measure angles, topology and distance to another mesh.",
       "bisector quality MESH [--reference IN] [options]",
       "Example:\n"
       "  bisector quality out.obj --reference bunny.off");
@@ -207,13 +213,14 @@ CLI::App* add_devices(CLI::App& program, DevicesCommand& command) {
 // What options ask of each other.
 void check_usage(const RemeshCommand& command) {
   if (command.seeds.empty() && command.options.vertices == 0)
-    throw CLI::RequiredError("how many vertices? -n N or --seeds FILE.xyz");
+    throw CLI::ValidationError("how many vertices? give -n N or --seeds FILE.xyz");
   if (!command.seeds.empty() && command.options.levels > 1)
     throw CLI::ValidationError("--levels: seeds from a file imply one level");
 }
 
 void check_usage(const RvdCommand& command) {
-  if (command.seeds.empty() && command.count == 0) throw CLI::RequiredError("which seeds? --seeds FILE.xyz or -n N");
+  if (command.seeds.empty() && command.count == 0)
+    throw CLI::ValidationError("which seeds? give --seeds FILE.xyz or -n N");
 }
 
 int fail_usage(const std::string& message, const CLI::App* command) {
@@ -249,7 +256,7 @@ int main(int argc, char** argv) {
       "  bisector remesh IN.off -o OUT.obj -n 10000     remesh with 10,000 vertices\n"
       "  bisector quality OUT.obj --reference IN.off    see how good the result is\n"
       "  bisector remesh --help                         all options of a command\n\n"
-      "Exit codes: 0 success, 1 bad input or a failed run, 2 bad usage, 130 cancelled. On failure nothing is written.");
+      "Exit codes: 0 success, 1 bad input or a failed run, 2 bad usage, 130 cancelled. If not 0, nothing is written.");
   program.set_version_flag("--version", std::string("bisector ") + BISECTOR_VERSION, "print the version and exit");
   program.get_help_ptr()->description("print this and exit");
   program.require_subcommand(0, 1);

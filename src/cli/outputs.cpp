@@ -1,5 +1,6 @@
 #include "outputs.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <unistd.h>
@@ -52,9 +53,15 @@ void check_writable(const std::string& path) {
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   if (!fs::is_directory(folder, error))
     throw Error(fmt::format("{}: the folder {} does not exist; create it first", path, folder.string()));
-  if (access(folder.c_str(), W_OK | X_OK) != 0)
+  // Permissions do not tell all: a file system may be read-only or full.
+  const fs::path trial = folder / fmt::format(".bisector-{}-trial.tmp", getpid());
+  const int descriptor = open(trial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (descriptor < 0)
     throw Error(fmt::format("{}: the folder {} cannot be written to: {}; choose another", path, folder.string(),
                             std::strerror(errno)));
+  close(descriptor);
+  unlink(trial.c_str());
+  if (access(target.c_str(), F_OK) != 0 && errno == ENAMETOOLONG) throw Error(path + ": the name is too long");
 }
 
 }  // namespace

@@ -11,8 +11,8 @@ struct Output {
   std::vector<std::string> extensions;  // the formats that can be written; empty: any name
 };
 
-// Throws Error if a format is unknown, a folder is missing or not writable, two outputs share a name, or an output other
-// than the first would replace an input.
+// Throws Error if a format is unknown, a folder is missing or not writable, two outputs share a name, or an output
+// other than the first would replace an input.
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
 inline const std::vector<std::string> kMeshFormats{".off", ".obj", ".ply", ".stl"};

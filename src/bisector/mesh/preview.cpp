@@ -68,7 +68,8 @@ struct Camera {
 };
 
 Camera aim(const std::vector<Vec3>& vertices, const Csr<Index>& polygons, const PreviewOptions& options) {
-  const double azimuth = options.azimuth * std::numbers::pi / 180, elevation = options.elevation * std::numbers::pi / 180;
+  constexpr double kDegree = std::numbers::pi / 180;
+  const double azimuth = options.azimuth * kDegree, elevation = options.elevation * kDegree;
   Camera camera;
   camera.right = {std::cos(azimuth), 0, -std::sin(azimuth)};
   camera.back = {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
@@ -121,7 +122,8 @@ std::vector<Vec3> corner_normals(const std::vector<Vec3>& vertices, const Csr<In
   faces.values.resize(polygons.values.size());
   std::vector<std::size_t> next(faces.offsets.begin(), faces.offsets.end() - 1);
   for (std::size_t f = 0; f < polygons.rows(); ++f)
-    for (const Index* v = polygons.begin(f); v != polygons.end(f); ++v) faces.values[next[*v]++] = static_cast<Index>(f);
+    for (std::size_t k = polygons.offsets[f]; k < polygons.offsets[f + 1]; ++k)
+      faces.values[next[polygons.values[k]]++] = static_cast<Index>(f);
 
   std::vector<Vec3> normals(polygons.values.size());
   parallel_each(polygons.rows(), [&](std::size_t f) {
@@ -290,7 +292,10 @@ void Band::draw_outlines() {
   for (const std::size_t k : dark) samples_[k].light = mix(samples_[k].light, ink, 0.8f);
 }
 
-Rgb background(double height) { return mix(to_linear(Colour{250, 251, 252}), to_linear(Colour{226, 231, 238}), static_cast<float>(height)); }
+// At a height of 0 (top) to 1.
+Rgb background(double height) {
+  return mix(to_linear(Colour{250, 251, 252}), to_linear(Colour{226, 231, 238}), static_cast<float>(height));
+}
 
 // The pieces that touch each band of rows.
 Csr<Index> sort_into_bands(const Scene& scene, std::size_t bands) {
@@ -326,7 +331,8 @@ std::vector<Piece> split_into_pieces(const Csr<Index>& polygons) {
 
 std::vector<unsigned char> render(const Scene& scene) {
   const int width = scene.options.width, height = scene.options.height;
-  std::vector<unsigned char> pixels(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
+  std::vector<unsigned char> pixels(3 * columns * rows);
   const auto bands = static_cast<std::size_t>((height + kBand - 1) / kBand);
   const Csr<Index> pieces = sort_into_bands(scene, bands);
   parallel_each(bands, [&](std::size_t b) {
@@ -344,7 +350,7 @@ std::vector<unsigned char> render(const Scene& scene) {
             sum += sample.nearness > 0 ? sample.light : sky;
           }
         const Rgb mean = (1.0f / (kSub * kSub)) * sum;
-        unsigned char* pixel = &pixels[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x))];
+        unsigned char* pixel = &pixels[3 * (static_cast<std::size_t>(y) * columns + static_cast<std::size_t>(x))];
         pixel[0] = to_srgb(mean.r);
         pixel[1] = to_srgb(mean.g);
         pixel[2] = to_srgb(mean.b);

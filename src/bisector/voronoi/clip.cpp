@@ -8,165 +8,200 @@ namespace bisector {
 namespace {
 
 constexpr double kUnit = 0x1p-53;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Within these, products of three scales neither overflow nor lose precision to underflow.
-constexpr double kSmallestScale = 0x1p-160, kLargestScale = 0x1p+160;
 // Lines that meet at a smaller angle (sine, squared) have their vertex computed exactly.
 constexpr double kSteep = 1e-8;
+// No product of coordinates this small is told from 0, for the bounds below do not cover underflow.
+constexpr double kTiny = 1e-300;
+
+double max_coordinate(const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
 }  // namespace
 
 Clipper::Clipper() : lines_(3) {
-  for (unsigned k = 0; k < 3; ++k) {
-    Line& line = lines_[k];
-    for (unsigned m = 0; m < 3; ++m) line.h[m] = m == (k + 2) % 3;
-    line.scale = 1;
-    line.squared = 0;
-    line.slot = kEdgeLabel | k;
-    line.id = kNone;
-  }
+  for (unsigned k = 0; k < 3; ++k) lines_[k].slot = kEdgeLabel | k;
 }
 
-void Clipper::start(const SortedSeeds& seeds, const Facet& facet, Index slot) {
+void Clipper::begin(const SortedSeeds& seeds, const Facet& facet) {
   seeds_ = &seeds;
   facet_ = &facet;
-  slot_ = slot;
-  uncertain_ = wider_ = false;
-  lines_.resize(3);
-  edges_.assign({0, 1, 2});
-  largest_ = 0;
-  for (int k = 0; k < 3; ++k) {
-    local_[k] = facet.corners[k] - seeds.x[slot];
-    largest_ = std::max({largest_, std::abs(local_[k].x), std::abs(local_[k].y), std::abs(local_[k].z)});
+  for (unsigned k = 0; k < 3; ++k) {
+    Line& line = lines_[k];
+    const unsigned from = facet.origin[k], to = from == k ? (k + 1) % 3 : k;
+    line.m = cross(facet.normal, facet.corners[to] - facet.corners[from]);
+    line.along = cross(facet.normal, line.m);
+    line.squared = norm2(line.m);
+    line.key = facet.rank[k];
   }
 }
 
-void Clipper::take(const SortedSeeds& seeds, const Facet& facet, Index slot) { start(seeds, facet, slot); }
-
-bool Clipper::clip(const SortedSeeds& seeds, const Neighbours& neighbours, const Facet& facet, Index slot) {
-  start(seeds, facet, slot);
-  vertices_.resize(3);
-  facet_squared_ = 0;
-  for (unsigned k = 0; k < 3; ++k) {
-    Vertex& v = vertices_[k];
-    for (unsigned m = 0; m < 3; ++m) v.lambda[m] = m == k;
-    v.bound = 12 * kUnit;
-    v.at = local_[k];
-    v.slack = 8 * kUnit * largest_;
-    v.squared = norm2(v.at) * (1 + 1e-12);
-    facet_squared_ = std::max(facet_squared_, v.squared);
+void Clipper::start(Index slot) {
+  slot_ = slot;
+  uncertain_ = wider_ = false;
+  largest_ = facet_squared_ = 0;
+  for (int k = 0; k < 3; ++k) {
+    local_[k] = facet_->corners[k] - seeds_->x[slot];
+    largest_ = std::max(largest_, max_coordinate(local_[k]));
+    facet_squared_ = std::max(facet_squared_, norm2(local_[k]) * (1 + 1e-12));
   }
+  polygon_.resize(3);
+  for (unsigned k = 0; k < 3; ++k) polygon_[k] = {local_[k], 8 * kUnit * largest_, k};
+}
+
+void Clipper::take(Index slot) {
+  lines_.resize(3);
+  start(slot);
+}
+
+bool Clipper::clip(const Neighbours& neighbours, Index slot) {
+  lines_.resize(3);
+  start(slot);
+  const Vec3 x = seeds_->x[slot];
+  height_ = dot(facet_->normal, local_[facet_->anchor]);
+  foot_ = height_ * facet_->normal;
+  for (unsigned k = 0; k < 3; ++k) lines_[k].offset = dot(lines_[k].m, local_[facet_->origin[k]]) - height_ * dot(facet_->normal, lines_[k].m);
+  slack_ = polygon_[0].slack;
   reach_ = facet_squared_;
-  const Vec3 x = seeds.x[slot];
   NeighbourList list = neighbours.list(slot);
   for (;;) {
     for (const Index* j = list.begin; j != list.end; ++j) {
-      const Vec3 towards = seeds.x[*j] - x;
-      const double squared = norm2(towards);
+      const Vec3 d = seeds_->x[*j] - x;
+      const double squared = norm2(d);
       // Security radius: all of the polygon is nearer to this seed than to any other from here on.
       if (4 * reach_ < squared * (1 - 1e-9)) return true;
-      if (wider_ && std::any_of(edges_.begin(), edges_.end(), [&](unsigned e) { return lines_[e].slot == *j; })) continue;
-      cut(*j, towards, squared);
-      if (edges_.empty()) return false;
+      const double taxicab = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
+      const double below = 0.5 * squared * (1 - 1e-12) - kTiny;
+      double farthest = -std::numeric_limits<double>::infinity();
+      for (const Corner& c : polygon_) farthest = std::max(farthest, dot(c.at, d));
+      if (farthest + slack_ * taxicab < below) continue;
+      if (wider_ && std::any_of(polygon_.begin(), polygon_.end(), [&](const Corner& c) { return lines_[c.edge].slot == *j; }))
+        continue;
+      cut(*j, d, squared, taxicab);
+      if (polygon_.empty()) return false;
     }
-    if (4 * reach_ < list.radius * list.radius * (1 - 1e-9) || list.radius == kInfinity) return true;
+    if (list.radius == std::numeric_limits<double>::infinity()) return true;
+    if (4 * reach_ < list.radius * list.radius * (1 - 1e-9)) return true;
     wider_ = true;
     list = neighbours.wider(slot, list);
   }
 }
 
-void Clipper::cut(Index other, const Vec3& d, double squared) {
-  const std::size_t n = edges_.size();
-  const double taxicab = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
-  const double half = 0.5 * squared * (1 - 1e-12);
-  bool apart = true;
-  for (const Vertex& v : vertices_) apart &= dot(v.at, d) + v.slack * taxicab < half;
-  if (apart) return;
-
-  Line line;
-  const double extent = std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) + 2 * largest_;
-  line.scale = taxicab * extent;
-  if (!(line.scale > kSmallestScale && line.scale < kLargestScale)) line.scale = kInfinity;
-  for (int m = 0; m < 3; ++m) {
-    const Vec3& p = local_[m];
-    line.h[m] = d.x * (d.x - 2 * p.x) + d.y * (d.y - 2 * p.y) + d.z * (d.z - 2 * p.z);
-  }
-  line.towards = d;
-  line.squared = squared;
-  line.slot = other;
-  line.id = seeds_->id[other];
-
+void Clipper::cut(Index other, const Vec3& d, double squared, double taxicab) {
+  const std::size_t n = polygon_.size();
+  const double below = 0.5 * squared * (1 - 1e-12) - kTiny, above = 0.5 * squared * (1 + 1e-12) + kTiny;
   sides_.resize(n);
-  int outside = 0;
+  std::size_t outside = 0;
   for (std::size_t k = 0; k < n; ++k) {
-    sides_[k] = static_cast<signed char>(side(k, line));
-    outside += sides_[k] < 0;
+    const double at = dot(polygon_[k].at, d), slack = polygon_[k].slack * taxicab;
+    int side = at + slack < below ? 1 : at - slack > above ? -1 : 0;
+    if (side == 0) {
+      uncertain_ = true;
+      side = exact_side(frame(), exact(lines_[polygon_[previous(k)].edge]), exact(lines_[polygon_[k].edge]),
+                        ExactLine::bisector(seeds_->x[other], seeds_->id[other]));
+    }
+    sides_[k] = static_cast<signed char>(side);
+    outside += side < 0;
   }
   if (outside == 0) return;
-  if (outside == static_cast<int>(n)) {
-    edges_.clear();
+  if (outside == n) {
+    polygon_.clear();
     return;
   }
-  // The polygon is convex: its vertices on the positive side are consecutive, from `in` up to `out`.
+  Line line;
+  line.m = d;
+  line.along = cross(facet_->normal, d);
+  line.offset = 0.5 * squared - height_ * dot(facet_->normal, d);
+  line.squared = squared;
+  line.key = std::uint64_t{3} + seeds_->id[other];
+  line.slot = other;
+  // The polygon is convex: its vertices on the positive side are consecutive, from `in` up to `last`.
   std::size_t in = 0;
-  while (!(sides_[in] > 0 && sides_[in ? in - 1 : n - 1] < 0)) ++in;
-  const unsigned index = static_cast<unsigned>(lines_.size());
-  lines_.push_back(line);
-  kept_edges_.clear();
-  kept_vertices_.clear();
+  while (!(sides_[in] > 0 && sides_[previous(in)] < 0)) ++in;
+  kept_.resize(n - outside + 2);
+  Corner* out = kept_.data();
   std::size_t k = in, last = in;
   do {
-    kept_edges_.push_back(edges_[k]);
-    kept_vertices_.push_back(vertices_[k]);
+    *out++ = polygon_[k];
     last = k;
     k = k + 1 == n ? 0 : k + 1;
   } while (sides_[k] > 0);
-  kept_vertices_.push_back(meet(lines_[edges_[last]], line));
-  kept_edges_.push_back(index);
-  const unsigned entering = edges_[in ? in - 1 : n - 1];
-  kept_vertices_.push_back(meet(line, lines_[entering]));
-  kept_edges_.push_back(entering);
-  edges_.swap(kept_edges_);
-  vertices_.swap(kept_vertices_);
-  reach_ = 0;
-  for (const Vertex& v : vertices_) reach_ = std::max(reach_, v.squared);
+  const unsigned entering = polygon_[previous(in)].edge;
+  *out = meet(lines_[polygon_[last].edge], line);
+  out++->edge = static_cast<unsigned>(lines_.size());
+  *out = meet(line, lines_[entering]);
+  out->edge = entering;
+  lines_.push_back(line);
+  polygon_.swap(kept_);
+  bound_polygon();
 }
 
-int Clipper::side(std::size_t k, const Line& line) {
-  const Vertex& v = vertices_[k];
-  const double value = line.h[0] * v.lambda[0] + line.h[1] * v.lambda[1] + line.h[2] * v.lambda[2];
-  const double bound = v.bound * line.scale;
-  if (value > bound) return 1;
-  if (value < -bound) return -1;
-  uncertain_ = true;
-  const Line& after = lines_[edges_[k]];
-  const Line& before = lines_[edges_[k ? k - 1 : edges_.size() - 1]];
-  return exact_side(frame(), exact(before), exact(after), exact(line));
-}
-
-// The bounds follow from |h| <= scale and the error 7 u scale of h: each component of the product a x b is off by at most
-// 33 u S_a S_b, and so the value of a further line c by 99 u S_a S_b S_c + 10 u S_c sum |lambda|, to first order.
-Clipper::Vertex Clipper::meet(const Line& a, const Line& b) const {
-  Vertex v;
-  v.lambda[0] = a.h[1] * b.h[2] - a.h[2] * b.h[1];
-  v.lambda[1] = a.h[2] * b.h[0] - a.h[0] * b.h[2];
-  v.lambda[2] = a.h[0] * b.h[1] - a.h[1] * b.h[0];
-  const double scales = a.scale * b.scale;
-  const double sum = std::abs(v.lambda[0]) + std::abs(v.lambda[1]) + std::abs(v.lambda[2]);
-  v.bound = kUnit * (100 * scales + 12 * sum);
-  const double total = v.lambda[0] + v.lambda[1] + v.lambda[2];
-  // Error of the position, relative to the largest coordinate. Every point of the facet is within facet_squared_ anyway.
-  const double error = kUnit * (200 * scales / total + 12);
-  v.squared = facet_squared_;
-  v.slack = kInfinity;
-  if (total > 0 && error < 1e-4) {
-    v.at = (1 / total) * (v.lambda[0] * local_[0] + v.lambda[1] * local_[1] + v.lambda[2] * local_[2]);
-    v.slack = (error + 16 * kUnit) * largest_;
-    const double off = 2 * v.slack;
-    v.squared = std::min(v.squared, norm2(v.at) * (1 + 1e-6) + 2e6 * (off * off));
+void Clipper::bound_polygon() {
+  slack_ = 0;
+  double squared = 0;
+  for (const Corner& c : polygon_) {
+    slack_ = std::max(slack_, c.slack);
+    squared = std::max(squared, norm2(c.at));
   }
-  return v;
+  // (r + e)^2 <= r^2 (1 + a) + e^2 (1 + 1/a), and no point of the facet is farther than its corners.
+  reach_ = std::min(facet_squared_, squared * (1 + 1e-6) + 4e6 * (slack_ * slack_));
 }
+
+// In the facet's plane with origin at the seed's foot, the lines' normals are the parts of m along the plane, and the lines
+// cross at (c2 t1 - c1 t2) / (t1 . m2). All data are within the facet's distance P of the seed, and with rounded data and
+// operations each term of the numerator is off by less than 250 u P |m1| |m2| and the determinant by 150 u |m1| |m2|
+// (the normal's own error, at most 60 u, included), which bounds the error of the quotient as coded.
+Clipper::Corner Clipper::meet(const Line& before, const Line& after) const {
+  Corner corner;
+  const bool in_order = before.key < after.key;
+  const Line& low = in_order ? before : after;
+  const Line& high = in_order ? after : before;
+  const double determinant = dot(low.along, high.m);
+  const double squares = low.squared * high.squared;
+  const double square = determinant * determinant;
+  if (square > kSteep * squares) {
+    const double inverse = 1 / determinant;
+    corner.at = foot_ + inverse * (high.offset * low.along - low.offset * high.along);
+    corner.slack = 2000 * kUnit * largest_ * std::sqrt(squares / square);
+  } else {
+    corner.at = exact_vertex(frame(), exact(before), exact(after));
+    corner.slack = 16 * kUnit * largest_;
+  }
+  return corner;
+}
+
+double Clipper::density(std::size_t k) const {
+  const double* r = facet_->density;
+  const Index after = label(k);
+  if (is_edge(after) && is_edge(label(previous(k)))) return r[after & ~kEdgeLabel];
+  const double value = r[facet_->anchor] + dot(facet_->gradient, vertex(k) - local_[facet_->anchor]);
+  return std::min(std::max(value, std::min({r[0], r[1], r[2]})), std::max({r[0], r[1], r[2]}));
+}
+
+template <bool kUniform>
+Moments Clipper::integrate() {
+  const std::size_t n = polygon_.size();
+  if constexpr (!kUniform) {
+    densities_.resize(n);
+    for (std::size_t k = 0; k < n; ++k) densities_[k] = density(k);
+  }
+  // The fan starts at the edge with the smallest label.
+  std::size_t apex = 0;
+  for (std::size_t k = 1; k < n; ++k)
+    if (lines_[polygon_[k].edge].key < lines_[polygon_[apex].edge].key) apex = k;
+  const auto next = [n](std::size_t k) { return k + 1 == n ? 0 : k + 1; };
+  const Vec3 a = vertex(apex);
+  Moments sum;
+  for (std::size_t b = next(apex), c = next(b); c != apex; b = c, c = next(c)) {
+    const double area = 0.5 * dot(facet_->normal, cross(vertex(b) - a, vertex(c) - a));
+    if constexpr (kUniform)
+      sum += triangle_moments(a, vertex(b), vertex(c), area);
+    else
+      sum += triangle_moments(a, vertex(b), vertex(c), densities_[apex], densities_[b], densities_[c], area);
+  }
+  return sum;
+}
+
+template Moments Clipper::integrate<true>();
+template Moments Clipper::integrate<false>();
 
 ExactFrame Clipper::frame() const {
   return {{facet_->corners[0], facet_->corners[1], facet_->corners[2]}, seeds_->x[slot_], seeds_->id[slot_]};
@@ -176,79 +211,5 @@ ExactLine Clipper::exact(const Line& line) const {
   if (is_edge(line.slot)) return ExactLine::edge(static_cast<int>(((line.slot & ~kEdgeLabel) + 2) % 3));
   return ExactLine::bisector(seeds_->x[line.slot], seeds_->id[line.slot]);
 }
-
-// The facet's plane and the two lines' planes, all within the cell's scale of the seed, meet at the vertex: edges as the planes
-// through them along the normal, the lower label first.
-Vec3 Clipper::position(const Line& before, const Line& after) const {
-  if (is_edge(before.slot) && is_edge(after.slot)) return local_[after.slot & ~kEdgeLabel];
-  const bool swap = is_edge(after.slot) || (!is_edge(before.slot) && after.id < before.id);
-  const Line& low = swap ? after : before;
-  const Line& high = swap ? before : after;
-  const Vec3& n = facet_->normal;
-  Vec3 m = low.towards;
-  double c = 0.5 * low.squared;
-  if (is_edge(low.slot)) {
-    const unsigned k = low.slot & ~kEdgeLabel;
-    const unsigned a = facet_->origin[k], b = a == k ? (k + 1) % 3 : k;
-    m = cross(n, facet_->corners[b] - facet_->corners[a]);
-    c = dot(m, local_[a]);
-  }
-  const Vec3 across = cross(m, high.towards);
-  const double determinant = dot(n, across);
-  if (!(determinant * determinant > kSteep * (norm2(m) * high.squared)))
-    return exact_vertex(frame(), exact(before), exact(after));
-  const double offset = dot(n, local_[facet_->anchor]);
-  const Vec3 p = offset * across + c * cross(high.towards, n) + (0.5 * high.squared) * cross(n, m);
-  const double inverse = 1 / determinant;
-  return inverse * p;
-}
-
-double Clipper::density(const Line& before, const Line& after, const Vec3& point) const {
-  const double* r = facet_->density;
-  if (is_edge(before.slot) && is_edge(after.slot)) return r[after.slot & ~kEdgeLabel];
-  const double value = r[facet_->anchor] + dot(facet_->gradient, point - local_[facet_->anchor]);
-  return std::min(std::max(value, std::min({r[0], r[1], r[2]})), std::max({r[0], r[1], r[2]}));
-}
-
-// The entry of the edge with the smallest label: facet edges by their vertices' indices, then seeds.
-std::size_t Clipper::first_entry() const {
-  const auto key = [&](std::size_t k) {
-    const Line& line = lines_[edges_[k]];
-    return is_edge(line.slot) ? static_cast<std::uint64_t>(facet_->rank[line.slot & ~kEdgeLabel])
-                              : std::uint64_t{3} + line.id;
-  };
-  std::size_t first = 0;
-  for (std::size_t k = 1; k < edges_.size(); ++k)
-    if (key(k) < key(first)) first = k;
-  return first;
-}
-
-template <bool kUniform>
-Moments Clipper::integrate() {
-  const std::size_t n = edges_.size();
-  points_.resize(n);
-  if constexpr (!kUniform) densities_.resize(n);
-  const Line* before = &lines_[edges_[n - 1]];
-  for (std::size_t k = 0; k < n; ++k) {
-    const Line* after = &lines_[edges_[k]];
-    points_[k] = position(*before, *after);
-    if constexpr (!kUniform) densities_[k] = density(*before, *after, points_[k]);
-    before = after;
-  }
-  const std::size_t apex = first_entry();
-  const auto next = [n](std::size_t k) { return k + 1 == n ? 0 : k + 1; };
-  Moments sum;
-  for (std::size_t b = next(apex), c = next(b); c != apex; b = c, c = next(c)) {
-    const double area = 0.5 * dot(facet_->normal, cross(points_[b] - points_[apex], points_[c] - points_[apex]));
-    if constexpr (kUniform)
-      sum += triangle_moments(points_[apex], points_[b], points_[c], area);
-    else
-      sum += triangle_moments(points_[apex], points_[b], points_[c], densities_[apex], densities_[b], densities_[c], area);
-  }
-  return sum;
-}
-
-template Moments Clipper::integrate<true>();
-template Moments Clipper::integrate<false>();
 
 }  // namespace bisector

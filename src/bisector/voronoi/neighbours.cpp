@@ -15,8 +15,8 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kFirst = 20;   // a random planar cell has six neighbours and is certified by about 16 nearest
-constexpr std::size_t kGrowth = 4;
-constexpr int kRingLevel = 2;        // the rung at which `nearest` turns to the Delaunay triangulation
+constexpr std::size_t kGrowth = 2;
+constexpr int kRingLevel = 3;        // the rung at which `nearest` turns to the Delaunay triangulation
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Cloud {

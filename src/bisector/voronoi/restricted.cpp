@@ -184,17 +184,18 @@ void RestrictedVoronoi::Work::clip_facet(const Facet& facet, Walker& walker, Chu
     chunk.contributions.push_back(
         {first, facet.triangle, moved(facet.moments, facet.corners[facet.anchor] - seeds.x[first])});
     if (want_polygons) {
-      clipper.take(seeds, facet, first);
-      clipper.integrate<true>();
+      clipper.begin(seeds, facet);
+      clipper.take(first);
       emit(clipper, facet, first, chunk);
     }
     return;
   }
+  clipper.begin(seeds, facet);
   walker.begin(seeds.x.size());
   for (Index site : facet.site) walker.meet(owner[site]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index slot = walker.queue[head];
-    const bool found = clipper.clip(seeds, neighbours, facet, slot);
+    const bool found = clipper.clip(neighbours, slot);
     chunk.certification.uncertain += clipper.uncertain();
     chunk.certification.wider += clipper.wider();
     if (!found) continue;

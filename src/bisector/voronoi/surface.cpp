@@ -17,7 +17,7 @@ Vec3 facet_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
   Vec3 n = cross(u, v);
   const double largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
   const double scale = norm(u) * norm(v);
-  if (!(largest > 1e-2 * scale)) n = exact_normal(a, b, c);
+  if (!(largest > 0.1 * scale)) n = exact_normal(a, b, c);
   const double m = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
   if (m == 0) return {};
   n = {n.x / m, n.y / m, n.z / m};
