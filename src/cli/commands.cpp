@@ -104,11 +104,14 @@ void require_sound(const RemeshResult& result) {
 
 void warn_of_topology(Console& console, const RemeshResult& result) {
   if (result.topology_matches) return;
-  console.warn(fmt::format("the output's topology ({}) is not the input's ({}); ask for more vertices",
-                           describe(result.topology), describe(result.input_topology)));
+  console.warn(fmt::format("the output's topology ({}) is not the input's ({}); {}", describe(result.topology),
+                           describe(result.input_topology),
+                           result.input_topology.manifold ? "ask for more vertices" : "mend the input"));
 }
 
-Json remesh_report(const RemeshResult& result, const TriangleMesh& input, const Device& device) {
+// Everything but the seconds, whose place is kept.
+Json remesh_report(Console& console, const RemeshResult& result, const QualityReport& quality,
+                   const TriangleMesh& input, const Device& device) {
   Json report = start_report("remesh");
   report["device"] = device_json(device);
   report["input"] = input_json(input);
@@ -117,6 +120,15 @@ Json remesh_report(const RemeshResult& result, const TriangleMesh& input, const 
   report["evaluations"] = result.evaluations;
   report["energy"] = result.energy;
   report["gradient_norm"] = result.gradient_norm;
+  report["seconds"] = nullptr;
+  report["certification"] = certification_json(result.certification);
+  report["quality"] = quality_json(quality);
+  console.phase("measuring the distance to the input");
+  add_distance(report["quality"], measure_distance(result.mesh, input));
+  console.phase("looking for self-intersections");
+  report["quality"]["self_intersections"] = count_self_intersections(result.mesh);
+  report["topology"] = topology_json(result.topology);
+  report["topology"]["matches_input"] = result.topology_matches;
   return report;
 }
 
@@ -192,6 +204,57 @@ std::string format_pairs(const RestrictedPolygons& polygons, const TriangleMesh&
   return fmt::to_string(text);
 }
 
+std::vector<Vec3> rvd_seeds(const RvdCommand& command, const TriangleMesh& input) {
+  if (!command.seeds.empty()) return read_seeds(command.seeds, command.count);
+  std::vector<Vec3> seeds;
+  for (const SurfaceSample& sample : sample_surface(input, command.count, command.random_seed))
+    seeds.push_back(sample.point);
+  return seeds;
+}
+
+void write_cells(const RvdCommand& command, const RestrictedPolygons& polygons, std::size_t seeds) {
+  if (command.output.empty() && command.preview.empty()) return;
+  const PolygonMesh cells = coloured_cells(polygons, seeds);
+  if (!command.output.empty()) write_polygons(command.output, cells);
+  if (command.preview.empty()) return;
+  PreviewOptions picture;
+  picture.edges = false;
+  picture.outlines = seeds <= 30'000;  // beyond, cells have too few pixels
+  picture.colours = cells.colours;
+  write_preview(command.preview, cells.vertices, cells.polygons, picture);
+}
+
+Json rvd_report(const Diagram& diagram, const TriangleMesh& input, const std::vector<Vec3>& seeds,
+                const Device& device, const Json& seconds) {
+  Json report = start_report("rvd");
+  report["device"] = device_json(device);
+  report["input"] = input_json(input);
+  report["energy"] = diagram.moments.energy;
+  report["mass"] = diagram.moments.mass;
+  report["untiled"] = 0;  // a diagram that does not tile is not reported
+  report["seconds"] = seconds;
+  report["certification"] = certification_json(diagram.moments.certification);
+  report["cells"] = cells_json(diagram.moments, seeds);
+  report["rdt"] = rdt_json(diagram.dual);
+  return report;
+}
+
+void print_summary(Console& console, const RvdCommand& command, const Diagram& diagram, const TriangleMesh& input,
+                   const Json& seconds) {
+  const CellMoments& moments = diagram.moments;
+  const auto empty = std::count_if(moments.cells.begin(), moments.cells.end(),
+                                   [](const Moments& m) { return m.mass == 0; });
+  console.print(fmt::format("input      {}: {}", command.input, size_of(input_json(input))));
+  console.print(fmt::format("cells      {}, {} of them empty; energy {:.6e}", moments.cells.size(), empty,
+                            moments.energy));
+  console.print(fmt::format("pairs      {} of a cell and a triangle, {} decided in exact arithmetic",
+                            moments.certification.pairs, moments.certification.uncertain));
+  console.print(fmt::format("dual       {}", counted(diagram.dual.triangles.size(), "triangle", "triangles")));
+  console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
+  if (command.common.verbose) print_seconds(console, seconds);
+  print_written(console, {command.output, command.preview, command.pairs, command.common.report});
+}
+
 // --- quality ---
 
 struct QualityMeasures {
@@ -254,7 +317,7 @@ void run(const RemeshCommand& command) {
   const Context context = console.context();
 
   console.phase("reading " + command.input);
-  Stopwatch reading;
+  const Stopwatch reading;
   const TriangleMesh input = read_mesh(command.input, context);
   const RemeshOptions options = remesh_options(command);
   double io = reading.seconds();
@@ -267,19 +330,7 @@ void run(const RemeshCommand& command) {
   const Stopwatch measuring;
   const QualityReport quality = measure_quality(result.mesh);
   Json report;
-  if (!report_path.empty()) {
-    report = remesh_report(result, input, device);
-    Json measures = quality_json(quality);
-    console.phase("looking for self-intersections");
-    measures["self_intersections"] = count_self_intersections(result.mesh);
-    console.phase("measuring the distance to the input");
-    add_distance(measures, measure_distance(result.mesh, input));
-    report["seconds"] = nullptr;
-    report["certification"] = certification_json(result.certification);
-    report["quality"] = std::move(measures);
-    report["topology"] = topology_json(result.topology);
-    report["topology"]["matches_input"] = result.topology_matches;
-  }
+  if (!report_path.empty()) report = remesh_report(console, result, quality, input, device);
   Json seconds = remesh_seconds(result.seconds);
   seconds["quality"] = measuring.seconds();
 
@@ -312,67 +363,31 @@ void run(const RvdCommand& command) {
   console.phase("reading " + command.input);
   const Stopwatch reading;
   const TriangleMesh input = read_mesh(command.input, console.context());
-  std::vector<Vec3> seeds;
-  if (!command.seeds.empty()) {
-    seeds = read_seeds(command.seeds, command.count);
-  } else {
-    for (const SurfaceSample& sample : sample_surface(input, command.count, command.random_seed))
-      seeds.push_back(sample.point);
-  }
+  const std::vector<Vec3> seeds = rvd_seeds(command, input);
   double io = reading.seconds();
 
   console.phase("computing the diagram");
   const Surface surface(input);
   const Stopwatch computing;
   const Diagram diagram = compute_diagram(surface, seeds, choose_neighbours(command.compute));
-  const CellMoments& moments = diagram.moments;
-  const DiagramSeconds& phases = moments.seconds;
-  const double extract =
-      computing.seconds() - (phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
-  if (std::abs(moments.mass - surface.mass) > 1e-12 * surface.mass)
-    console.warn(fmt::format("the masses of the cells sum to {}, the area is {}", moments.mass, surface.mass));
-  const auto empty = std::count_if(moments.cells.begin(), moments.cells.end(),
-                                   [](const Moments& m) { return m.mass == 0; });
+  const double computed = computing.seconds();
+  if (std::abs(diagram.moments.mass - surface.mass) > 1e-12 * surface.mass)
+    console.warn(fmt::format("the masses of the cells sum to {}, the area is {}", diagram.moments.mass, surface.mass));
 
   console.phase("writing");
   stop_watching_interrupts();
   const Stopwatch writing;
-  if (!command.output.empty() || !command.preview.empty()) {
-    const PolygonMesh cells = coloured_cells(diagram.polygons, seeds.size());
-    if (!command.output.empty()) write_polygons(command.output, cells);
-    PreviewOptions picture;
-    picture.edges = false;
-    picture.outlines = true;
-    picture.colours = cells.colours;
-    if (!command.preview.empty()) write_preview(command.preview, cells.vertices, cells.polygons, picture);
-  }
+  write_cells(command, diagram.polygons, seeds.size());
   if (!command.pairs.empty()) write_file(command.pairs, format_pairs(diagram.polygons, input));
   io += writing.seconds();
 
+  const DiagramSeconds& phases = diagram.moments.seconds;
   Json seconds{{"total", total.seconds()}};
   seconds.update(seconds_json(phases));
-  seconds["extract"] = extract;
+  seconds["extract"] = computed - (phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
   seconds["io"] = io;
-  if (!report_path.empty()) {
-    Json report = start_report("rvd");
-    report["device"] = device_json(device);
-    report["input"] = input_json(input);
-    report["energy"] = moments.energy;
-    report["mass"] = moments.mass;
-    report["untiled"] = 0;
-    report["seconds"] = seconds;
-    report["certification"] = certification_json(moments.certification);
-    report["cells"] = cells_json(moments, seeds);
-    report["rdt"] = rdt_json(diagram.dual);
-    write_report(report_path, report);
-  }
-  console.print(fmt::format("input      {}: {}", command.input, size_of(input_json(input))));
-  console.print(fmt::format("cells      {}, {} of them empty; energy {:.6e}", seeds.size(), empty, moments.energy));
-  console.print(fmt::format("pairs      {} of a cell and a triangle, {} decided in exact arithmetic",
-                            moments.certification.pairs, moments.certification.uncertain));
-  console.print(fmt::format("dual       {}", counted(diagram.dual.triangles.size(), "triangle", "triangles")));
-  if (command.common.verbose) print_seconds(console, seconds);
-  print_written(console, {command.output, command.preview, command.pairs, report_path});
+  if (!report_path.empty()) write_report(report_path, rvd_report(diagram, input, seeds, device, seconds));
+  print_summary(console, command, diagram, input, seconds);
 }
 
 void run(const QualityCommand& command) {

@@ -92,9 +92,10 @@ void Console::show(const Progress& progress) {
   last_shown_ = now;
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
-  std::string line = fmt::format("{}  iteration {}/{}  energy {:.6e}  gradient {:.2e}  {:.0f} %", progress.phase,
-                                 progress.iteration, progress.iterations, progress.energy, progress.gradient_norm,
-                                 100 * fraction);
+  std::string line = fmt::format("iteration {}/{}  energy {:.6e}  gradient {:.2e}", progress.iteration,
+                                 progress.iterations, progress.energy, progress.gradient_norm);
+  if (*progress.phase) line = fmt::format("{}  {}", progress.phase, line);
+  if (fraction > 0) line += fmt::format("  {:.0f} %", 100 * fraction);
   if (fraction > 0.02) line += "  " + time_left(elapsed * (1 - fraction) / fraction);
   show_line(std::move(line));
 }

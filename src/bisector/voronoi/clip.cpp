@@ -8,16 +8,26 @@ namespace bisector {
 namespace {
 
 constexpr double kUnit = 0x1p-53;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Lines that meet at a smaller angle (sine, squared) have their vertex computed exactly.
 constexpr double kSteep = 1e-8;
 // No product of coordinates this small is told from 0, for the bounds below do not cover underflow.
 constexpr double kTiny = 1e-300;
 
+// Two doubles in one register; operations round as on one.
+typedef double Pair __attribute__((vector_size(2 * sizeof(double))));
+
 double max_coordinate(const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
 }  // namespace
 
-Clipper::Clipper() : lines_(3) {
+void Clipper::Polygon::reserve(std::size_t count) {
+  if (corners.size() >= count) return;
+  corners.resize(2 * count);
+  edges.resize(2 * count);
+}
+
+Clipper::Clipper() : lines_(16) {
   for (unsigned k = 0; k < 3; ++k) lines_[k].slot = kEdgeLabel | k;
 }
 
@@ -43,23 +53,20 @@ void Clipper::start(Index slot) {
     largest_ = std::max(largest_, max_coordinate(local_[k]));
     facet_squared_ = std::max(facet_squared_, norm2(local_[k]) * (1 + 1e-12));
   }
-  polygon_.resize(3);
-  for (unsigned k = 0; k < 3; ++k) polygon_[k] = {local_[k], 8 * kUnit * largest_, k};
+  line_count_ = 3;
+  polygon_.reserve(3);
+  polygon_.size = 0;
+  for (unsigned k = 0; k < 3; ++k) polygon_.push({local_[k], 8 * kUnit * largest_}, k);
 }
 
-void Clipper::take(Index slot) {
-  lines_.resize(3);
-  start(slot);
-}
+void Clipper::take(Index slot) { start(slot); }
 
 bool Clipper::clip(const Neighbours& neighbours, Index slot) {
-  lines_.resize(3);
   start(slot);
   const Vec3 x = seeds_->x[slot];
   height_ = dot(facet_->normal, local_[facet_->anchor]);
   foot_ = height_ * facet_->normal;
   for (unsigned k = 0; k < 3; ++k) lines_[k].offset = dot(lines_[k].m, local_[facet_->origin[k]]) - height_ * dot(facet_->normal, lines_[k].m);
-  slack_ = polygon_[0].slack;
   reach_ = facet_squared_;
   NeighbourList list = neighbours.list(slot);
   for (;;) {
@@ -68,34 +75,49 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
       const double squared = norm2(d);
       // Security radius: all of the polygon is nearer to this seed than to any other from here on.
       if (4 * reach_ < squared * (1 - 1e-9)) return true;
-      const double taxicab = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
-      const double below = 0.5 * squared * (1 - 1e-12) - kTiny;
-      double farthest = -std::numeric_limits<double>::infinity();
-      for (const Corner& c : polygon_) farthest = std::max(farthest, dot(c.at, d));
-      if (farthest + slack_ * taxicab < below) continue;
-      if (wider_ && std::any_of(polygon_.begin(), polygon_.end(), [&](const Corner& c) { return lines_[c.edge].slot == *j; }))
-        continue;
-      cut(*j, d, squared, taxicab);
-      if (polygon_.empty()) return false;
+      if (passes_by(d, squared)) continue;
+      if (wider_ && bounded_by(*j)) continue;
+      cut(*j, d, squared);
+      if (polygon_.size == 0) return false;
     }
-    if (list.radius == std::numeric_limits<double>::infinity()) return true;
+    if (list.radius == kInfinity) return true;
     if (4 * reach_ < list.radius * list.radius * (1 - 1e-9)) return true;
     wider_ = true;
     list = neighbours.wider(slot, list);
   }
 }
 
-void Clipper::cut(Index other, const Vec3& d, double squared, double taxicab) {
-  const std::size_t n = polygon_.size();
+bool Clipper::bounded_by(Index other) const {
+  for (std::size_t k = 0; k < polygon_.size; ++k)
+    if (label(k) == other) return true;
+  return false;
+}
+
+// Whether all of the polygon is certain to lie on the seed's side.
+bool Clipper::passes_by(const Vec3& d, double squared) const {
+  const Pair xy = {d.x, d.y}, z = {d.z, std::abs(d.x) + std::abs(d.y) + std::abs(d.z)};
+  double farthest = -kInfinity;
+  for (std::size_t k = 0; k < polygon_.size; ++k) {
+    const auto* halves = reinterpret_cast<const Pair*>(&polygon_.corners[k]);
+    const Pair sum = halves[0] * xy + halves[1] * z;
+    const double upper = sum[0] + sum[1];
+    farthest = farthest > upper ? farthest : upper;
+  }
+  return farthest < 0.5 * squared * (1 - 1e-12) - kTiny;
+}
+
+void Clipper::cut(Index other, const Vec3& d, double squared) {
+  const std::size_t n = polygon_.size;
+  const double taxicab = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
   const double below = 0.5 * squared * (1 - 1e-12) - kTiny, above = 0.5 * squared * (1 + 1e-12) + kTiny;
-  sides_.resize(n);
+  if (sides_.size() < n) sides_.resize(2 * n);
   std::size_t outside = 0;
   for (std::size_t k = 0; k < n; ++k) {
-    const double at = dot(polygon_[k].at, d), slack = polygon_[k].slack * taxicab;
-    int side = at + slack < below ? 1 : at - slack > above ? -1 : 0;
+    const double along = dot(polygon_.corners[k].at, d), error = polygon_.corners[k].slack * taxicab;
+    int side = along + error < below ? 1 : along - error > above ? -1 : 0;
     if (side == 0) {
       uncertain_ = true;
-      side = exact_side(frame(), exact(lines_[polygon_[previous(k)].edge]), exact(lines_[polygon_[k].edge]),
+      side = exact_side(frame(), exact(lines_[polygon_.edges[previous(k)]]), exact(lines_[polygon_.edges[k]]),
                         ExactLine::bisector(seeds_->x[other], seeds_->id[other]));
     }
     sides_[k] = static_cast<signed char>(side);
@@ -103,46 +125,44 @@ void Clipper::cut(Index other, const Vec3& d, double squared, double taxicab) {
   }
   if (outside == 0) return;
   if (outside == n) {
-    polygon_.clear();
+    polygon_.size = 0;
     return;
   }
-  Line line;
+  if (lines_.size() == line_count_) lines_.resize(2 * line_count_);
+  const unsigned edge = static_cast<unsigned>(line_count_);
+  Line& line = lines_[line_count_++];
   line.m = d;
   line.along = cross(facet_->normal, d);
   line.offset = 0.5 * squared - height_ * dot(facet_->normal, d);
   line.squared = squared;
   line.key = std::uint64_t{3} + seeds_->id[other];
   line.slot = other;
-  // The polygon is convex: its vertices on the positive side are consecutive, from `in` up to `last`.
+  // The polygon is convex: its corners on the positive side are consecutive, from `in` up to `last`.
   std::size_t in = 0;
   while (!(sides_[in] > 0 && sides_[previous(in)] < 0)) ++in;
-  kept_.resize(n - outside + 2);
-  Corner* out = kept_.data();
+  kept_.reserve(n - outside + 2);
+  kept_.size = 0;
   std::size_t k = in, last = in;
   do {
-    *out++ = polygon_[k];
+    kept_.push(polygon_.corners[k], polygon_.edges[k]);
     last = k;
     k = k + 1 == n ? 0 : k + 1;
   } while (sides_[k] > 0);
-  const unsigned entering = polygon_[previous(in)].edge;
-  *out = meet(lines_[polygon_[last].edge], line);
-  out++->edge = static_cast<unsigned>(lines_.size());
-  *out = meet(line, lines_[entering]);
-  out->edge = entering;
-  lines_.push_back(line);
-  polygon_.swap(kept_);
+  const unsigned leaving = polygon_.edges[last], entering = polygon_.edges[previous(in)];
+  kept_.push(meet(lines_[leaving], line), edge);
+  kept_.push(meet(line, lines_[entering]), entering);
+  std::swap(polygon_, kept_);
   bound_polygon();
 }
 
 void Clipper::bound_polygon() {
-  slack_ = 0;
-  double squared = 0;
-  for (const Corner& c : polygon_) {
-    slack_ = std::max(slack_, c.slack);
-    squared = std::max(squared, norm2(c.at));
+  double squared = 0, slack = 0;
+  for (std::size_t k = 0; k < polygon_.size; ++k) {
+    slack = std::max(slack, polygon_.corners[k].slack);
+    squared = std::max(squared, norm2(polygon_.corners[k].at));
   }
   // (r + e)^2 <= r^2 (1 + a) + e^2 (1 + 1/a), and no point of the facet is farther than its corners.
-  reach_ = std::min(facet_squared_, squared * (1 + 1e-6) + 4e6 * (slack_ * slack_));
+  reach_ = std::min(facet_squared_, squared * (1 + 1e-6) + 4e6 * (slack * slack));
 }
 
 // In the facet's plane with origin at the seed's foot, the lines' normals are the parts of m along the plane, and the lines
@@ -150,22 +170,14 @@ void Clipper::bound_polygon() {
 // operations each term of the numerator is off by less than 250 u P |m1| |m2| and the determinant by 150 u |m1| |m2|
 // (the normal's own error, at most 60 u, included), which bounds the error of the quotient as coded.
 Clipper::Corner Clipper::meet(const Line& before, const Line& after) const {
-  Corner corner;
-  const bool in_order = before.key < after.key;
-  const Line& low = in_order ? before : after;
-  const Line& high = in_order ? after : before;
-  const double determinant = dot(low.along, high.m);
-  const double squares = low.squared * high.squared;
+  const double determinant = dot(before.along, after.m);
+  const double squares = before.squared * after.squared;
   const double square = determinant * determinant;
-  if (square > kSteep * squares) {
-    const double inverse = 1 / determinant;
-    corner.at = foot_ + inverse * (high.offset * low.along - low.offset * high.along);
-    corner.slack = 2000 * kUnit * largest_ * std::sqrt(squares / square);
-  } else {
-    corner.at = exact_vertex(frame(), exact(before), exact(after));
-    corner.slack = 16 * kUnit * largest_;
-  }
-  return corner;
+  if (!(square > kSteep * squares))
+    return {exact_vertex(frame(), exact(before), exact(after)), 16 * kUnit * largest_};
+  const double inverse = 1 / determinant;
+  return {foot_ + inverse * (after.offset * before.along - before.offset * after.along),
+          2000 * kUnit * largest_ * std::sqrt(squares / square)};
 }
 
 double Clipper::density(std::size_t k) const {
@@ -178,7 +190,7 @@ double Clipper::density(std::size_t k) const {
 
 template <bool kUniform>
 Moments Clipper::integrate() {
-  const std::size_t n = polygon_.size();
+  const std::size_t n = polygon_.size;
   if constexpr (!kUniform) {
     densities_.resize(n);
     for (std::size_t k = 0; k < n; ++k) densities_[k] = density(k);
@@ -186,7 +198,7 @@ Moments Clipper::integrate() {
   // The fan starts at the edge with the smallest label.
   std::size_t apex = 0;
   for (std::size_t k = 1; k < n; ++k)
-    if (lines_[polygon_[k].edge].key < lines_[polygon_[apex].edge].key) apex = k;
+    if (lines_[polygon_.edges[k]].key < lines_[polygon_.edges[apex]].key) apex = k;
   const auto next = [n](std::size_t k) { return k + 1 == n ? 0 : k + 1; };
   const Vec3 a = vertex(apex);
   Moments sum;

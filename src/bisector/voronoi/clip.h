@@ -25,11 +25,11 @@ class Clipper {
 
   // The last polygon, counter-clockwise: vertex k relative to the seed, and the label (a slot or a facet edge) of the edge
   // that starts there.
-  std::size_t size() const { return polygon_.size(); }
-  const Vec3& vertex(std::size_t k) const { return polygon_[k].at; }
-  Index label(std::size_t k) const { return lines_[polygon_[k].edge].slot; }
+  std::size_t size() const { return polygon_.size; }
+  const Vec3& vertex(std::size_t k) const { return polygon_.corners[k].at; }
+  Index label(std::size_t k) const { return lines_[polygon_.edges[k]].slot; }
   // Bounds the error of each coordinate of vertex k.
-  double slack(std::size_t k) const { return polygon_[k].slack; }
+  double slack(std::size_t k) const { return polygon_.corners[k].slack; }
   // Integrals over the last polygon.
   template <bool kUniform>
   Moments integrate();
@@ -48,19 +48,31 @@ class Clipper {
     std::uint64_t key;  // order of labels: facet edges by their vertices' indices, then seeds by the caller's index
     Index slot;         // of the other seed, or kEdgeLabel | k
   };
-  // A vertex and the edge that starts there (an index into lines_).
-  struct Corner {
+  struct alignas(16) Corner {
     Vec3 at;
     double slack;
-    unsigned edge;
+  };
+  // Corners, and for each the edge that starts there (an index into lines_). Capacity is kept.
+  struct Polygon {
+    std::size_t size = 0;
+    std::vector<Corner> corners;
+    std::vector<unsigned> edges;
+
+    void reserve(std::size_t count);
+    void push(const Corner& corner, unsigned edge) {
+      corners[size] = corner;
+      edges[size++] = edge;
+    }
   };
 
   void start(Index slot);
   void bound_polygon();
-  void cut(Index other, const Vec3& towards, double squared, double taxicab);
+  void cut(Index other, const Vec3& towards, double squared);
+  bool passes_by(const Vec3& towards, double squared) const;
   Corner meet(const Line& before, const Line& after) const;
+  bool bounded_by(Index other) const;
   double density(std::size_t corner) const;
-  std::size_t previous(std::size_t corner) const { return corner ? corner - 1 : polygon_.size() - 1; }
+  std::size_t previous(std::size_t corner) const { return corner ? corner - 1 : polygon_.size - 1; }
   ExactFrame frame() const;
   ExactLine exact(const Line& line) const;
 
@@ -73,9 +85,9 @@ class Clipper {
   Vec3 foot_;                 // of the seed on that plane
   double facet_squared_ = 0;  // upper bound of the squared distance of any point of the facet
   double reach_ = 0;          // the same of the polygon
-  double slack_ = 0;          // the largest of the polygon's corners
   std::vector<Line> lines_;   // all that ever cut; the first three are the facet's edges
-  std::vector<Corner> polygon_, kept_;
+  std::size_t line_count_ = 0;
+  Polygon polygon_, kept_;
   std::vector<signed char> sides_;
   std::vector<double> densities_;
   bool uncertain_ = false, wider_ = false;

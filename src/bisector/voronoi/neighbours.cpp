@@ -1,45 +1,42 @@
 #include "bisector/voronoi/neighbours.h"
 
-#include <nanoflann.hpp>
-
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <limits>
 #include <mutex>
 #include <optional>
 
 #include "bisector/core/parallel.h"
 #include "bisector/voronoi/delaunay.h"
-#include "bisector/voronoi/morton.h"
+#include "bisector/voronoi/hilbert.h"
 
 namespace bisector {
 namespace {
 
-constexpr std::size_t kFirst = 20;   // a random planar cell has six neighbours and is certified by about 16 nearest
-constexpr std::size_t kGrowth = 2;
-constexpr int kRingLevel = 3;        // the rung at which `nearest` turns to the Delaunay triangulation
+// A random planar cell has six neighbours and is certified by about 16 nearest seeds.
+constexpr std::size_t kFirstMost = 40;   // entries of a first list
+constexpr double kFirstMean = 28;        // the radius of the search aims at
+constexpr std::size_t kFirstLeast = 6;  // else the search is repeated with a larger radius
+constexpr std::uint64_t kPlaceMask = 511;
+constexpr std::size_t kCandidates = kPlaceMask + 1;  // and with a smaller one beyond these
+constexpr int kTrials = 12;
+constexpr double kLargestRun = 5;        // diagonal of the box of one search, in radii
+constexpr double kGrowth = 1.6;          // of the radius, from level to level
+constexpr int kRingLevel = 6;            // the rung at which `nearest` turns to the Delaunay triangulation
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-struct Cloud {
-  const std::vector<Vec3>& points;
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t i, std::size_t k) const { return points[i][static_cast<int>(k)]; }
-  template <class BBox>
-  bool kdtree_get_bbox(BBox&) const { return false; }
-};
-
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, 3, Index>;
-
 // Distances are compared after rounding; this keeps what a list leaves out beyond its radius all the same.
-double lower_bound_of_distance(double squared) { return std::sqrt(squared) * (1 - 1e-12); }
+constexpr double kBelow = 1 - 1e-9;
 
 }  // namespace
 
 SortedSeeds sort_seeds(const std::vector<Vec3>& seeds) {
   SortedSeeds sorted;
-  sorted.id = morton_order(seeds);
+  sorted.id = hilbert_order(seeds);
   sorted.slot.assign(seeds.size(), kNone);
   sorted.x.reserve(seeds.size());
-  // Equal seeds are neighbours in Morton order, the lowest index first.
+  // Equal seeds are neighbours in Hilbert order, the lowest index first.
   std::size_t n = 0;
   for (std::size_t k = 0; k < sorted.id.size(); ++k) {
     const Index i = sorted.id[k];
@@ -49,15 +46,26 @@ SortedSeeds sort_seeds(const std::vector<Vec3>& seeds) {
     sorted.x.push_back(seeds[i]);
   }
   sorted.id.resize(n);
+  sorted.extent = bounding_box(sorted.x).diagonal();
   return sorted;
 }
 
-struct Neighbours::Tree {
-  Cloud cloud;
-  KdTree index;
-  explicit Tree(const std::vector<Vec3>& points)
-      : cloud{points}, index(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(12)) {
-    index.buildIndex();
+struct Neighbours::Candidate {
+  double squared;
+  Index slot;
+  bool operator<(const Candidate& b) const { return squared < b.squared; }
+};
+
+struct Neighbours::Search {
+  double radius = 0;  // carried along, for seeds nearby need similar ones
+  std::vector<Index> found;
+  std::vector<double> px, py, pz, squared;  // of the seeds found
+  std::vector<std::uint64_t> keys;
+
+  void resize(std::size_t n) {
+    if (px.size() >= n) return;
+    for (auto* array : {&px, &py, &pz, &squared}) array->resize(2 * n);
+    keys.resize(2 * n);
   }
 };
 
@@ -88,34 +96,90 @@ void Neighbours::drop_grown() {
 
 void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
   const std::size_t n = seeds.x.size();
-  if (heads_ && grown_.load() == 0 && head_count_ == n) {
-    // No list was grown, so the heads are all null still.
-  } else {
-    drop_grown();
-    heads_ = std::make_unique<std::atomic<Grown*>[]>(n);
-    head_count_ = n;
-  }
-  grown_ = 0;
+  drop_grown();
+  heads_ = std::make_unique<std::atomic<Grown*>[]>(n);
+  head_count_ = n;
   seeds_ = &seeds;
   last_rung_ = std::make_unique<LastRung>();
-  tree_ = n ? std::make_unique<Tree>(seeds.x) : nullptr;
+  if (n) tree_.build(seeds.x);
   use_rings_ = source == NeighbourSource::delaunay && last_rung().rings.has_value();
   if (use_rings_) return;
 
-  stride_ = n ? std::min(kFirst, n - 1) : 0;
-  first_.resize(n * stride_);
-  radius_.resize(n);
-  parallel_chunks(n, 512, [&](std::size_t, std::size_t begin, std::size_t end) {
-    Index found[kFirst + 1];
-    double squared[kFirst + 1];
-    for (std::size_t i = begin; i < end; ++i) {
-      tree_->index.knnSearch(&seeds.x[i].x, stride_ + 1, found, squared);
-      Index* out = &first_[i * stride_];
-      for (std::size_t k = 0, m = 0; k <= stride_ && m < stride_; ++k)
-        if (found[k] != i) out[m++] = found[k];
-      radius_[i] = stride_ + 1 == n ? kInfinity : lower_bound_of_distance(squared[stride_]);
+  first_.resize(n * kFirstMost);
+  count_.assign(n, 0);
+  radius_.assign(n, 0);
+  parallel_chunks(tree_.leaves(), 64, [&](std::size_t, std::size_t begin, std::size_t end) {
+    Search search;
+    search.radius = tree_.leaf_box(begin).diagonal();
+    for (std::size_t leaf = begin; leaf < end; ++leaf) {
+      const std::size_t first = leaf * SeedTree::kLeaf, last = std::min(n, first + SeedTree::kLeaf);
+      if (list_run(first, last, tree_.leaf_box(leaf), search)) continue;
+      // The leaf spans a jump of the spatial order.
+      for (std::size_t i = first; i < last; ++i) list_run(i, i + 1, {seeds.x[i], seeds.x[i]}, search);
     }
   });
+}
+
+// Lists for the seeds [begin, end) from one search around their box; a failing search is repeated with another radius. False
+// if the box is too large to be worth it.
+bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Search& search) {
+  const std::vector<Vec3>& x = seeds_->x;
+  if (!(search.radius > 0)) search.radius = std::max(box.diagonal(), 1e-6 * seeds_->extent);
+  if (box.diagonal() > kLargestRun * search.radius) return false;
+  for (int trial = 0;; ++trial) {
+    search.found.clear();
+    tree_.near(box, search.radius, search.found);
+    const bool all = search.found.size() == x.size();
+    const bool last = all || trial == kTrials;
+    if (search.found.size() > kCandidates) {
+      if (last) return false;
+      search.radius *= 0.6;
+      continue;
+    }
+    const double squared = all ? kInfinity : search.radius * search.radius;
+    const std::size_t n = search.found.size();
+    search.resize(n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const Vec3 p = x[search.found[k]];
+      search.px[k] = p.x;
+      search.py[k] = p.y;
+      search.pz[k] = p.z;
+    }
+    std::size_t least = x.size(), total = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 p = x[i];
+      const double *px = search.px.data(), *py = search.py.data(), *pz = search.pz.data();
+      double* d = search.squared.data();
+      for (std::size_t k = 0; k < n; ++k) {
+        const double dx = px[k] - p.x, dy = py[k] - p.y, dz = pz[k] - p.z;
+        d[k] = dx * dx + dy * dy + dz * dz;
+      }
+      // Distance and place in one key: squared distances are positive, so their bits sort like them; the last nine give way.
+      std::uint64_t* out = search.keys.data();
+      for (std::size_t k = 0; k < n; ++k) {
+        *out = (std::bit_cast<std::uint64_t>(d[k]) & ~kPlaceMask) | k;
+        out += d[k] < squared && d[k] > 0;
+      }
+      std::size_t kept = static_cast<std::size_t>(out - search.keys.data());
+      least = std::min(least, kept);
+      total += kept;
+      std::sort(search.keys.data(), out);
+      radius_[i] = all ? kInfinity : search.radius * kBelow;
+      if (kept > kFirstMost) {
+        radius_[i] = std::sqrt(d[search.keys[kFirstMost] & kPlaceMask]) * kBelow;
+        kept = kFirstMost;
+      }
+      count_[i] = static_cast<unsigned char>(kept);
+      for (std::size_t k = 0; k < kept; ++k) first_[i * kFirstMost + k] = search.found[search.keys[k] & kPlaceMask];
+    }
+    const double mean = static_cast<double>(total) / static_cast<double>(end - begin);
+    const double factor = std::clamp(std::sqrt(kFirstMean / std::max(mean, 1.0)), 0.5, 2.0);
+    if (last || least >= kFirstLeast) {
+      search.radius *= factor;
+      return true;
+    }
+    search.radius *= std::max(factor, 1.3);
+  }
 }
 
 NeighbourList Neighbours::list(Index slot) const {
@@ -123,25 +187,22 @@ NeighbourList Neighbours::list(Index slot) const {
     const auto& rings = *last_rung_->rings;
     return {rings.begin(slot), rings.end(slot), kInfinity, kRingLevel};
   }
-  const Index* begin = first_.data() + slot * stride_;
-  return {begin, begin + stride_, radius_[slot], 0};
+  const Index* begin = first_.data() + slot * kFirstMost;
+  return {begin, begin + count_[slot], radius_[slot], 0};
 }
 
 NeighbourList Neighbours::wider(Index slot, const NeighbourList& shorter) const {
   Grown* head = heads_[slot].load(std::memory_order_acquire);
   while (!head || head->level <= shorter.level) {
-    std::unique_ptr<Grown> fresh = grow(slot, (head ? head->level : 0) + 1);
+    std::unique_ptr<Grown> fresh =
+        head ? grow(slot, head->level + 1, head->radius) : grow(slot, 1, radius_[slot]);
     fresh->next = head;
-    if (heads_[slot].compare_exchange_strong(head, fresh.get(), std::memory_order_acq_rel)) {
-      head = fresh.release();
-      grown_.fetch_add(1, std::memory_order_relaxed);
-    }
+    if (heads_[slot].compare_exchange_strong(head, fresh.get(), std::memory_order_acq_rel)) head = fresh.release();
   }
   return {head->values.data(), head->values.data() + head->values.size(), head->radius, head->level};
 }
 
-std::unique_ptr<Neighbours::Grown> Neighbours::grow(Index slot, int level) const {
-  const std::size_t n = seeds_->x.size();
+std::unique_ptr<Neighbours::Grown> Neighbours::grow(Index slot, int level, double radius) const {
   auto grown = std::make_unique<Grown>();
   grown->level = level;
   if (level >= kRingLevel && last_rung().rings) {
@@ -150,15 +211,21 @@ std::unique_ptr<Neighbours::Grown> Neighbours::grow(Index slot, int level) const
     grown->radius = kInfinity;
     return grown;
   }
-  std::size_t count = kFirst;
-  for (int k = 0; k < level && count < n - 1; ++k) count *= kGrowth;
-  count = std::min(count, n - 1);
-  std::vector<Index> found(count + 1);
-  std::vector<double> squared(count + 1);
-  tree_->index.knnSearch(&seeds_->x[slot].x, count + 1, found.data(), squared.data());
-  for (std::size_t k = 0; k <= count && grown->values.size() < count; ++k)
-    if (found[k] != slot) grown->values.push_back(found[k]);
-  grown->radius = count + 1 == n ? kInfinity : lower_bound_of_distance(squared[count]);
+  const Vec3 p = seeds_->x[slot];
+  grown->radius = std::max(kGrowth * radius, 1e-9 * seeds_->extent);
+  std::vector<Candidate> candidates;
+  const std::vector<Index> found = around(p, grown->radius);
+  const double squared = grown->radius * grown->radius;
+  for (const Index j : found)
+    if (j != slot) candidates.push_back({norm2(seeds_->x[j] - p), j});
+  if (found.size() == seeds_->x.size()) {
+    grown->radius = kInfinity;
+  } else {
+    std::erase_if(candidates, [&](const Candidate& c) { return !(c.squared < squared); });
+    grown->radius *= kBelow;
+  }
+  std::sort(candidates.begin(), candidates.end());
+  for (const Candidate& c : candidates) grown->values.push_back(c.slot);
   return grown;
 }
 
@@ -178,23 +245,9 @@ const Neighbours::LastRung& Neighbours::last_rung() const {
   return *last_rung_;
 }
 
-Index Neighbours::nearest(const Vec3& q) const {
-  Index found = 0;
-  double squared = 0;
-  tree_->index.knnSearch(&q.x, 1, &found, &squared);
-  return found;
-}
-
-std::size_t Neighbours::nearest(const Vec3& q, std::size_t count, Index* slots) const {
-  std::vector<double> squared(count);
-  return tree_->index.knnSearch(&q.x, count, slots, squared.data());
-}
-
-std::vector<Index> Neighbours::within(const Vec3& q, double r2) const {
-  std::vector<std::pair<Index, double>> found;
-  tree_->index.radiusSearch(&q.x, r2 * (1 + 1e-9), found, nanoflann::SearchParams(0, 0, false));
+std::vector<Index> Neighbours::around(const Vec3& q, double radius) const {
   std::vector<Index> slots;
-  for (const auto& f : found) slots.push_back(f.first);
+  tree_.near({q, q}, radius, slots);
   return slots;
 }
 

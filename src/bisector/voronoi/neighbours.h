@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bisector/core/types.h"
+#include "bisector/voronoi/seed_tree.h"
 
 namespace bisector {
 
@@ -20,6 +21,7 @@ struct SortedSeeds {
   std::vector<Vec3> x;
   std::vector<Index> id;
   std::vector<Index> slot;  // of each caller index, or kNone
+  double extent = 0;        // diagonal of the bounding box
 };
 
 SortedSeeds sort_seeds(const std::vector<Vec3>& seeds);
@@ -45,33 +47,29 @@ class Neighbours {
   // A list that reaches farther than `shorter` did. Safe to call from many threads; depends on the seeds alone.
   NeighbourList wider(Index slot, const NeighbourList& shorter) const;
   // A slot whose distance to q is the least up to rounding.
-  Index nearest(const Vec3& q) const;
-  // The `count` slots nearest to q in ascending distance, or all if there are fewer. Returns how many.
-  std::size_t nearest(const Vec3& q, std::size_t count, Index* slots) const;
-  // All slots within squared distance r2 (1 + 1e-9) of q.
-  std::vector<Index> within(const Vec3& q, double r2) const;
-
-  // Lists grown since build().
-  std::size_t grown() const { return grown_.load(std::memory_order_relaxed); }
+  Index nearest(const Vec3& q) const { return tree_.nearest(q); }
+  // All slots within `radius` of q, and some of the others.
+  std::vector<Index> around(const Vec3& q, double radius) const;
 
  private:
-  struct Tree;
+  struct Candidate;
   struct Grown;
   struct LastRung;
+  struct Search;
+  bool list_run(std::size_t begin, std::size_t end, const Box& box, Search& search);
   const LastRung& last_rung() const;
-  std::unique_ptr<Grown> grow(Index slot, int level) const;
+  std::unique_ptr<Grown> grow(Index slot, int level, double radius) const;
   void drop_grown();
 
   const SortedSeeds* seeds_ = nullptr;
-  std::unique_ptr<Tree> tree_;
-  std::size_t stride_ = 0;       // entries per list of first_
-  std::vector<Index> first_;
-  std::vector<double> radius_;   // of the lists of first_
-  bool use_rings_ = false;       // the first lists are Delaunay rings
+  SeedTree tree_;
+  std::vector<Index> first_;             // room for kFirstMost per slot
+  std::vector<unsigned char> count_;     // of the lists of first_
+  std::vector<double> radius_;
+  bool use_rings_ = false;               // the first lists are Delaunay rings
   std::unique_ptr<LastRung> last_rung_;
   std::unique_ptr<std::atomic<Grown*>[]> heads_;  // grown lists of each slot, the longest first
   std::size_t head_count_ = 0;
-  mutable std::atomic<std::size_t> grown_{0};
 };
 
 }  // namespace bisector

@@ -100,7 +100,7 @@ Index find_owner(const SortedSeeds& seeds, const Neighbours& neighbours, const V
   }
   // The list is too short for a certificate: take the best of all seeds that are nearest up to rounding.
   owner = neighbours.nearest(q);
-  for (Index k : neighbours.within(q, norm2(q - seeds.x[owner])))
+  for (Index k : neighbours.around(q, norm(q - seeds.x[owner]) * (1 + 1e-9)))
     if (k != owner && !owns(seeds, q, owner, k)) owner = k;
   return owner;
 }
@@ -290,12 +290,11 @@ void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
     result.step_mass[i] = mass;
     const Index s = seeds.slot[i];
     if (mass >= 0.25 * largest || s == kNone) return;
+    const NeighbourList list = neighbours.list(s);
     double around[kStepNeighbours];
     std::size_t count = 0;
-    Index near[kStepNeighbours + 1];
-    const std::size_t found = neighbours.nearest(seeds.x[s], kStepNeighbours + 1, near);
-    for (std::size_t k = 0; k < found && count < kStepNeighbours; ++k)
-      if (near[k] != s) around[count++] = result.cells[seeds.id[near[k]]].mass;
+    for (const Index* j = list.begin; j != list.end && count < kStepNeighbours; ++j)
+      around[count++] = result.cells[seeds.id[*j]].mass;
     std::sort(around, around + count);
     if (count) result.step_mass[i] = std::max(mass, 0.25 * around[count / 2]);
   });

@@ -6,7 +6,7 @@
 #include "bisector/core/error.h"
 #include "bisector/core/parallel.h"
 #include "bisector/voronoi/exact.h"
-#include "bisector/voronoi/morton.h"
+#include "bisector/voronoi/hilbert.h"
 
 namespace bisector {
 namespace {
@@ -62,13 +62,13 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     }
   box = bounding_box(points);
   std::vector<Index> site_of(mesh.vertices.size(), kNone);
-  for (Index k : morton_order(points)) {
+  for (Index k : hilbert_order(points)) {
     site_of[of_point[k]] = static_cast<Index>(sites.size());
     sites.push_back(of_point[k]);
   }
 
   facet_of.assign(mesh.triangles.size(), kNone);
-  for (Index k : morton_order(centres)) {
+  for (Index k : hilbert_order(centres)) {
     const Index t = kept[k];
     const Triangle& v = mesh.triangles[t];
     Facet f;

@@ -1,4 +1,4 @@
-#include "bisector/voronoi/morton.h"
+#include "bisector/voronoi/hilbert.h"
 
 
 #include "bisector/core/parallel.h"
@@ -22,9 +22,31 @@ std::uint64_t spread(std::uint64_t x) {
   return x;
 }
 
+// Place on the Hilbert curve of 21 bits per axis: the curve's orientation in each octant is undone from the highest bit down,
+// then the Gray code (Skilling 2004, "Programming the Hilbert curve").
+std::uint64_t hilbert_code(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  constexpr std::uint32_t kTop = 1u << 20;
+  std::uint32_t axes[3] = {x, y, z};
+  for (std::uint32_t bit = kTop; bit > 1; bit >>= 1) {
+    const std::uint32_t lower = bit - 1;
+    for (std::uint32_t& axis : axes) {
+      const std::uint32_t swap = axis & bit ? 0 : (axes[0] ^ axis) & lower;
+      const std::uint32_t invert = axis & bit ? lower : 0;
+      axes[0] ^= swap ^ invert;
+      axis ^= swap;
+    }
+  }
+  axes[1] ^= axes[0];
+  axes[2] ^= axes[1];
+  std::uint32_t flip = 0;
+  for (std::uint32_t bit = kTop; bit > 1; bit >>= 1)
+    if (axes[2] & bit) flip ^= bit - 1;
+  return spread(axes[0] ^ flip) << 2 | spread(axes[1] ^ flip) << 1 | spread(axes[2] ^ flip);
+}
+
 }  // namespace
 
-std::vector<Index> morton_order(const std::vector<Vec3>& points) {
+std::vector<Index> hilbert_order(const std::vector<Vec3>& points) {
   const Box box = bounding_box(points);
   const Vec3 extent = box.hi - box.lo;
   const double side = std::max({extent.x, extent.y, extent.z});
@@ -32,8 +54,7 @@ std::vector<Index> morton_order(const std::vector<Vec3>& points) {
   std::vector<Key> keys(points.size());
   parallel_each(points.size(), [&](std::size_t i) {
     const Vec3 p = scale * (points[i] - box.lo);
-    keys[i] = {spread(static_cast<std::uint64_t>(p.x)) | spread(static_cast<std::uint64_t>(p.y)) << 1 |
-                   spread(static_cast<std::uint64_t>(p.z)) << 2,
+    keys[i] = {hilbert_code(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), static_cast<std::uint32_t>(p.z)),
                static_cast<Index>(i)};
   });
   // Points of one code are ordered by position first, so that equal points meet.
