@@ -12,7 +12,10 @@
 #include <vector>
 
 #if defined(__SANITIZE_THREAD__)
-#include <sanitizer/tsan_interface.h>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
 #endif
 
 namespace bisector {
@@ -33,18 +36,33 @@ inline unsigned thread_count() {
 }
 
 namespace detail {
-// TBB's own library is not instrumented, so the thread sanitizer has to be told that a loop's start happens before
-// its bodies and they before its end; races between bodies are still found.
-struct LoopFence {
 #if defined(__SANITIZE_THREAD__)
-  char token = 0;
-  void publish() { __tsan_release(&token); }
-  void observe() { __tsan_acquire(&token); }
+// TBB's own library is not instrumented, and the thread sanitizer reports its hand-overs as races; plain threads show the
+// races between bodies and nothing else.
+template <class Body>
+void for_each_chunk(std::size_t chunks, const Body& body) {
+  std::atomic<std::size_t> next = 0;
+  std::exception_ptr failure;
+  std::once_flag first_failure;
+  const auto work = [&] {
+    try {
+      for (std::size_t c; (c = next++) < chunks;) body(c);
+    } catch (...) {
+      std::call_once(first_failure, [&] { failure = std::current_exception(); });
+    }
+  };
+  std::vector<std::thread> threads;
+  for (unsigned t = 1; t < thread_count(); ++t) threads.emplace_back(work);
+  work();
+  for (std::thread& thread : threads) thread.join();
+  if (failure) std::rethrow_exception(failure);
+}
 #else
-  void publish() {}
-  void observe() {}
+template <class Body>
+void for_each_chunk(std::size_t chunks, const Body& body) {
+  tbb::parallel_for(std::size_t{0}, chunks, body);
+}
 #endif
-};
 }  // namespace detail
 
 // Calls body(chunk, begin, end) for every chunk of `size` consecutive items of [0, n).
@@ -55,14 +73,7 @@ void parallel_chunks(std::size_t n, std::size_t size, const Body& body) {
     if (n) body(std::size_t{0}, std::size_t{0}, n);
     return;
   }
-  detail::LoopFence start, finish;
-  start.publish();
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
-    start.observe();
-    body(c, c * size, std::min(n, (c + 1) * size));
-    finish.publish();
-  });
-  finish.observe();
+  detail::for_each_chunk(chunks, [&](std::size_t c) { body(c, c * size, std::min(n, (c + 1) * size)); });
 }
 
 // Calls body(i) for every i of [0, n).

@@ -69,7 +69,7 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
 
 std::vector<Vec3> refine(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds) {
   std::vector<Vec3> finer = seeds;
-  for (const DualEdge& edge : extract_dual_edges(polygons)) finer.push_back(edge.midpoint);
+  for (const DualEdge& edge : extract_dual_edges(polygons, seeds)) finer.push_back(edge.crossing);
   return finer;
 }
 
@@ -93,7 +93,7 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
     return moments.cells[a].second > moments.cells[b].second;
   });
   std::vector<std::vector<Index>> around(seeds.size());
-  for (const DualEdge& e : extract_dual_edges(polygons)) {
+  for (const DualEdge& e : extract_dual_edges(polygons, seeds)) {
     around[e.a].push_back(e.b);
     around[e.b].push_back(e.a);
   }
@@ -120,7 +120,7 @@ void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, s
     seeds.insert(seeds.end(), more.begin(), more.end());
   }
   if (seeds.size() <= count) return;
-  std::vector<DualEdge> edges = extract_dual_edges(polygons);
+  std::vector<DualEdge> edges = extract_dual_edges(polygons, seeds);
   std::vector<double> squared(edges.size());
   std::vector<std::size_t> order(edges.size());
   std::iota(order.begin(), order.end(), std::size_t{0});

@@ -1,6 +1,7 @@
 #include "bisector/voronoi/clip.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -14,8 +15,12 @@ constexpr double kSteep = 1e-8;
 // No product of coordinates this small is told from 0, for the bounds below do not cover underflow.
 constexpr double kTiny = 1e-300;
 
-// Two doubles in one register; operations round as on one.
-typedef double Pair __attribute__((vector_size(2 * sizeof(double))));
+// Two doubles or four floats in one register; operations round as on one.
+typedef double Pair __attribute__((vector_size(2 * sizeof(double)), may_alias));
+
+typedef std::int32_t FourMask __attribute__((vector_size(4 * sizeof(float))));
+
+constexpr std::size_t kScreens = 512;
 
 double max_coordinate(const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
@@ -27,12 +32,17 @@ void Clipper::Polygon::reserve(std::size_t count) {
   edges.resize(2 * count);
 }
 
-Clipper::Clipper() : lines_(16) {
+Clipper::Clipper() : lines_(16), screens_(kScreens) {
   for (unsigned k = 0; k < 3; ++k) lines_[k].slot = kEdgeLabel | k;
 }
 
-void Clipper::begin(const SortedSeeds& seeds, const Facet& facet) {
+void Clipper::reset(const SortedSeeds& seeds) {
   seeds_ = &seeds;
+  scale_ = seeds.extent > 0 ? std::ldexp(1.0, -std::ilogb(seeds.extent)) : 1;
+  for (Screen& screen : screens_) screen.list = nullptr;
+}
+
+void Clipper::begin(const Facet& facet) {
   facet_ = &facet;
   for (unsigned k = 0; k < 3; ++k) {
     Line& line = lines_[k];
@@ -56,35 +66,90 @@ void Clipper::start(Index slot) {
   line_count_ = 3;
   polygon_.reserve(3);
   polygon_.size = 0;
-  for (unsigned k = 0; k < 3; ++k) polygon_.push({local_[k], 8 * kUnit * largest_}, k);
+  for (unsigned k = 0; k < 3; ++k) polygon_.push(k) = {local_[k], 8 * kUnit * largest_};
 }
 
 void Clipper::take(Index slot) { start(slot); }
 
 bool Clipper::clip(const Neighbours& neighbours, Index slot) {
   start(slot);
-  const Vec3 x = seeds_->x[slot];
   height_ = dot(facet_->normal, local_[facet_->anchor]);
   foot_ = height_ * facet_->normal;
-  for (unsigned k = 0; k < 3; ++k) lines_[k].offset = dot(lines_[k].m, local_[facet_->origin[k]]) - height_ * dot(facet_->normal, lines_[k].m);
-  reach_ = facet_squared_;
+  for (unsigned k = 0; k < 3; ++k)
+    lines_[k].offset = dot(lines_[k].m, local_[facet_->origin[k]]) - height_ * dot(facet_->normal, lines_[k].m);
+  bound_polygon();
   NeighbourList list = neighbours.list(slot);
   for (;;) {
-    for (const Index* j = list.begin; j != list.end; ++j) {
-      const Vec3 d = seeds_->x[*j] - x;
-      const double squared = norm2(d);
+    const std::size_t count = static_cast<std::size_t>(list.end - list.begin);
+    const std::size_t screened = std::min(count, 4 * kBlocks);
+    Screen& screen = screen_of(list);
+    std::size_t k = 0;
+    for (; k < screened; k += 4) {
+      if (k == 4 * screen.built) build_block(screen, list, k / 4);
+      const Block& block = screen.blocks[k / 4];
       // Security radius: all of the polygon is nearer to this seed than to any other from here on.
-      if (4 * reach_ < squared * (1 - 1e-9)) return true;
-      if (passes_by(d, squared)) continue;
-      if (wider_ && bounded_by(*j)) continue;
-      cut(*j, d, squared);
-      if (polygon_.size == 0) return false;
+      if (2 * reach_scaled_ < block.half[0]) return true;
+      const unsigned present = (1u << std::min<std::size_t>(4, count - k)) - 1;
+      for (unsigned lines = may_cut(block) & present; lines; lines &= lines - 1)
+        if (!visit(list.begin[k + static_cast<unsigned>(std::countr_zero(lines))])) return false;
     }
-    if (list.radius == kInfinity) return true;
-    if (4 * reach_ < list.radius * list.radius * (1 - 1e-9)) return true;
+    for (; k < count; ++k) {
+      if (4 * reach_ < norm2(seeds_->x[list.begin[k]] - seeds_->x[slot]) * (1 - 1e-9)) return true;
+      if (!visit(list.begin[k])) return false;
+    }
+    if (list.radius == kInfinity || 4 * reach_ < list.radius * list.radius * (1 - 1e-9)) return true;
     wider_ = true;
     list = neighbours.wider(slot, list);
   }
+}
+
+Clipper::Screen& Clipper::screen_of(const NeighbourList& list) {
+  Screen& screen = screens_[slot_ % kScreens];
+  if (screen.list != list.begin) {
+    screen.list = list.begin;
+    screen.built = 0;
+  }
+  return screen;
+}
+
+// Half squares are rounded down by more than float's error, so a line that is held to pass does.
+void Clipper::build_block(Screen& screen, const NeighbourList& list, std::size_t index) const {
+  Block& block = screen.blocks[index];
+  screen.built = index + 1;
+  const Vec3 x = seeds_->x[slot_];
+  for (std::size_t m = 0; m < 4; ++m) {
+    const Index* j = list.begin + 4 * index + m;
+    const Vec3 d = j < list.end ? scale_ * (seeds_->x[*j] - x) : Vec3{};
+    block.x[m] = static_cast<float>(d.x);
+    block.y[m] = static_cast<float>(d.y);
+    block.z[m] = static_cast<float>(d.z);
+    block.half[m] = j < list.end ? static_cast<float>(0.5 * norm2(d) * (1 - 1e-5)) : std::numeric_limits<float>::infinity();
+  }
+}
+
+// With |d| < 2 r, r the polygon's reach, a product as coded is off by less than 2e-6 |d| r < 4e-6 r^2. Lines with |d| >= 2 r do not
+// cut at all. Whatever overflows or is not a number counts as cutting.
+unsigned Clipper::may_cut(const Block& block) const {
+  const auto load = [](const float* p) { return *reinterpret_cast<const Four*>(p); };
+  const Four x = load(block.x), y = load(block.y), z = load(block.z);
+  const float margin = 4e-6f * reach_scaled_;
+  const Four limit = load(block.half) - margin;
+  FourMask below = ~FourMask{};
+  for (std::size_t k = 0; k < polygon_.size; ++k) {
+    const Splat& corner = splats_[k];
+    below &= x * corner.x + y * corner.y + z * corner.z < limit;
+  }
+  return (~static_cast<unsigned>(below[0]) & 1) | (~static_cast<unsigned>(below[1]) & 2) |
+         (~static_cast<unsigned>(below[2]) & 4) | (~static_cast<unsigned>(below[3]) & 8);
+}
+
+bool Clipper::visit(Index other) {
+  const Vec3 d = seeds_->x[other] - seeds_->x[slot_];
+  const double squared = norm2(d);
+  if (passes_by(d, squared)) return true;
+  if (wider_ && bounded_by(other)) return true;
+  cut(other, d, squared);
+  return polygon_.size > 0;
 }
 
 bool Clipper::bounded_by(Index other) const {
@@ -144,13 +209,13 @@ void Clipper::cut(Index other, const Vec3& d, double squared) {
   kept_.size = 0;
   std::size_t k = in, last = in;
   do {
-    kept_.push(polygon_.corners[k], polygon_.edges[k]);
+    kept_.push(polygon_.edges[k]) = polygon_.corners[k];
     last = k;
     k = k + 1 == n ? 0 : k + 1;
   } while (sides_[k] > 0);
   const unsigned leaving = polygon_.edges[last], entering = polygon_.edges[previous(in)];
-  kept_.push(meet(lines_[leaving], line), edge);
-  kept_.push(meet(line, lines_[entering]), entering);
+  meet(lines_[leaving], line, kept_.push(edge));
+  meet(line, lines_[entering], kept_.push(entering));
   std::swap(polygon_, kept_);
   bound_polygon();
 }
@@ -163,21 +228,31 @@ void Clipper::bound_polygon() {
   }
   // (r + e)^2 <= r^2 (1 + a) + e^2 (1 + 1/a), and no point of the facet is farther than its corners.
   reach_ = std::min(facet_squared_, squared * (1 + 1e-6) + 4e6 * (slack * slack));
+  reach_scaled_ = static_cast<float>(reach_ * (scale_ * scale_) * (1 + 1e-6));
+  if (splats_.size() < polygon_.size) splats_.resize(2 * polygon_.size);
+  for (std::size_t k = 0; k < polygon_.size; ++k) {
+    const Vec3 p = scale_ * polygon_.corners[k].at;
+    const float x = static_cast<float>(p.x), y = static_cast<float>(p.y), z = static_cast<float>(p.z);
+    splats_[k] = {Four{x, x, x, x}, Four{y, y, y, y}, Four{z, z, z, z}};
+  }
 }
 
 // In the facet's plane with origin at the seed's foot, the lines' normals are the parts of m along the plane, and the lines
 // cross at (c2 t1 - c1 t2) / (t1 . m2). All data are within the facet's distance P of the seed, and with rounded data and
 // operations each term of the numerator is off by less than 250 u P |m1| |m2| and the determinant by 150 u |m1| |m2|
 // (the normal's own error, at most 60 u, included), which bounds the error of the quotient as coded.
-Clipper::Corner Clipper::meet(const Line& before, const Line& after) const {
+void Clipper::meet(const Line& before, const Line& after, Corner& corner) const {
   const double determinant = dot(before.along, after.m);
   const double squares = before.squared * after.squared;
   const double square = determinant * determinant;
-  if (!(square > kSteep * squares))
-    return {exact_vertex(frame(), exact(before), exact(after)), 16 * kUnit * largest_};
+  if (!(square > kSteep * squares)) {
+    corner.at = exact_vertex(frame(), exact(before), exact(after));
+    corner.slack = 16 * kUnit * largest_;
+    return;
+  }
   const double inverse = 1 / determinant;
-  return {foot_ + inverse * (after.offset * before.along - before.offset * after.along),
-          2000 * kUnit * largest_ * std::sqrt(squares / square)};
+  corner.at = foot_ + inverse * (after.offset * before.along - before.offset * after.along);
+  corner.slack = 2000 * kUnit * largest_ * std::sqrt(squares / square);
 }
 
 double Clipper::density(std::size_t k) const {

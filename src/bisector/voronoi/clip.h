@@ -16,8 +16,10 @@ class Clipper {
  public:
   Clipper();
 
-  // The facet that the following calls are about; it and the seeds must outlive them.
-  void begin(const SortedSeeds& seeds, const Facet& facet);
+  // Forgets what is kept about the seeds; to be called whenever they or their neighbours change.
+  void reset(const SortedSeeds& seeds);
+  // The facet that the following calls are about; it must outlive them.
+  void begin(const Facet& facet);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
   // Takes the whole facet, which the caller knows to lie in the cell.
@@ -59,17 +61,39 @@ class Clipper {
     std::vector<unsigned> edges;
 
     void reserve(std::size_t count);
-    void push(const Corner& corner, unsigned edge) {
-      corners[size] = corner;
-      edges[size++] = edge;
+    Corner& push(unsigned edge) {
+      edges[size] = edge;
+      return corners[size++];
     }
   };
 
+  // The first neighbours of a cell in single precision, four to a block, scaled into the range of float: a screen that lets
+  // pass all lines that could cut.
+  struct alignas(16) Block {
+    float x[4], y[4], z[4], half[4];
+  };
+  static constexpr std::size_t kBlocks = 10;
+  struct Screen {
+    const Index* list = nullptr;
+    std::size_t built = 0;
+    Block blocks[kBlocks];
+  };
+  typedef float Four __attribute__((vector_size(4 * sizeof(float)), may_alias));
+  struct Splat {
+    Four x, y, z;
+  };
+
   void start(Index slot);
+  Screen& screen_of(const NeighbourList& list);
+  void build_block(Screen& screen, const NeighbourList& list, std::size_t block) const;
+  // Bit m is set if line m of the block may cut.
+  unsigned may_cut(const Block& block) const;
+  // Cuts by one neighbour. False if the polygon is empty then.
+  bool visit(Index other);
   void bound_polygon();
   void cut(Index other, const Vec3& towards, double squared);
   bool passes_by(const Vec3& towards, double squared) const;
-  Corner meet(const Line& before, const Line& after) const;
+  void meet(const Line& before, const Line& after, Corner& corner) const;
   bool bounded_by(Index other) const;
   double density(std::size_t corner) const;
   std::size_t previous(std::size_t corner) const { return corner ? corner - 1 : polygon_.size - 1; }
@@ -88,6 +112,10 @@ class Clipper {
   std::vector<Line> lines_;   // all that ever cut; the first three are the facet's edges
   std::size_t line_count_ = 0;
   Polygon polygon_, kept_;
+  std::vector<Screen> screens_;   // direct-mapped by slot
+  std::vector<Splat> splats_;     // the polygon's corners, scaled
+  double scale_ = 1;              // a power of two
+  float reach_scaled_ = 0;        // upper bound of reach_, scaled
   std::vector<signed char> sides_;
   std::vector<double> densities_;
   bool uncertain_ = false, wider_ = false;

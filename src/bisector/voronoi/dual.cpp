@@ -1,6 +1,7 @@
 #include "bisector/voronoi/dual.h"
 
 #include <algorithm>
+#include <tuple>
 
 #include "bisector/core/parallel.h"
 
@@ -46,8 +47,12 @@ Dual extract_dual(const RestrictedPolygons& polygons) {
   return dual;
 }
 
-std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons) {
-  std::vector<DualEdge> pieces;
+std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds) {
+  struct Piece {
+    DualEdge edge;
+    double squared;  // from the middle of the seeds
+  };
+  std::vector<Piece> pieces;
   for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
     const Index cell = polygons.pairs[k].cell;
     const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
@@ -55,23 +60,22 @@ std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons) {
       const Index label = polygons.labels[first + e];
       if (is_edge(label) || label < cell) continue;
       const Vec3 &p = polygons.vertices[first + e], &q = polygons.vertices[first + (e + 1) % size];
-      pieces.push_back({cell, label, 0.5 * (p + q), norm(q - p)});
+      const Vec3 along = q - p, middle = 0.5 * (seeds[cell] + seeds[label]);
+      const double length2 = norm2(along);
+      if (length2 == 0) continue;
+      const Vec3 nearest = p + std::clamp(dot(middle - p, along) / length2, 0.0, 1.0) * along;
+      pieces.push_back({{cell, label, nearest}, norm2(nearest - middle)});
     }
   }
-  std::stable_sort(pieces.begin(), pieces.end(), [](const DualEdge& x, const DualEdge& y) {
-    return x.a != y.a ? x.a < y.a : x.b < y.b;
+  sort_in_parallel(pieces, [](const Piece& x, const Piece& y) {
+    const auto key = [](const Piece& p) {
+      return std::tie(p.edge.a, p.edge.b, p.squared, p.edge.crossing.x, p.edge.crossing.y, p.edge.crossing.z);
+    };
+    return key(x) < key(y);
   });
   std::vector<DualEdge> edges;
-  for (std::size_t k = 0; k < pieces.size();) {
-    DualEdge sum{pieces[k].a, pieces[k].b, {}, 0};
-    for (; k < pieces.size() && pieces[k].a == sum.a && pieces[k].b == sum.b; ++k) {
-      sum.midpoint += pieces[k].length * pieces[k].midpoint;
-      sum.length += pieces[k].length;
-    }
-    if (sum.length == 0) continue;
-    sum.midpoint *= 1 / sum.length;
-    edges.push_back(sum);
-  }
+  for (const Piece& p : pieces)
+    if (edges.empty() || edges.back().a != p.edge.a || edges.back().b != p.edge.b) edges.push_back(p.edge);
   return edges;
 }
 

@@ -18,14 +18,13 @@ struct Dual {
 
 Dual extract_dual(const RestrictedPolygons& polygons);
 
-// A pair of cells that share an edge of the diagram.
+// A pair of cells that share an edge of positive length of the diagram.
 struct DualEdge {
-  Index a, b;       // a < b
-  Vec3 midpoint;    // of the restricted Voronoi edge: the mean of its points by length
-  double length;    // of the restricted Voronoi edge
+  Index a, b;    // a < b
+  Vec3 crossing; // the point of the restricted Voronoi edge nearest to the middle of the two seeds
 };
 
-// Every pair of cells that share an edge of positive length, sorted.
-std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons);
+// All such pairs, sorted.
+std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds);
 
 }  // namespace bisector

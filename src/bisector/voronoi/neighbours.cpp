@@ -150,6 +150,7 @@ bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Se
       const Vec3 p = x[i];
       const double *px = search.px.data(), *py = search.py.data(), *pz = search.pz.data();
       double* d = search.squared.data();
+      const Index* found = search.found.data();
       for (std::size_t k = 0; k < n; ++k) {
         const double dx = px[k] - p.x, dy = py[k] - p.y, dz = pz[k] - p.z;
         d[k] = dx * dx + dy * dy + dz * dz;
@@ -158,7 +159,7 @@ bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Se
       std::uint64_t* out = search.keys.data();
       for (std::size_t k = 0; k < n; ++k) {
         *out = (std::bit_cast<std::uint64_t>(d[k]) & ~kPlaceMask) | k;
-        out += d[k] < squared && d[k] > 0;
+        out += static_cast<int>(d[k] < squared) & static_cast<int>(found[k] != i);
       }
       std::size_t kept = static_cast<std::size_t>(out - search.keys.data());
       least = std::min(least, kept);

@@ -36,6 +36,7 @@ struct Walker {
   std::vector<Index> queue;
   std::vector<Index> stamp;  // by slot: the last visit
   Index visit = 0;
+  std::uint64_t generation = 0;  // of the seeds that the clipper knows
 
   void begin(std::size_t slots) {
     if (stamp.size() != slots || visit == kNone - 1) {
@@ -129,6 +130,7 @@ struct RestrictedVoronoi::Work {
   std::vector<Index> owner;   // slot of each site
   std::vector<Index> hint;    // owner's seed index in the last diagram
   std::vector<Chunk> chunks;
+  std::uint64_t generation = 0;  // of `seeds`
   ThreadLocal<Walker> walkers;
   std::vector<std::size_t> cell_begin;
   struct Item {
@@ -184,13 +186,13 @@ void RestrictedVoronoi::Work::clip_facet(const Facet& facet, Walker& walker, Chu
     chunk.contributions.push_back(
         {first, facet.triangle, moved(facet.moments, facet.corners[facet.anchor] - seeds.x[first])});
     if (want_polygons) {
-      clipper.begin(seeds, facet);
+      clipper.begin(facet);
       clipper.take(first);
       emit(clipper, facet, first, chunk);
     }
     return;
   }
-  clipper.begin(seeds, facet);
+  clipper.begin(facet);
   walker.begin(seeds.x.size());
   for (Index site : facet.site) walker.meet(owner[site]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
@@ -212,12 +214,17 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
   // Small chunks where facets are few and large.
   const std::size_t size = std::clamp<std::size_t>(n / 256, 1, 512);
   chunks.resize((n + size - 1) / size);
+  ++generation;
   parallel_chunks(n, size, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Chunk& chunk = chunks[c];
     chunk.contributions.clear();
     chunk.polygons = {};
     chunk.certification = {};
     Walker& walker = walkers.local();
+    if (walker.generation != generation) {
+      walker.generation = generation;
+      walker.clipper.reset(seeds);
+    }
     for (std::size_t k = begin; k < end; ++k) clip_facet(surface.facets[k], walker, chunk, want_polygons);
   });
 }
@@ -285,18 +292,20 @@ void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
   double largest = 0;
   for (const Moments& cell : result.cells) largest = std::max(largest, cell.mass);
   result.step_mass.resize(n);
-  parallel_each(n, [&](std::size_t i) {
-    const double mass = result.cells[i].mass;
-    result.step_mass[i] = mass;
-    const Index s = seeds.slot[i];
-    if (mass >= 0.25 * largest || s == kNone) return;
-    const NeighbourList list = neighbours.list(s);
-    double around[kStepNeighbours];
+  parallel_each(n, [&](std::size_t i) { result.step_mass[i] = result.cells[i].mass; });
+  parallel_each(seeds.x.size(), [&](std::size_t s) {
+    double& step_mass = result.step_mass[seeds.id[s]];
+    if (step_mass >= 0.25 * largest) return;
+    const NeighbourList list = neighbours.list(static_cast<Index>(s));
+    std::array<double, kStepNeighbours> around;  // sorted
     std::size_t count = 0;
-    for (const Index* j = list.begin; j != list.end && count < kStepNeighbours; ++j)
-      around[count++] = result.cells[seeds.id[*j]].mass;
-    std::sort(around, around + count);
-    if (count) result.step_mass[i] = std::max(mass, 0.25 * around[count / 2]);
+    for (const Index* j = list.begin; j != list.end && count < kStepNeighbours; ++j) {
+      const double mass = result.cells[seeds.id[*j]].mass;
+      std::size_t k = count++;
+      for (; k > 0 && around[k - 1] > mass; --k) around[k] = around[k - 1];
+      around[k] = mass;
+    }
+    if (count) step_mass = std::max(step_mass, 0.25 * around[count / 2]);
   });
 }
 
