@@ -93,7 +93,7 @@ inline void expect_sound(const Surface& surface, const Diagram& d) {
   EXPECT_TRUE(transposed == pairs);
   double mass = 0;
   for (const Moments& m : d.moments.cells) {
-    EXPECT_GE(m.mass, -1e-15 * surface.mass);
+    EXPECT_GE(m.mass, -1e-12 * surface.mass);
     mass += m.mass;
   }
   EXPECT_NEAR(mass, surface.mass, 1e-12 * surface.mass);

@@ -100,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(Restricted, Small, testing::ValuesIn(small_cases()),
 
 class Integers : public testing::TestWithParam<std::uint64_t> {};
 
-constexpr std::uint64_t kIntegerCases = 4000, kIntegerBlock = 500;
+constexpr std::uint64_t kIntegerCases = 8000, kIntegerBlock = 500;
 
 TEST_P(Integers, AgreeWithTheOracle) {
   for (std::uint64_t k = GetParam(); k < GetParam() + kIntegerBlock && !HasFailure(); ++k) expect_oracle(integer_case(k));
@@ -190,7 +190,8 @@ std::vector<MediumCase> medium_cases() {
   }
   for (std::size_t k : {0u, 3u, 4u}) {
     cases.push_back({std::string(meshes[k].name) + " cospherical", meshes[k].mesh, round_seeds(2000, false)});
-    cases.push_back({std::string(meshes[k].name) + " cocircular", meshes[k].mesh, round_seeds(2000, true)});
+    // All cells meet along one line, where every decision is close: the cost grows with the square of the count.
+    cases.push_back({std::string(meshes[k].name) + " cocircular", meshes[k].mesh, round_seeds(250, true)});
   }
   return cases;
 }
@@ -236,6 +237,8 @@ TEST_P(Medium, StepMassesAndCertificationAreReproducible) {
     }
   }
 }
+
+void PrintTo(const MediumCase& problem, std::ostream* out) { *out << problem.name; }
 
 INSTANTIATE_TEST_SUITE_P(Restricted, Medium, testing::ValuesIn(medium_cases()),
                          [](const auto& instance) { return test_name(instance.param.name); });

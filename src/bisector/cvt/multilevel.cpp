@@ -14,6 +14,7 @@ namespace {
 constexpr std::size_t kPerComponent = 4;      // a tetrahedron
 constexpr std::size_t kCoarsest = 100;        // seeds on the coarsest level, at least
 constexpr int kLevels = 3;
+constexpr double kNearMiddle = 0.25;          // of the distance of two seeds
 
 }  // namespace
 
@@ -25,7 +26,7 @@ std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::
   // Components that chance left too few move seeds over from the others.
   const std::vector<Index> label = label_components(surface.mesh.triangles, surface.mesh.vertices.size());
   std::vector<std::vector<Triangle>> parts;
-  for (const Facet& facet : surface.facets) {
+  for (const FacetSummary& facet : surface.summaries) {
     const Triangle& t = surface.mesh.triangles[facet.triangle];
     if (label[t[0]] >= parts.size()) parts.resize(label[t[0]] + 1);
     parts[label[t[0]]].push_back(t);
@@ -69,7 +70,12 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
 
 std::vector<Vec3> refine(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds) {
   std::vector<Vec3> finer = seeds;
-  for (const DualEdge& edge : extract_dual_edges(polygons, seeds)) finer.push_back(edge.crossing);
+  for (const DualEdge& edge : extract_dual_edges(polygons, seeds)) {
+    const Vec3 a = seeds[edge.a], b = seeds[edge.b], middle = 0.5 * (a + b);
+    // On a smooth surface the middle is the better start; where the edge crosses elsewhere, it may be off the sheet.
+    const bool near = norm2(middle - edge.crossing) < kNearMiddle * kNearMiddle * norm2(b - a);
+    finer.push_back(near ? middle : edge.crossing);
+  }
   return finer;
 }
 

@@ -16,8 +16,7 @@ std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::
 // a closed surface of Euler characteristic chi. `levels` 0 means as many as leave the coarsest enough seeds, at most 3.
 std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::size_t components, int levels);
 
-// The seeds, and for every two of them that share a restricted Voronoi edge one more, on that edge as near as can be to the
-// middle of the two.
+// The seeds, and the middle of every two of them that share a restricted Voronoi edge, moved to that edge where it is far off.
 std::vector<Vec3> refine(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds);
 
 // Removes one end of the shortest dual edges, or adds seeds where the energy is highest, until there are `count`; at most

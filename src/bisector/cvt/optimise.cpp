@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kMassTolerance = 1e-12;   // relative; a diagram whose cells do not add up is never used
 constexpr double kArmijo = 1e-4;
+constexpr double kFlatGradient = 1e-8;     // relative to the first; what is left is rounding
 constexpr int kLineSearchTrials = 8;
 constexpr std::size_t kDecreaseWindow = 5;
 constexpr int kReseedTrials = 10;
@@ -119,7 +120,7 @@ void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options,
   bool restarted = false;
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     context.check();
-    if (state.gradient_norm <= options.tolerance * first_norm) break;
+    if (state.gradient_norm <= kFlatGradient * first_norm) break;
     const std::vector<Vec3> direction = history.direction(state.gradient, preconditioner(state.moments));
     if (!line_search(backend, state, direction, options.constrained, next, totals)) {
       // Once from scratch along the gradient; if that finds nothing either, this is the minimum to rounding.
@@ -152,7 +153,7 @@ void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options,
     context.report(progress);
     const std::size_t n = energies.size();
     if (n > kDecreaseWindow &&
-        energies[n - 1 - kDecreaseWindow] - energies[n - 1] < kDecreaseWindow * options.decrease * energies[n - 1])
+        energies[n - 1 - kDecreaseWindow] - energies[n - 1] < kDecreaseWindow * options.tolerance * energies[n - 1])
       break;
   }
   const double total = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -10,8 +10,7 @@ namespace bisector {
 
 struct OptimiseOptions {
   int iterations = 100;        // accepted steps at most
-  double tolerance = 1e-4;     // stop when the gradient norm is below this share of that of one Lloyd step's start
-  double decrease = 0;         // stop when the energy falls by less than this share per step, over five steps
+  double tolerance = 2e-5;     // stop when the energy falls by less than this share per step, over five steps
   bool constrained = false;    // CCVT: seeds stay on the surface, gradients in its tangent planes
   Progress progress;           // phase and total; iteration, energy and gradient are filled in
 };

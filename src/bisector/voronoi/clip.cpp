@@ -15,8 +15,6 @@ constexpr double kSteep = 1e-8;
 // No product of coordinates this small is told from 0, for the bounds below do not cover underflow.
 constexpr double kTiny = 1e-300;
 
-// Two doubles or four floats in one register; operations round as on one.
-typedef double Pair __attribute__((vector_size(2 * sizeof(double)), may_alias));
 
 typedef std::int32_t FourMask __attribute__((vector_size(4 * sizeof(float))));
 
@@ -47,9 +45,9 @@ void Clipper::begin(const Facet& facet) {
   for (unsigned k = 0; k < 3; ++k) {
     Line& line = lines_[k];
     const unsigned from = facet.origin[k], to = from == k ? (k + 1) % 3 : k;
-    line.m = cross(facet.normal, facet.corners[to] - facet.corners[from]);
-    line.along = cross(facet.normal, line.m);
-    line.squared = norm2(line.m);
+    line.along = facet.corners[from] - facet.corners[to];
+    line.m = cross(line.along, facet.normal);
+    line.squared = norm2(line.along);
     line.key = facet.rank[k];
   }
 }
@@ -77,7 +75,7 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
   foot_ = height_ * facet_->normal;
   for (unsigned k = 0; k < 3; ++k)
     lines_[k].offset = dot(lines_[k].m, local_[facet_->origin[k]]) - height_ * dot(facet_->normal, lines_[k].m);
-  bound_polygon();
+  bounded_ = false;
   NeighbourList list = neighbours.list(slot);
   for (;;) {
     const std::size_t count = static_cast<std::size_t>(list.end - list.begin);
@@ -86,6 +84,7 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
     std::size_t k = 0;
     for (; k < screened; k += 4) {
       if (k == 4 * screen.built) build_block(screen, list, k / 4);
+      if (!bounded_) bound_polygon();
       const Block& block = screen.blocks[k / 4];
       // Security radius: all of the polygon is nearer to this seed than to any other from here on.
       if (2 * reach_scaled_ < block.half[0]) return true;
@@ -94,9 +93,11 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
         if (!visit(list.begin[k + static_cast<unsigned>(std::countr_zero(lines))])) return false;
     }
     for (; k < count; ++k) {
+      if (!bounded_) bound_polygon();
       if (4 * reach_ < norm2(seeds_->x[list.begin[k]] - seeds_->x[slot]) * (1 - 1e-9)) return true;
       if (!visit(list.begin[k])) return false;
     }
+    if (!bounded_) bound_polygon();
     if (list.radius == kInfinity || 4 * reach_ < list.radius * list.radius * (1 - 1e-9)) return true;
     wider_ = true;
     list = neighbours.wider(slot, list);
@@ -145,10 +146,8 @@ unsigned Clipper::may_cut(const Block& block) const {
 
 bool Clipper::visit(Index other) {
   const Vec3 d = seeds_->x[other] - seeds_->x[slot_];
-  const double squared = norm2(d);
-  if (passes_by(d, squared)) return true;
   if (wider_ && bounded_by(other)) return true;
-  cut(other, d, squared);
+  cut(other, d, norm2(d));
   return polygon_.size > 0;
 }
 
@@ -156,19 +155,6 @@ bool Clipper::bounded_by(Index other) const {
   for (std::size_t k = 0; k < polygon_.size; ++k)
     if (label(k) == other) return true;
   return false;
-}
-
-// Whether all of the polygon is certain to lie on the seed's side.
-bool Clipper::passes_by(const Vec3& d, double squared) const {
-  const Pair xy = {d.x, d.y}, z = {d.z, std::abs(d.x) + std::abs(d.y) + std::abs(d.z)};
-  double farthest = -kInfinity;
-  for (std::size_t k = 0; k < polygon_.size; ++k) {
-    const auto* halves = reinterpret_cast<const Pair*>(&polygon_.corners[k]);
-    const Pair sum = halves[0] * xy + halves[1] * z;
-    const double upper = sum[0] + sum[1];
-    farthest = farthest > upper ? farthest : upper;
-  }
-  return farthest < 0.5 * squared * (1 - 1e-12) - kTiny;
 }
 
 void Clipper::cut(Index other, const Vec3& d, double squared) {
@@ -217,10 +203,11 @@ void Clipper::cut(Index other, const Vec3& d, double squared) {
   meet(lines_[leaving], line, kept_.push(edge));
   meet(line, lines_[entering], kept_.push(entering));
   std::swap(polygon_, kept_);
-  bound_polygon();
+  bounded_ = false;
 }
 
 void Clipper::bound_polygon() {
+  bounded_ = true;
   double squared = 0, slack = 0;
   for (std::size_t k = 0; k < polygon_.size; ++k) {
     slack = std::max(slack, polygon_.corners[k].slack);
@@ -276,12 +263,16 @@ Moments Clipper::integrate() {
     if (lines_[polygon_.edges[k]].key < lines_[polygon_.edges[apex]].key) apex = k;
   const auto next = [n](std::size_t k) { return k + 1 == n ? 0 : k + 1; };
   const Vec3 a = vertex(apex);
+  const double squared_a = norm2(a);
   Moments sum;
+  double squared_b = norm2(vertex(next(apex)));
   for (std::size_t b = next(apex), c = next(b); c != apex; b = c, c = next(c)) {
     const double area = 0.5 * dot(facet_->normal, cross(vertex(b) - a, vertex(c) - a));
-    if constexpr (kUniform)
-      sum += triangle_moments(a, vertex(b), vertex(c), area);
-    else
+    if constexpr (kUniform) {
+      const double squared_c = norm2(vertex(c));
+      sum += triangle_moments(a + vertex(b) + vertex(c), squared_a + squared_b + squared_c, area);
+      squared_b = squared_c;
+    } else
       sum += triangle_moments(a, vertex(b), vertex(c), densities_[apex], densities_[b], densities_[c], area);
   }
   return sum;

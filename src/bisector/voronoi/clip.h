@@ -92,7 +92,6 @@ class Clipper {
   bool visit(Index other);
   void bound_polygon();
   void cut(Index other, const Vec3& towards, double squared);
-  bool passes_by(const Vec3& towards, double squared) const;
   void meet(const Line& before, const Line& after, Corner& corner) const;
   bool bounded_by(Index other) const;
   double density(std::size_t corner) const;
@@ -109,6 +108,7 @@ class Clipper {
   Vec3 foot_;                 // of the seed on that plane
   double facet_squared_ = 0;  // upper bound of the squared distance of any point of the facet
   double reach_ = 0;          // the same of the polygon
+  bool bounded_ = false;      // reach_ and splats_ are those of the polygon
   std::vector<Line> lines_;   // all that ever cut; the first three are the facet's edges
   std::size_t line_count_ = 0;
   Polygon polygon_, kept_;

@@ -20,8 +20,8 @@ Dual extract_dual(const RestrictedPolygons& polygons);
 
 // A pair of cells that share an edge of positive length of the diagram.
 struct DualEdge {
-  Index a, b;    // a < b
-  Vec3 crossing; // the point of the restricted Voronoi edge nearest to the middle of the two seeds
+  Index a, b;     // a < b
+  Vec3 crossing;  // the point of the restricted Voronoi edge nearest to the middle of the two seeds
 };
 
 // All such pairs, sorted.

@@ -24,13 +24,12 @@ inline Moments moved(const Moments& m, const Vec3& to_origin) {
           m.mass * norm2(to_origin) + 2 * dot(to_origin, m.first) + m.second};
 }
 
-// Moments of the triangle (a, b, c) of signed area `area` with density 1.
-inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, double area) {
-  const Vec3 s = a + b + c;
-  return {area, (area / 3) * s, (area / 12) * (norm2(s) + (norm2(a) + norm2(b) + norm2(c)))};
+// Moments of a triangle of signed area `area` with density 1, from the sum of its corners and of their squared lengths.
+inline Moments triangle_moments(const Vec3& sum, double squares, double area) {
+  return {area, (area / 3) * sum, (area / 12) * (norm2(sum) + squares)};
 }
 
-// The same with the density linear, ra, rb and rc at the corners.
+// Moments of the triangle (a, b, c) with the density linear, ra, rb and rc at the corners.
 inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, double ra, double rb, double rc, double area) {
   const double s = ra + rb + rc;
   const Vec3 first = (s + ra) * a + (s + rb) * b + (s + rc) * c;

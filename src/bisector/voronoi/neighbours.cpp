@@ -28,6 +28,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Distances are compared after rounding; this keeps what a list leaves out beyond its radius all the same.
 constexpr double kBelow = 1 - 1e-9;
+constexpr double kMostLost = 0.3;        // of a radius, before lists are built again
+
+// Distance and place in one key: squared distances are positive, so their bits sort like them; the last nine give way.
+std::uint64_t sort_key(double squared, std::size_t place) {
+  return (std::bit_cast<std::uint64_t>(squared) & ~kPlaceMask) | place;
+}
 
 }  // namespace
 
@@ -103,6 +109,7 @@ void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
   last_rung_ = std::make_unique<LastRung>();
   if (n) tree_.build(seeds.x);
   use_rings_ = source == NeighbourSource::delaunay && last_rung().rings.has_value();
+  built_x_.clear();
   if (use_rings_) return;
 
   first_.resize(n * kFirstMost);
@@ -118,6 +125,49 @@ void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
       for (std::size_t i = first; i < last; ++i) list_run(i, i + 1, {seeds.x[i], seeds.x[i]}, search);
     }
   });
+  built_x_ = seeds.x;
+  built_radius_ = radius_;
+}
+
+bool Neighbours::update() {
+  const std::vector<Vec3>& x = seeds_->x;
+  const std::size_t n = x.size();
+  if (use_rings_ || built_x_.size() != n) return false;
+  constexpr std::size_t kBlock = 4096;
+  std::vector<double> farthest((n + kBlock - 1) / kBlock, 0);
+  parallel_chunks(n, kBlock, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) farthest[c] = std::max(farthest[c], norm2(x[i] - built_x_[i]));
+  });
+  const double any = std::sqrt(*std::max_element(farthest.begin(), farthest.end())) * (1 + 1e-9);
+  std::atomic<bool> worth_it = true;
+  parallel_chunks(n, 512, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::uint64_t keys[kFirstMost];
+    Index sorted[kFirstMost];
+    for (std::size_t i = begin; i < end && worth_it.load(std::memory_order_relaxed); ++i) {
+      const double lost = norm(x[i] - built_x_[i]) * (1 + 1e-9) + any;
+      if (!(lost <= kMostLost * built_radius_[i])) {
+        worth_it.store(false, std::memory_order_relaxed);
+        return;
+      }
+      radius_[i] = (built_radius_[i] - lost) * kBelow;
+      Index* list = &first_[i * kFirstMost];
+      for (std::size_t k = 0; k < count_[i]; ++k) {
+        const std::uint64_t key = sort_key(norm2(x[list[k]] - x[i]), k);
+        std::size_t m = k;
+        for (; m > 0 && keys[m - 1] > key; --m) keys[m] = keys[m - 1];
+        keys[m] = key;
+      }
+      for (std::size_t k = 0; k < count_[i]; ++k) sorted[k] = list[keys[k] & kPlaceMask];
+      std::copy(sorted, sorted + count_[i], list);
+    }
+  });
+  if (!worth_it) return false;
+  drop_grown();
+  heads_ = std::make_unique<std::atomic<Grown*>[]>(n);
+  head_count_ = n;
+  last_rung_ = std::make_unique<LastRung>();
+  tree_.build(x);
+  return true;
 }
 
 // Lists for the seeds [begin, end) from one search around their box; a failing search is repeated with another radius. False
@@ -155,10 +205,9 @@ bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Se
         const double dx = px[k] - p.x, dy = py[k] - p.y, dz = pz[k] - p.z;
         d[k] = dx * dx + dy * dy + dz * dz;
       }
-      // Distance and place in one key: squared distances are positive, so their bits sort like them; the last nine give way.
       std::uint64_t* out = search.keys.data();
       for (std::size_t k = 0; k < n; ++k) {
-        *out = (std::bit_cast<std::uint64_t>(d[k]) & ~kPlaceMask) | k;
+        *out = sort_key(d[k], k);
         out += static_cast<int>(d[k] < squared) & static_cast<int>(found[k] != i);
       }
       std::size_t kept = static_cast<std::size_t>(out - search.keys.data());

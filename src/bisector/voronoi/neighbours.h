@@ -42,6 +42,9 @@ class Neighbours {
 
   // Builds the lists of all slots. `seeds` must outlive their use.
   void build(const SortedSeeds& seeds, NeighbourSource source);
+  // For the same slots at new positions: sorts the lists of the last build anew and shortens their certificates by how far
+  // seeds have moved since. False if that is not worth it and build() has to be called.
+  bool update();
 
   NeighbourList list(Index slot) const;
   // A list that reaches farther than `shorter` did. Safe to call from many threads; depends on the seeds alone.
@@ -66,6 +69,8 @@ class Neighbours {
   std::vector<Index> first_;             // room for kFirstMost per slot
   std::vector<unsigned char> count_;     // of the lists of first_
   std::vector<double> radius_;
+  std::vector<Vec3> built_x_;            // positions and radii of the last build
+  std::vector<double> built_radius_;
   bool use_rings_ = false;               // the first lists are Delaunay rings
   std::unique_ptr<LastRung> last_rung_;
   std::unique_ptr<std::atomic<Grown*>[]> heads_;  // grown lists of each slot, the longest first

@@ -12,20 +12,24 @@ namespace {
 
 constexpr std::size_t kSumBlock = 32;
 constexpr std::size_t kStepNeighbours = 6;
+constexpr std::size_t kRanges = 8;  // of triangles, in the sort by cells
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-struct Contribution {
+// The moments of a pair whose cell holds all of the facet are left to the facet's summary.
+constexpr Index kWhole = kNone;
+
+struct Entry {
   Index slot;
-  Index triangle;
-  Moments moments;
+  Index moments;  // index into Chunk::moments, or kWhole
 };
 
-// What one chunk of facets contributes, and the polygons if they are wanted.
+// What one chunk of facets contributes, facet by facet, and the polygons if they are wanted.
 struct Chunk {
-  std::vector<Contribution> contributions;
+  std::vector<Entry> entries;
+  std::vector<Moments> moments;
   RestrictedPolygons polygons;
   Certification certification;
 };
@@ -66,38 +70,49 @@ bool owns(const SortedSeeds& seeds, const Vec3& q, Index i, Index j) {
   return exact_side(q, seeds.x[i], seeds.id[i], seeds.x[j], seeds.id[j]) > 0;
 }
 
+// Whether every seed that could be nearer to q than `owner` is listed and certain not to be.
+bool certainly_owns(const SortedSeeds& seeds, const NeighbourList& list, const Vec3& q, Index owner) {
+  const Vec3 x = seeds.x[owner], p = q - x;
+  const double r2 = norm2(p), reach = 4 * r2 * (1 + 1e-9);
+  // With |d| <= 2 |p| the bound of owns() is below 2^-45 |p|^2.
+  const double bound = 0x1p-45 * r2 + 0x1p-1000;
+  for (const Index* j = list.begin; j != list.end; ++j) {
+    const Vec3 d = seeds.x[*j] - x;
+    const double squared = norm2(d);
+    if (squared > reach) return true;
+    if (!(squared - 2 * dot(d, p) > bound)) return false;
+  }
+  return list.radius * list.radius > reach;
+}
+
 // The cell that q belongs to. Walks from `guess` to ever better seeds; a seed is the owner when no seed within twice its
 // distance is better. The answer does not depend on the guess.
 Index find_owner(const SortedSeeds& seeds, const Neighbours& neighbours, const Vec3& q, Index guess) {
   Index owner = guess;
   for (;;) {
     const NeighbourList list = neighbours.list(owner);
-    const double r2 = norm2(q - seeds.x[owner]);
-    const double reach = 4 * r2 * (1 + 1e-9);
+    if (certainly_owns(seeds, list, q, owner)) return owner;
+    // The nearest of those listed, if it is nearer; else exactly, among those that may be as near.
     Index better = kNone;
-    double best = r2 * (1 - 1e-9);
-    const Index* j = list.begin;
-    for (; j != list.end; ++j) {
-      if (norm2(seeds.x[*j] - seeds.x[owner]) > reach) break;
-      const double s2 = norm2(q - seeds.x[*j]);
-      if (s2 < best) {
-        best = s2;
+    double best = norm2(q - seeds.x[owner]);
+    const double reach = 4 * best * (1 + 1e-9);
+    best *= 1 - 1e-9;
+    for (const Index* j = list.begin; j != list.end; ++j) {
+      const double squared = norm2(q - seeds.x[*j]);
+      if (squared < best) {
+        best = squared;
         better = *j;
       }
     }
-    if (better != kNone) {
-      owner = better;
-      continue;
-    }
-    if (j == list.end && !(list.radius * list.radius > reach)) break;
-    bool certain = true;
-    for (const Index* k = list.begin; k != j; ++k)
-      if (!owns(seeds, q, owner, *k)) {
-        owner = *k;
-        certain = false;
+    if (better == kNone) {
+      for (const Index* j = list.begin; j != list.end && better == kNone; ++j)
+        if (!owns(seeds, q, owner, *j)) better = *j;
+      if (better == kNone) {
+        if (list.radius * list.radius > reach) return owner;
         break;
       }
-    if (certain) return owner;
+    }
+    owner = better;
   }
   // The list is too short for a certificate: take the best of all seeds that are nearest up to rounding.
   owner = neighbours.nearest(q);
@@ -106,20 +121,34 @@ Index find_owner(const SortedSeeds& seeds, const Neighbours& neighbours, const V
   return owner;
 }
 
-// The rule of all sums: in ascending triangle index, by blocks of 32, the blocks' sums likewise.
-Moments fixed_tree_sum(std::vector<Moments>& terms) {
-  if (terms.empty()) return {};
-  for (std::size_t n = terms.size(); n > 1;) {
-    std::size_t blocks = 0;
-    for (std::size_t begin = 0; begin < n; begin += kSumBlock) {
-      Moments sum = terms[begin];
-      for (std::size_t k = begin + 1; k < std::min(n, begin + kSumBlock); ++k) sum += terms[k];
-      terms[blocks++] = sum;
-    }
-    n = blocks;
+// The rule of all sums: terms in ascending triangle index, by blocks of 32, the blocks' sums likewise.
+class FixedTreeSum {
+ public:
+  void add(const Moments& term) {
+    if (count_ % kSumBlock == 0) blocks_.push_back(term);
+    else blocks_.back() += term;
+    ++count_;
   }
-  return terms[0];
-}
+  Moments finish() {
+    for (std::size_t n = blocks_.size(); n > 1;) {
+      std::size_t kept = 0;
+      for (std::size_t begin = 0; begin < n; begin += kSumBlock) {
+        Moments sum = blocks_[begin];
+        for (std::size_t k = begin + 1; k < std::min(n, begin + kSumBlock); ++k) sum += blocks_[k];
+        blocks_[kept++] = sum;
+      }
+      n = kept;
+    }
+    const Moments sum = blocks_.empty() ? Moments{} : blocks_[0];
+    blocks_.clear();
+    count_ = 0;
+    return sum;
+  }
+
+ private:
+  std::size_t count_ = 0;
+  std::vector<Moments> blocks_;
+};
 
 }  // namespace
 
@@ -127,25 +156,31 @@ struct RestrictedVoronoi::Work {
   const Surface& surface;
   SortedSeeds seeds;
   Neighbours neighbours;
+  NeighbourSource built_source = NeighbourSource::nearest;
   std::vector<Index> owner;   // slot of each site
   std::vector<Index> hint;    // owner's seed index in the last diagram
   std::vector<Chunk> chunks;
   std::uint64_t generation = 0;  // of `seeds`
   ThreadLocal<Walker> walkers;
-  std::vector<std::size_t> cell_begin;
+  std::size_t chunk_size = 1;           // facets
+  std::vector<Index> first_entry;       // of each facet, in its chunk
   struct Item {
-    Index triangle, chunk, entry;
+    Index facet, moments;
   };
-  std::vector<Item> items;
+  std::vector<Item> items;              // by cell, then by triangle
+  std::vector<std::size_t> cell_begin;
+  std::vector<Index> cursor;            // by range of triangles and slot
 
   explicit Work(const Surface& s) : surface(s) {}
 
   void find_owners(std::size_t seed_count);
   void clip_facets(bool want_polygons);
-  void clip_facet(const Facet& facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
-  void emit(const Clipper& clipper, const Facet& facet, Index slot, Chunk& chunk) const;
+  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
+  void emit(const Clipper& clipper, Index triangle, Index slot, Chunk& chunk) const;
+  void sort_items();
   void sum_cells(std::size_t seed_count, CellMoments& result);
   void set_step_masses(CellMoments& result) const;
+  bool follow(const std::vector<Vec3>& given, NeighbourSource source);
   void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_polygons);
 };
 
@@ -166,9 +201,9 @@ void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
   });
 }
 
-void RestrictedVoronoi::Work::emit(const Clipper& clipper, const Facet& facet, Index slot, Chunk& chunk) const {
+void RestrictedVoronoi::Work::emit(const Clipper& clipper, Index triangle, Index slot, Chunk& chunk) const {
   RestrictedPolygons& out = chunk.polygons;
-  out.pairs.push_back({facet.triangle, seeds.id[slot]});
+  out.pairs.push_back({triangle, seeds.id[slot]});
   for (std::size_t k = 0; k < clipper.size(); ++k) {
     const Index label = clipper.label(k);
     out.labels.push_back(is_edge(label) ? label : seeds.id[label]);
@@ -177,24 +212,24 @@ void RestrictedVoronoi::Work::emit(const Clipper& clipper, const Facet& facet, I
   out.offsets.push_back(out.labels.size());
 }
 
-void RestrictedVoronoi::Work::clip_facet(const Facet& facet, Walker& walker, Chunk& chunk, bool want_polygons) const {
+void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk, bool want_polygons) const {
+  const FacetSummary& summary = surface.summaries[index];
   Clipper& clipper = walker.clipper;
-  const bool uniform = surface.density.empty();
-  const Index first = owner[facet.site[0]];
+  const Index first = owner[summary.site[0]];
   // A cell is convex: it holds the facet if it owns the corners.
-  if (first == owner[facet.site[1]] && first == owner[facet.site[2]]) {
-    chunk.contributions.push_back(
-        {first, facet.triangle, moved(facet.moments, facet.corners[facet.anchor] - seeds.x[first])});
+  if (first == owner[summary.site[1]] && first == owner[summary.site[2]]) {
+    chunk.entries.push_back({first, kWhole});
     if (want_polygons) {
-      clipper.begin(facet);
+      clipper.begin(surface.facets[index]);
       clipper.take(first);
-      emit(clipper, facet, first, chunk);
+      emit(clipper, summary.triangle, first, chunk);
     }
     return;
   }
-  clipper.begin(facet);
+  const bool uniform = surface.density.empty();
+  clipper.begin(surface.facets[index]);
   walker.begin(seeds.x.size());
-  for (Index site : facet.site) walker.meet(owner[site]);
+  for (Index site : summary.site) walker.meet(owner[site]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index slot = walker.queue[head];
     const bool found = clipper.clip(neighbours, slot);
@@ -203,21 +238,23 @@ void RestrictedVoronoi::Work::clip_facet(const Facet& facet, Walker& walker, Chu
     if (!found) continue;
     for (std::size_t k = 0; k < clipper.size(); ++k)
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
-    chunk.contributions.push_back(
-        {slot, facet.triangle, uniform ? clipper.integrate<true>() : clipper.integrate<false>()});
-    if (want_polygons) emit(clipper, facet, slot, chunk);
+    chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
+    chunk.moments.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
+    if (want_polygons) emit(clipper, summary.triangle, slot, chunk);
   }
 }
 
 void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
   const std::size_t n = surface.facets.size();
   // Small chunks where facets are few and large.
-  const std::size_t size = std::clamp<std::size_t>(n / 256, 1, 512);
-  chunks.resize((n + size - 1) / size);
+  chunk_size = std::clamp<std::size_t>(n / 256, 1, 512);
+  chunks.resize((n + chunk_size - 1) / chunk_size);
+  first_entry.resize(n);
   ++generation;
-  parallel_chunks(n, size, [&](std::size_t c, std::size_t begin, std::size_t end) {
+  parallel_chunks(n, chunk_size, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Chunk& chunk = chunks[c];
-    chunk.contributions.clear();
+    chunk.entries.clear();
+    chunk.moments.clear();
     chunk.polygons = {};
     chunk.certification = {};
     Walker& walker = walkers.local();
@@ -225,35 +262,54 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
       walker.generation = generation;
       walker.clipper.reset(seeds);
     }
-    for (std::size_t k = begin; k < end; ++k) clip_facet(surface.facets[k], walker, chunk, want_polygons);
+    for (std::size_t k = begin; k < end; ++k) {
+      first_entry[k] = static_cast<Index>(chunk.entries.size());
+      clip_facet(k, walker, chunk, want_polygons);
+    }
   });
 }
 
-void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
-  const std::size_t slots = seeds.x.size();
-  std::unique_ptr<std::atomic<std::size_t>[]> cursor(new std::atomic<std::size_t>[slots + 1]{});
-  parallel_chunks(chunks.size(), 4, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t c = begin; c < end; ++c)
-      for (const Contribution& k : chunks[c].contributions) cursor[k.slot].fetch_add(1, std::memory_order_relaxed);
+// Brings the entries into the order of cells and, in each, of triangles: a stable counting sort over the triangles in their
+// order, in a fixed number of ranges.
+void RestrictedVoronoi::Work::sort_items() {
+  const std::size_t slots = seeds.x.size(), triangles = surface.facet_of.size();
+  const std::size_t range = (triangles + kRanges - 1) / kRanges;
+  const auto for_each_entry = [&](std::size_t begin, std::size_t end, const auto& visit) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const Index facet = surface.facet_of[t];
+      if (facet == kNone) continue;
+      const Chunk& chunk = chunks[facet / chunk_size];
+      const bool last = facet + 1 == first_entry.size() || (facet + 1) % chunk_size == 0;
+      const std::size_t stop = last ? chunk.entries.size() : first_entry[facet + 1];
+      for (std::size_t k = first_entry[facet]; k < stop; ++k) visit(facet, chunk.entries[k]);
+    }
+  };
+  cursor.assign(kRanges * slots, 0);
+  parallel_chunks(triangles, range, [&](std::size_t r, std::size_t begin, std::size_t end) {
+    Index* count = cursor.data() + r * slots;
+    for_each_entry(begin, end, [&](Index, const Entry& entry) { ++count[entry.slot]; });
   });
   cell_begin.resize(slots + 1);
   std::size_t total = 0;
   for (std::size_t s = 0; s < slots; ++s) {
     cell_begin[s] = total;
-    total += cursor[s].load(std::memory_order_relaxed);
-    cursor[s].store(cell_begin[s], std::memory_order_relaxed);
+    for (std::size_t r = 0; r < kRanges; ++r) {
+      const Index count = cursor[r * slots + s];
+      cursor[r * slots + s] = static_cast<Index>(total);
+      total += count;
+    }
   }
   cell_begin[slots] = total;
   items.resize(total);
-  parallel_chunks(chunks.size(), 4, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t c = begin; c < end; ++c)
-      for (std::size_t k = 0; k < chunks[c].contributions.size(); ++k) {
-        const Contribution& item = chunks[c].contributions[k];
-        items[cursor[item.slot].fetch_add(1, std::memory_order_relaxed)] = {
-            item.triangle, static_cast<Index>(c), static_cast<Index>(k)};
-      }
+  parallel_chunks(triangles, range, [&](std::size_t r, std::size_t begin, std::size_t end) {
+    Index* next = cursor.data() + r * slots;
+    for_each_entry(begin, end, [&](Index facet, const Entry& entry) { items[next[entry.slot]++] = {facet, entry.moments}; });
   });
+}
 
+void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
+  sort_items();
+  const std::size_t slots = seeds.x.size(), total = items.size();
   result.cells.assign(seed_count, Moments{});
   result.triangles.offsets.assign(seed_count + 1, 0);
   for (std::size_t i = 0; i < seed_count; ++i) {
@@ -262,18 +318,16 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
   }
   result.triangles.values.resize(total);
   parallel_chunks(slots, 256, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::vector<Moments> terms;
+    FixedTreeSum sum;
     for (std::size_t s = begin; s < end; ++s) {
-      Item* first = items.data() + cell_begin[s];
-      Item* last = items.data() + cell_begin[s + 1];
-      std::sort(first, last, [](const Item& a, const Item& b) { return a.triangle < b.triangle; });
       Index* triangles = result.triangles.values.data() + result.triangles.offsets[seeds.id[s]];
-      terms.clear();
-      for (Item* k = first; k != last; ++k) {
-        terms.push_back(chunks[k->chunk].contributions[k->entry].moments);
-        *triangles++ = k->triangle;
+      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
+        const FacetSummary& summary = surface.summaries[items[k].facet];
+        *triangles++ = summary.triangle;
+        sum.add(items[k].moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[s])
+                                           : chunks[items[k].facet / chunk_size].moments[items[k].moments]);
       }
-      result.cells[seeds.id[s]] = fixed_tree_sum(terms);
+      result.cells[seeds.id[s]] = sum.finish();
     }
   });
   set_step_masses(result);
@@ -309,11 +363,21 @@ void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
   });
 }
 
+// Moves the seeds of the last diagram in place if these are as many and not far off.
+bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSource source) {
+  if (given.size() != seeds.x.size() || given.size() != seeds.slot.size() || source != built_source) return false;
+  parallel_each(given.size(), [&](std::size_t i) { seeds.x[seeds.slot[i]] = given[i]; });
+  return neighbours.update();
+}
+
 void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,
                                        bool want_polygons) {
   const auto t0 = std::chrono::steady_clock::now();
-  seeds = sort_seeds(given);
-  neighbours.build(seeds, source);
+  if (!follow(given, source)) {
+    seeds = sort_seeds(given);
+    neighbours.build(seeds, source);
+    built_source = source;
+  }
   const auto t1 = std::chrono::steady_clock::now();
   find_owners(given.size());
   const auto t2 = std::chrono::steady_clock::now();
@@ -336,22 +400,22 @@ void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource
                                  RestrictedPolygons& polygons) {
   work_->evaluate(seeds, source, result, true);
   // Chunks are in spatial order; the result is in order of triangles, then cells.
-  struct Entry {
+  struct Place {
     Index triangle, cell, chunk, piece;
   };
-  std::vector<Entry> order;
+  std::vector<Place> order;
   order.reserve(result.certification.pairs);
   const auto& chunks = work_->chunks;
   for (Index c = 0; c < chunks.size(); ++c)
     for (Index k = 0; k < chunks[c].polygons.pairs.size(); ++k)
       order.push_back({chunks[c].polygons.pairs[k].triangle, chunks[c].polygons.pairs[k].cell, c, k});
-  sort_in_parallel(order, [](const Entry& a, const Entry& b) {
+  sort_in_parallel(order, [](const Place& a, const Place& b) {
     return a.triangle != b.triangle ? a.triangle < b.triangle : a.cell < b.cell;
   });
   polygons = {};
   polygons.pairs.reserve(order.size());
   polygons.offsets.reserve(order.size() + 1);
-  for (const Entry& e : order) {
+  for (const Place& e : order) {
     const RestrictedPolygons& from = chunks[e.chunk].polygons;
     polygons.pairs.push_back({e.triangle, e.cell});
     const auto begin = static_cast<std::ptrdiff_t>(from.offsets[e.piece]);

@@ -72,13 +72,14 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     const Index t = kept[k];
     const Triangle& v = mesh.triangles[t];
     Facet f;
-    f.triangle = t;
+    FacetSummary summary;
+    summary.triangle = t;
     f.normal = normals[t];
     std::array<std::array<Index, 3>, 3> edges;
     for (unsigned char m = 0; m < 3; ++m) {
       f.corners[m] = mesh.vertices[v[m]];
       f.density[m] = density.empty() ? 1.0 : density[v[m]];
-      f.site[m] = site_of[v[m]];
+      summary.site[m] = site_of[v[m]];
       const unsigned char next = static_cast<unsigned char>((m + 1) % 3);
       f.origin[m] = v[m] < v[next] ? m : next;
       edges[m] = {std::min(v[m], v[next]), std::max(v[m], v[next]), m};
@@ -87,19 +88,20 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     f.gradient = (1 / twice_area) * cross(f.normal, (f.density[1] - f.density[0]) * (f.corners[0] - f.corners[2]) +
                                                         (f.density[2] - f.density[0]) * (f.corners[1] - f.corners[0]));
     f.anchor = static_cast<unsigned char>(std::min_element(v.begin(), v.end()) - v.begin());
-    const Vec3 origin = f.corners[f.anchor];
-    f.moments = triangle_moments(f.corners[0] - origin, f.corners[1] - origin, f.corners[2] - origin, f.density[0],
-                                 f.density[1], f.density[2], 0.5 * twice_area);
+    const Vec3 origin = summary.anchor = f.corners[f.anchor];
+    summary.moments = triangle_moments(f.corners[0] - origin, f.corners[1] - origin, f.corners[2] - origin,
+                                       f.density[0], f.density[1], f.density[2], 0.5 * twice_area);
     std::sort(edges.begin(), edges.end());
     for (unsigned char r = 0; r < 3; ++r) f.rank[edges[r][2]] = r;
     facet_of[t] = static_cast<Index>(facets.size());
     facets.push_back(f);
+    summaries.push_back(summary);
   }
   area = fixed_sum(facets.size(), [&](std::size_t k) {
     const Facet& f = facets[k];
     return 0.5 * dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
   });
-  mass = fixed_sum(facets.size(), [&](std::size_t k) { return facets[k].moments.mass; });
+  mass = fixed_sum(facets.size(), [&](std::size_t k) { return summaries[k].moments.mass; });
 }
 
 }  // namespace bisector

@@ -18,12 +18,17 @@ struct Facet {
   Vec3 normal;              // unit length
   double density[3];        // at the corners
   Vec3 gradient;            // of the density
-  Moments moments;          // of the whole facet, about the anchor
-  Index site[3];            // of the corners, in Surface::sites
-  Index triangle;           // index in the mesh
   unsigned char anchor;     // the corner of lowest vertex index
   unsigned char origin[3];  // of each edge: its end of lower vertex index
   unsigned char rank[3];    // of each edge among the three, by sorted vertex indices
+};
+
+// What is needed of a triangle that lies in one cell.
+struct FacetSummary {
+  Vec3 anchor;      // position of that corner
+  Moments moments;  // of the whole triangle, about the anchor
+  Index site[3];    // of the corners, in Surface::sites
+  Index triangle;   // index in the mesh
 };
 
 struct Surface {
@@ -34,6 +39,7 @@ struct Surface {
   TriangleMesh mesh;
   std::vector<double> density;       // per vertex, or empty
   std::vector<Facet> facets;         // in a spatial order; exactly collinear triangles are left out
+  std::vector<FacetSummary> summaries;  // of the facets
   std::vector<Index> sites;          // the vertices that facets use, in a spatial order
   std::vector<Index> facet_of;       // of each triangle, or kNone
   double area = 0;
