@@ -94,7 +94,7 @@ void Console::show(const Progress& progress) {
   const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
   std::string line = fmt::format("iteration {}/{}  energy {:.6e}  gradient {:.2e}", progress.iteration,
                                  progress.iterations, progress.energy, progress.gradient_norm);
-  if (*progress.phase) line = fmt::format("{}  {}", progress.phase, line);
+  if (!progress.phase.empty()) line = fmt::format("{}  {}", progress.phase, line);
   if (fraction > 0) line += fmt::format("  {:.0f} %", 100 * fraction);
   if (fraction > 0.02) line += "  " + time_left(elapsed * (1 - fraction) / fraction);
   show_line(std::move(line));

@@ -151,8 +151,8 @@ CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
   app->add_option("--iterations", command.options.iterations, "at most so many per level; default 100")
       ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
   app->add_option("--tolerance", command.options.tolerance,
-                  "stop when the gradient has fallen to this share;\n"
-                  "default 1e-4")
+                  "end a level when the energy falls by less than this\n"
+                  "share per iteration; default 1.2e-5")
       ->type_name("T")->check(number_below(1))->group("Optimisation");
   app->add_option("--levels", command.options.levels,
                   "coarse-to-fine levels, 1 to 8; default: as many as the\n"

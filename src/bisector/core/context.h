@@ -10,7 +10,7 @@
 namespace bisector {
 
 struct Progress {
-  const char* phase = "";      // "level 1/3", "constrained", ...
+  std::string phase;           // "level 1/3", "on the surface", ...
   int iteration = 0;           // within the phase
   int iterations = 0;          // at most, within the phase
   double energy = 0;

@@ -145,12 +145,8 @@ void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options,
       std::swap(state, next);
     }
     energies.push_back(state.energy);
-    Progress progress = options.progress;
-    progress.iteration = iteration + 1;
-    progress.iterations = options.iterations;
-    progress.energy = state.energy;
-    progress.gradient_norm = state.gradient_norm;
-    context.report(progress);
+    context.report({options.phase, iteration + 1, options.iterations, state.energy, state.gradient_norm,
+                    options.done + options.share * (iteration + 1) / options.iterations});
     const std::size_t n = energies.size();
     if (n > kDecreaseWindow &&
         energies[n - 1 - kDecreaseWindow] - energies[n - 1] < kDecreaseWindow * options.tolerance * energies[n - 1])

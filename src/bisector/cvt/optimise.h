@@ -1,6 +1,7 @@
 // The optimisation loop: minimises the CVT energy F = sum_i int rho |x - x_i|^2 by L-BFGS (thesis 4.4.2; Liu et al. 2009).
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "bisector/core/context.h"
@@ -10,9 +11,10 @@ namespace bisector {
 
 struct OptimiseOptions {
   int iterations = 100;        // accepted steps at most
-  double tolerance = 2e-5;     // stop when the energy falls by less than this share per step, over five steps
+  double tolerance = 1.2e-5;     // stop when the energy falls by less than this share per step, over five steps
   bool constrained = false;    // CCVT: seeds stay on the surface, gradients in its tangent planes
-  Progress progress;           // phase and total; iteration, energy and gradient are filled in
+  std::string phase;           // for progress
+  double done = 0, share = 1;  // of the whole run: fraction before this optimisation, and its own
 };
 
 struct OptimiseTotals {

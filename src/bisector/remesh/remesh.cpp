@@ -1,7 +1,10 @@
 #include "bisector/remesh/remesh.h"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <optional>
+#include <utility>
 
 #include "bisector/core/parallel.h"
 #include "bisector/cvt/cpu_backend.h"
@@ -14,6 +17,8 @@ namespace bisector {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+constexpr double kConstrainedShare = 0.3;  // of the steps of a level that the last, constrained ones take
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -46,10 +51,19 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
                             : std::vector<std::size_t>{options.seeds.size()};
   state.seeds = options.seeds.empty() ? initial_seeds(surface, counts.front(), options.random_seed) : options.seeds;
 
+  // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
+  const auto cost = [&](std::size_t seeds) { return static_cast<double>(surface.facets.size() + 3 * seeds); };
+  const bool constrain = options.energy == Energy::constrained;
+  double total = constrain ? kConstrainedShare * cost(counts.back()) : 0;
+  for (std::size_t count : counts) total += cost(count);
+
   OptimiseOptions step;
   step.iterations = options.iterations;
+  step.share = 0;
   step.tolerance = options.tolerance;
   for (std::size_t level = 0; level < counts.size(); ++level) {
+    step.phase = counts.size() > 1 ? fmt::format("level {}/{}", level + 1, counts.size()) : "optimising";
+    step.done += std::exchange(step.share, cost(counts[level]) / total);
     optimise(backend, state, step, totals, context);
     if (level + 1 == counts.size()) break;
     backend.evaluate(state.seeds, state.moments, polygons);
@@ -59,8 +73,10 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
       set_count(polygons, state.moments, counts[level + 1], state.seeds);
     }
   }
-  if (options.energy == Energy::constrained) {
+  if (constrain) {
     step.constrained = true;
+    step.phase = "on the surface";
+    step.done += std::exchange(step.share, kConstrainedShare * cost(counts.back()) / total);
     optimise(backend, state, step, totals, context);
   }
   if (options.topology == TopologyControl::enforce)

@@ -28,7 +28,7 @@ struct RemeshOptions {
   std::vector<Vec3> seeds;                 // start from these instead of random ones, in one level; empty: random
   std::uint64_t random_seed = 1;
   int iterations = 100;                    // at most, per level
-  double tolerance = 2e-5;                 // a level ends when the energy falls by less than this share per step
+  double tolerance = 1.2e-5;                 // a level ends when the energy falls by less than this share per step
   int levels = 0;                          // of the multilevel start; 0: as many as the count allows, at most 3
   Energy energy = Energy::constrained;
   TopologyControl topology = TopologyControl::enforce;

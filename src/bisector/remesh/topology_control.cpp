@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <string>
 
 #include "bisector/cvt/multilevel.h"
 #include "bisector/voronoi/dual.h"
@@ -135,6 +136,8 @@ bool enforce_topology(Backend& backend, CvtState& state, const MeshTopology& inp
                       OptimiseTotals& totals, const Context& context) {
   if (!input.manifold || !input.oriented) return false;
   options.iterations = std::min(options.iterations, kStepsPerRound);
+  options.done = 1;
+  options.share = 0;
   RestrictedPolygons polygons;
   const std::size_t count = state.seeds.size();
   for (int round = 0;; ++round) {
@@ -146,6 +149,7 @@ bool enforce_topology(Backend& backend, CvtState& state, const MeshTopology& inp
     std::vector<Vec3> points = repair_points(backend.surface(), polygons, state.seeds, cells);
     if (points.empty()) return false;
     points.resize(std::min(points.size(), count / 4));
+    options.phase = "topology, round " + std::to_string(round + 1);
     set_count(polygons, state.moments, count - points.size(), state.seeds);
     state.seeds.insert(state.seeds.end(), points.begin(), points.end());
     optimise(backend, state, options, totals, context);

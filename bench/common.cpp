@@ -1,0 +1,73 @@
+#include "common.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "bisector/mesh/sampling.h"
+
+namespace bisector::bench {
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+std::vector<Vec3> random_seeds(const TriangleMesh& mesh, std::size_t count) {
+  std::vector<Vec3> seeds;
+  for (const SurfaceSample& sample : sample_surface(mesh, count, 1)) seeds.push_back(sample.point);
+  return seeds;
+}
+
+std::string Table::markdown() const {
+  std::vector<std::size_t> width;
+  for (const std::string& name : columns) width.push_back(name.size());
+  for (const auto& row : rows)
+    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
+  std::string text;
+  const auto line = [&](const std::vector<std::string>& cells) {
+    text += '|';
+    for (std::size_t c = 0; c < cells.size(); ++c) text += fmt::format(" {:>{}} |", cells[c], width[c]);
+    text += '\n';
+  };
+  line(columns);
+  text += '|';
+  for (std::size_t w : width) text += std::string(w + 1, '-') + ":|";
+  text += '\n';
+  for (const auto& row : rows) line(row);
+  return text;
+}
+
+std::string Table::csv() const {
+  std::string text = fmt::format("{}\n", fmt::join(columns, ","));
+  for (const auto& row : rows) text += fmt::format("{}\n", fmt::join(row, ","));
+  return text;
+}
+
+std::string describe_machine() {
+  std::string processor = "unknown processor";
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);)
+    if (line.starts_with("model name")) {
+      const std::size_t begin = line.find_first_not_of(" \t:", 10);
+      if (begin != std::string::npos) processor = line.substr(begin);
+      break;
+    }
+  double load = 0;
+  getloadavg(&load, 1);
+  return fmt::format("{}, {} cores, load {:.2f} before the start; compiler {}", processor,
+                     std::thread::hardware_concurrency(), load, __VERSION__);
+}
+
+std::string describe_model(const std::string& path, const TriangleMesh& mesh) {
+  return fmt::format("model {}: {} vertices, {} triangles", std::filesystem::path(path).stem().string(),
+                     mesh.vertices.size(), mesh.triangles.size());
+}
+
+}  // namespace bisector::bench

@@ -1,0 +1,197 @@
+// One cold evaluation of the restricted Voronoi diagram, beside CGAL's Delaunay triangulation of the same seeds.
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "bisector/core/error.h"
+#include "bisector/core/parallel.h"
+#include "bisector/mesh/io.h"
+#include "bisector/voronoi/restricted.h"
+#include "common.h"
+#include "delaunay_time.h"
+
+namespace {
+
+using namespace bisector;
+using namespace bisector::bench;
+
+constexpr std::size_t kMany = 500'000;  // seeds; from here on with half the repeats
+
+struct Options {
+  std::string model = BISECTOR_DEFAULT_MODEL, csv;
+  std::vector<std::size_t> seeds{10, 100, 1'000, 10'000, 100'000, 1'000'000};
+  std::vector<unsigned> threads{1, 2};
+  std::vector<std::string> sources{"nearest", "delaunay"};
+  std::size_t repeat = 5;
+  bool once = false;  // one evaluation of the first of each list and nothing else, for its memory
+};
+
+NeighbourSource source_of(const std::string& name) {
+  return name == "delaunay" ? NeighbourSource::delaunay : NeighbourSource::nearest;
+}
+
+struct Run {
+  double total = 0, gradient_norm = 0;
+  CellMoments moments;
+};
+
+// From seeds to a gradient, with nothing kept from before.
+Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source, unsigned threads) {
+  const ThreadLimit limit(threads);
+  Run run;
+  const Stopwatch watch;
+  RestrictedVoronoi diagram(surface);
+  diagram.evaluate(seeds, source, run.moments);
+  std::vector<Vec3> gradient(seeds.size());
+  parallel_each(seeds.size(), [&](std::size_t i) { gradient[i] = -2.0 * run.moments.cells[i].first; });
+  run.gradient_norm = std::sqrt(fixed_sum(seeds.size(), [&](std::size_t i) { return norm2(gradient[i]); }));
+  const double missing = std::abs(run.moments.mass - surface.mass);
+  run.total = watch.seconds();
+  if (!(missing <= 1e-12 * surface.mass))
+    throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(), run.moments.mass,
+                            surface.mass));
+  return run;
+}
+
+// Peak resident memory, in MiB, of a process that reads the model and evaluates once. Must come before the first loop of
+// this process: a new process counts what its parent held.
+double peak_memory(const Options& options, std::size_t seeds, const std::string& source, unsigned threads) {
+  std::vector<std::string> words{"bench_evaluation", options.model, "--once", "--seeds", std::to_string(seeds), "--sources",
+                                 source, "--threads", std::to_string(threads)};
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    execv("/proc/self/exe", arguments.data());
+    _exit(127);
+  }
+  int status = 0;
+  rusage usage{};
+  if (child < 0 || wait4(child, &status, 0, &usage) != child || status != 0)
+    throw Error("a process of its own to measure memory failed");
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+// All runs of one combination of seeds, source and threads.
+struct Series {
+  std::string source;
+  unsigned threads = 1;
+  double memory = 0;
+  std::vector<double> total, neighbours, owners, clip, ratio;
+  CellMoments last;
+  double gradient_norm = 0;
+
+  void add(Run run, double delaunay) {
+    const DiagramSeconds& phases = run.moments.seconds;
+    total.push_back(run.total);
+    neighbours.push_back(phases.delaunay + phases.neighbours);
+    owners.push_back(phases.pairs);
+    clip.push_back(phases.clip);
+    ratio.push_back(run.total / delaunay);
+    if (gradient_norm != 0 && run.gradient_norm != gradient_norm) throw Error("the gradient differs from the last run's");
+    gradient_norm = run.gradient_norm;
+    last = std::move(run.moments);
+  }
+};
+
+void require_same(const Series& a, const Series& b) {
+  if (a.last.mass != b.last.mass || a.last.energy != b.last.energy || a.gradient_norm != b.gradient_norm)
+    throw Error(fmt::format("{} with {} threads and {} with {} threads differ", a.source, a.threads, b.source, b.threads));
+}
+
+std::string milliseconds(double seconds) { return fmt::format("{:.{}f}", 1e3 * seconds, seconds < 0.1 ? 2 : 0); }
+
+void measure(const Surface& surface, const Options& options, std::size_t count, std::vector<Series> series,
+             Table& table) {
+  const std::vector<Vec3> seeds = random_seeds(surface.mesh, count);
+  const std::size_t repeat = count < kMany ? options.repeat : (options.repeat + 1) / 2;
+  std::vector<double> delaunay;
+  for (std::size_t r = 0; r < repeat; ++r) {
+    for (Series& s : series) {
+      // Its own triangulation right before each: what slows one of the two slows the other.
+      delaunay.push_back(delaunay_seconds(seeds));
+      s.add(evaluate(surface, seeds, source_of(s.source), s.threads), delaunay.back());
+    }
+    std::fprintf(stderr, "%zu seeds: round %zu of %zu\n", count, r + 1, repeat);
+  }
+  for (const Series& s : series) {
+    require_same(s, series.front());
+    // The first number of threads of the same source.
+    const Series& base = *std::find_if(series.begin(), series.end(), [&](const Series& b) { return b.source == s.source; });
+    const CellMoments& m = s.last;
+    table.rows.push_back({std::to_string(count), s.source, std::to_string(s.threads), milliseconds(median(s.total)),
+                          milliseconds(median(s.neighbours)), milliseconds(median(s.owners)), milliseconds(median(s.clip)),
+                          milliseconds(median(delaunay)), fmt::format("{:.2f}", median(s.ratio)),
+                          fmt::format("{:.2f}", median(base.total) / median(s.total)),
+                          fmt::format("{:.0f}", s.memory), std::to_string(m.certification.pairs),
+                          std::to_string(m.certification.uncertain), std::to_string(m.certification.wider),
+                          fmt::format("{:.1e}", std::abs(m.mass - surface.mass) / surface.mass)});
+  }
+}
+
+void run(const Options& options) {
+  if (options.once) {
+    const ThreadLimit limit(options.threads.front());
+    const Surface surface(read_mesh(options.model));
+    const std::vector<Vec3> seeds = random_seeds(surface.mesh, options.seeds.front());
+    evaluate(surface, seeds, source_of(options.sources.front()), options.threads.front());
+    return;
+  }
+  const std::string machine = describe_machine();
+  std::vector<std::vector<Series>> all;
+  for (std::size_t count : options.seeds) {
+    all.emplace_back();
+    for (const std::string& source : options.sources)
+      for (unsigned threads : options.threads) {
+        Series s;
+        s.source = source;
+        s.threads = threads;
+        s.memory = peak_memory(options, count, source, threads);
+        all.back().push_back(std::move(s));
+      }
+  }
+  TriangleMesh mesh = read_mesh(options.model);
+  fmt::print("{}\n{}\n", machine, describe_model(options.model, mesh));
+  const Stopwatch preparing;
+  const Surface surface(std::move(mesh));
+  fmt::print("surface prepared once in {:.0f} ms, not counted below; times in ms, memory in MiB\n\n",
+             1e3 * preparing.seconds());
+  Table table{{"seeds", "source", "threads", "total", "neighbours", "owners", "clip", "CGAL", "ratio", "speed-up", "memory",
+               "pairs", "uncertain", "wider", "mass error"}, {}};
+  for (std::size_t k = 0; k < all.size(); ++k) measure(surface, options, options.seeds[k], std::move(all[k]), table);
+  fmt::print("{}", table.markdown());
+  if (!options.csv.empty()) write_file(options.csv, table.csv());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app{"Times one cold evaluation of a restricted Voronoi diagram beside CGAL's Delaunay triangulation."};
+  app.add_option("MESH", options.model, "the surface; default: examples/smooth.off");
+  app.add_option("--seeds", options.seeds, "counts, area-uniform random seeds")->delimiter(',');
+  app.add_option("--repeat", options.repeat, "runs of each; half as many from 500,000 seeds on")->check(CLI::Range(1, 1000));
+  app.add_option("--threads", options.threads, "numbers of threads")->delimiter(',')->check(CLI::Range(1, 1024));
+  app.add_option("--sources", options.sources, "nearest, delaunay")
+      ->delimiter(',')->check(CLI::IsMember({"nearest", "delaunay"}));
+  app.add_option("--csv", options.csv, "also write the table to this file");
+  app.add_flag("--once", options.once)->group("");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(options);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_evaluation: %s\n", error.what());
+    return 1;
+  }
+}
