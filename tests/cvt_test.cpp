@@ -61,7 +61,7 @@ void expect_gradient(const Surface& surface, const std::vector<Vec3>& seeds, std
       size += norm(gradient);
     }
     double errors[3];
-    const double steps[3] = {4e-3, 1e-3, 2.5e-4};
+    const double steps[3] = {1e-4, 2.5e-5, 6.25e-6};
     for (int k = 0; k < 3; ++k) {
       std::vector<Vec3> plus = seeds, minus = seeds;
       for (std::size_t i = 0; i < seeds.size(); ++i) {
@@ -71,10 +71,10 @@ void expect_gradient(const Surface& surface, const std::vector<Vec3>& seeds, std
       const double difference = (energy_at(backend, plus) - energy_at(backend, minus)) / (2 * steps[k]);
       errors[k] = std::abs(difference - slope);
     }
-    EXPECT_LE(errors[2], 1e-5 * size);
+    EXPECT_LE(errors[2], 1e-7 * size);
     // The energy's third derivative jumps where the combinatorics change, so 16 per step is not to be had everywhere.
-    EXPECT_LE(errors[1], errors[0] / 4 + 1e-8 * size);
-    EXPECT_LE(errors[2], errors[1] / 4 + 1e-8 * size);
+    EXPECT_LE(errors[1], errors[0] / 4 + 1e-9 * size);
+    EXPECT_LE(errors[2], errors[1] / 4 + 1e-9 * size);
   }
 }
 
@@ -257,11 +257,18 @@ TEST_P(Loop, NeverGoesUphillAndReducesTheGradient) {
   OptimiseOptions options;
   options.iterations = 60;
   options.constrained = GetParam().constrained;
-  options.progress.phase = "phase";
+  options.tolerance = 0;
+  options.phase = "phase";
+  options.done = 0.25;
+  options.share = 0.5;
+  double fraction = 0.25;
   std::vector<double> energies{before}, gradients;
   Context context;
   context.progress = [&](const Progress& p) {
-    EXPECT_STREQ(p.phase, "phase");
+    EXPECT_EQ(p.phase, "phase");
+    EXPECT_GE(p.fraction, fraction);
+    EXPECT_LE(p.fraction, 0.75);
+    fraction = p.fraction;
     EXPECT_EQ(p.iteration, static_cast<int>(energies.size()));
     EXPECT_EQ(p.iterations, 60);
     EXPECT_LT(p.energy, energies.back());
@@ -353,34 +360,39 @@ TEST(Optimise, StopsWhenCancelled) {
   EXPECT_EQ(iterations, 3);
 }
 
-TEST(Optimise, StopsAtTheToleranceTheDecreaseAndTheIterations) {
+TEST(Optimise, StopsAtTheToleranceAndTheIterations) {
   const TriangleMesh mesh = icosphere(3);
   const Surface surface(mesh);
   CpuBackend backend(surface, NeighbourSource::nearest);
-  const auto run = [&](const OptimiseOptions& options, CvtState& state) {
+  CvtState state;
+  const auto run = [&](const OptimiseOptions& options) {
     state.seeds = random_seeds(mesh, 50, 13);
     OptimiseTotals totals;
-    optimise(backend, state, options, totals, {});
-    return totals.iterations;
+    std::vector<double> energies;
+    Context context;
+    context.progress = [&](const Progress& p) { energies.push_back(p.energy); };
+    optimise(backend, state, options, totals, context);
+    EXPECT_EQ(energies.size(), static_cast<std::size_t>(totals.iterations));
+    return energies;
   };
   OptimiseOptions options;
-  CvtState state;
   options.iterations = 0;
-  EXPECT_EQ(run(options, state), 0);
+  EXPECT_EQ(run(options).size(), 0u);
   EXPECT_TRUE(same_bits(state.seeds, random_seeds(mesh, 50, 13)));
-  const double first = state.gradient_norm;
   options.iterations = 4;
-  EXPECT_EQ(run(options, state), 4);
+  EXPECT_EQ(run(options).size(), 4u);
   options.iterations = 2000;
-  options.tolerance = 1e-2;
-  const int loose = run(options, state);
-  EXPECT_LE(state.gradient_norm, 1e-2 * first);
-  options.tolerance = 1e-6;
-  const int tight = run(options, state);
-  EXPECT_GT(tight, loose);
-  EXPECT_LE(state.gradient_norm, 1e-6 * first);
-  options.decrease = 1e-3;
-  EXPECT_LT(run(options, state), tight);
+  options.tolerance = 1e-3;
+  const std::vector<double> loose = run(options);
+  ASSERT_GT(loose.size(), 6u);
+  ASSERT_LT(loose.size(), 2000u);
+  // Below the tolerance over the last five steps, and over no five before.
+  for (std::size_t k = 5; k < loose.size(); ++k)
+    EXPECT_EQ(loose[k - 5] - loose[k] < 5 * 1e-3 * loose[k], k + 1 == loose.size()) << k;
+  options.tolerance = 1e-7;
+  const std::vector<double> tight = run(options);
+  EXPECT_GT(tight.size(), loose.size());
+  EXPECT_TRUE(std::equal(loose.begin(), loose.end(), tight.begin()));
 }
 
 // The minimum for one seed is the centroid of the surface, for the free energy.
@@ -393,12 +405,10 @@ TEST(Optimise, OneSeedFindsTheCentroid) {
   CellMoments moments;
   backend.evaluate(state.seeds, moments);
   const Vec3 centroid = state.seeds[0] + (1 / moments.mass) * moments.cells[0].first;
-  OptimiseOptions options;
-  options.tolerance = 1e-12;
   OptimiseTotals totals;
-  optimise(backend, state, options, totals, {});
+  optimise(backend, state, {}, totals, {});
   EXPECT_LE(norm(state.seeds[0] - centroid), 1e-12);
-  EXPECT_LE(totals.iterations, 3);
+  EXPECT_LE(totals.iterations, 10);
 }
 
 // --- Constraint ---
@@ -499,8 +509,9 @@ TEST(Multilevel, RefiningAClosedDualGivesTheCountOfTheFormula) {
     const std::vector<Vec3> finer = refine(polygons, state.seeds);
     EXPECT_EQ(static_cast<long long>(finer.size()), 4 * 400 - 3 * euler);
     EXPECT_TRUE(std::equal(state.seeds.begin(), state.seeds.end(), finer.begin()));
-    for (std::size_t i = 400; i < finer.size(); ++i)
-      EXPECT_LE(distance_to_surface(surface, finer[i]), 1e-12 * surface.box.diagonal());
+    // Between neighbours: on the surface, or as far from it as the middle of two seeds on either side of a bulge.
+    const double spacing = std::sqrt(surface.area / 400);
+    for (std::size_t i = 400; i < finer.size(); ++i) EXPECT_LE(distance_to_surface(surface, finer[i]), 0.2 * spacing);
   }
 }
 

@@ -182,7 +182,7 @@ std::vector<MediumCase> medium_cases() {
     add("grid", grid_seeds(mesh, 11, 11, 11));
     add("clustered", clustered_seeds(mesh, 2000));
     add("mirrored", mirrored(random_seeds(mesh, 700, 24), 0));
-    std::vector<Vec3> flat = random_seeds(mesh, 1000, 25);
+    std::vector<Vec3> flat = random_seeds(mesh, 300, 25);
     for (Vec3& x : flat) x.z = 0;
     add("planar", flat);
     add("in the box", box_seeds(mesh, 2000, 0.1));
@@ -191,7 +191,7 @@ std::vector<MediumCase> medium_cases() {
   for (std::size_t k : {0u, 3u, 4u}) {
     cases.push_back({std::string(meshes[k].name) + " cospherical", meshes[k].mesh, round_seeds(2000, false)});
     // All cells meet along one line, where every decision is close: the cost grows with the square of the count.
-    cases.push_back({std::string(meshes[k].name) + " cocircular", meshes[k].mesh, round_seeds(250, true)});
+    cases.push_back({std::string(meshes[k].name) + " cocircular", meshes[k].mesh, round_seeds(120, true)});
   }
   return cases;
 }
@@ -219,21 +219,28 @@ TEST_P(Medium, EverySourceAndThreadCountGivesTheSameBits) {
   expect_same_moments(moments, reference.moments);
 }
 
-// Both depend on the seeds and the surface alone, as everything that is reported or steers the optimiser.
-TEST_P(Medium, StepMassesAndCertificationAreReproducible) {
+// Step masses steer the optimiser, so they may not depend on the source either.
+TEST_P(Medium, StepMassesAreTheSameForBothSources) {
   const auto& [name, mesh, seeds] = GetParam();
   const Surface surface(mesh);
   CellMoments nearest, delaunay;
   RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::nearest, nearest);
   RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::delaunay, delaunay);
   EXPECT_TRUE(same_bits(nearest.step_mass, delaunay.step_mass));
-  for (unsigned threads : {1u, 2u}) {
-    const ThreadLimit limit(threads);
-    for (int run = 0; run < 2; ++run) {
+}
+
+TEST_P(Medium, CertificationIsReproducible) {
+  const auto& [name, mesh, seeds] = GetParam();
+  const Surface surface(mesh);
+  for (NeighbourSource source : kSources) {
+    CellMoments first;
+    for (unsigned threads : {1u, 2u, 2u}) {
+      const ThreadLimit limit(threads);
       CellMoments again;
-      RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::nearest, again);
-      EXPECT_EQ(again.certification.uncertain, nearest.certification.uncertain);
-      EXPECT_EQ(again.certification.wider, nearest.certification.wider);
+      RestrictedVoronoi(surface).evaluate(seeds, source, again);
+      if (first.cells.empty()) first = again;
+      EXPECT_EQ(again.certification.uncertain, first.certification.uncertain);
+      EXPECT_EQ(again.certification.wider, first.certification.wider);
     }
   }
 }

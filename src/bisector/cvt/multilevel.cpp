@@ -68,13 +68,26 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
   return counts;
 }
 
-std::vector<Vec3> refine(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds) {
+std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
+                         std::size_t count) {
+  std::vector<DualEdge> edges = extract_dual_edges(polygons, seeds);
+  const std::size_t room = count > seeds.size() ? count - seeds.size() : 0;
+  if (edges.size() > room) {
+    std::stable_sort(edges.begin(), edges.end(), [&](const DualEdge& e, const DualEdge& f) {
+      return norm2(seeds[e.a] - seeds[e.b]) > norm2(seeds[f.a] - seeds[f.b]);
+    });
+    edges.resize(room);
+  }
   std::vector<Vec3> finer = seeds;
-  for (const DualEdge& edge : extract_dual_edges(polygons, seeds)) {
+  for (const DualEdge& edge : edges) {
     const Vec3 a = seeds[edge.a], b = seeds[edge.b], middle = 0.5 * (a + b);
     // On a smooth surface the middle is the better start; where the edge crosses elsewhere, it may be off the sheet.
     const bool near = norm2(middle - edge.crossing) < kNearMiddle * kNearMiddle * norm2(b - a);
     finer.push_back(near ? middle : edge.crossing);
+  }
+  if (finer.size() < count) {
+    const std::vector<Vec3> more = insertion_points(polygons, seeds, moments, count - finer.size());
+    finer.insert(finer.end(), more.begin(), more.end());
   }
   return finer;
 }

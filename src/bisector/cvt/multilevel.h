@@ -17,7 +17,10 @@ std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::
 std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::size_t components, int levels);
 
 // The seeds, and the middle of every two of them that share a restricted Voronoi edge, moved to that edge where it is far off.
-std::vector<Vec3> refine(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds);
+// To come near `count`, the shortest edges get none, or the cells of highest energy one more at a corner; the result may have
+// fewer than `count` seeds if there are too few edges, never more unless there are more seeds already.
+std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
+                         std::size_t count);
 
 // Removes one end of the shortest dual edges, or adds seeds where the energy is highest, until there are `count`; at most
 // doubles the seeds. `polygons` and `moments` are those of the seeds given.

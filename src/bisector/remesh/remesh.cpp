@@ -67,7 +67,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     optimise(backend, state, step, totals, context);
     if (level + 1 == counts.size()) break;
     backend.evaluate(state.seeds, state.moments, polygons);
-    state.seeds = refine(polygons, state.seeds);
+    state.seeds = refine(polygons, state.moments, state.seeds, counts[level + 1]);
     while (state.seeds.size() != counts[level + 1]) {
       backend.evaluate(state.seeds, state.moments, polygons);
       set_count(polygons, state.moments, counts[level + 1], state.seeds);
@@ -80,10 +80,11 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     optimise(backend, state, step, totals, context);
   }
   if (options.topology == TopologyControl::enforce)
-    enforce_topology(backend, state, result.input_topology, step, totals, context);
+    enforce_topology(backend, state, polygons, result.input_topology, step, totals, context);
+  else
+    backend.evaluate(state.seeds, state.moments, polygons);
 
   const auto extraction = Clock::now();
-  backend.evaluate(state.seeds, state.moments, polygons);
   result.untiled = count_untiled(surface, polygons);
   result.mesh = dual_mesh(state.seeds, polygons);
   result.topology = analyse_topology(result.mesh.triangles, result.mesh.vertices.size());

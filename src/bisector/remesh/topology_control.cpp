@@ -132,22 +132,20 @@ bool same_topology(const MeshTopology& dual, const MeshTopology& input) {
          dual.components == input.components;
 }
 
-bool enforce_topology(Backend& backend, CvtState& state, const MeshTopology& input, OptimiseOptions options,
-                      OptimiseTotals& totals, const Context& context) {
-  if (!input.manifold || !input.oriented) return false;
+void enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
+                      OptimiseOptions options, OptimiseTotals& totals, const Context& context) {
   options.iterations = std::min(options.iterations, kStepsPerRound);
   options.done = 1;
   options.share = 0;
-  RestrictedPolygons polygons;
   const std::size_t count = state.seeds.size();
   for (int round = 0;; ++round) {
     backend.evaluate(state.seeds, state.moments, polygons);
+    if (!input.manifold || !input.oriented || round == kRounds) return;
     const Dual dual = extract_dual(polygons);
-    if (same_topology(analyse_topology(dual.triangles, count), input)) return true;
-    if (round == kRounds) return false;
+    if (same_topology(analyse_topology(dual.triangles, count), input)) return;
     const std::vector<Index> cells = broken_cells(dual, count, input.closed);
     std::vector<Vec3> points = repair_points(backend.surface(), polygons, state.seeds, cells);
-    if (points.empty()) return false;
+    if (points.empty()) return;
     points.resize(std::min(points.size(), count / 4));
     options.phase = "topology, round " + std::to_string(round + 1);
     set_count(polygons, state.moments, count - points.size(), state.seeds);

@@ -15,9 +15,9 @@ TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons&
 bool same_topology(const MeshTopology& dual, const MeshTopology& input);
 
 // While the dual differs in topology from a manifold input: moves seeds from where the energy is lowest to the cells that
-// break it, and optimises again. The number of seeds stays. Returns whether the topology is the input's; gives up after
-// a bounded number of rounds.
-bool enforce_topology(Backend& backend, CvtState& state, const MeshTopology& input, OptimiseOptions options,
-                      OptimiseTotals& totals, const Context& context);
+// break it, and optimises again. The number of seeds stays. Gives up after a bounded number of rounds. `polygons` and
+// state.moments are those of the final seeds.
+void enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
+                      OptimiseOptions options, OptimiseTotals& totals, const Context& context);
 
 }  // namespace bisector

@@ -71,10 +71,7 @@ void Clipper::take(Index slot) { start(slot); }
 
 bool Clipper::clip(const Neighbours& neighbours, Index slot) {
   start(slot);
-  height_ = dot(facet_->normal, local_[facet_->anchor]);
-  foot_ = height_ * facet_->normal;
-  for (unsigned k = 0; k < 3; ++k)
-    lines_[k].offset = dot(lines_[k].m, local_[facet_->origin[k]]) - height_ * dot(facet_->normal, lines_[k].m);
+  place_lines();
   bounded_ = false;
   NeighbourList list = neighbours.list(slot);
   for (;;) {
@@ -102,6 +99,92 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
     wider_ = true;
     list = neighbours.wider(slot, list);
   }
+}
+
+void Clipper::place_lines() {
+  height_ = dot(facet_->normal, local_[facet_->anchor]);
+  foot_ = height_ * facet_->normal;
+  for (unsigned k = 0; k < 3; ++k)
+    lines_[k].offset = dot(lines_[k].m, local_[facet_->origin[k]]) - height_ * dot(facet_->normal, lines_[k].m);
+}
+
+unsigned Clipper::add_line(Index other, const Vec3& d, double squared) {
+  if (lines_.size() == line_count_) lines_.resize(2 * line_count_);
+  Line& line = lines_[line_count_];
+  line.m = d;
+  line.along = cross(facet_->normal, d);
+  line.offset = 0.5 * squared - height_ * dot(facet_->normal, d);
+  line.squared = squared;
+  line.key = std::uint64_t{3} + seeds_->id[other];
+  line.slot = other;
+  return static_cast<unsigned>(line_count_++);
+}
+
+// A closed chain of corners, each where two lines that follow each other meet, that all lie strictly within every other line
+// is the boundary of the clipped facet: each is a vertex of it, and two on one line end that line's edge.
+bool Clipper::confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count) {
+  start(slot);
+  place_lines();
+  polygon_.reserve(count);
+  polygon_.size = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (is_edge(labels[k])) {
+      polygon_.push(labels[k] & ~kEdgeLabel);
+    } else {
+      const Vec3 d = seeds_->x[labels[k]] - seeds_->x[slot];
+      polygon_.push(add_line(labels[k], d, norm2(d)));
+    }
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    const Line &before = lines_[polygon_.edges[previous(k)]], &after = lines_[polygon_.edges[k]];
+    if (is_edge(before.slot) && is_edge(after.slot)) {
+      const unsigned corner = after.slot & ~kEdgeLabel;
+      if ((before.slot & ~kEdgeLabel) != (corner + 2) % 3) return false;
+      polygon_.corners[k] = {local_[corner], 8 * kUnit * largest_};
+    } else if (!meet(before, after, polygon_.corners[k])) {
+      return false;
+    }
+  }
+  for (std::size_t e = 0; e < line_count_; ++e)
+    for (std::size_t k = 0; k < count; ++k)
+      if (polygon_.edges[k] != e && polygon_.edges[previous(k)] != e && !certainly_inside(k, lines_[e])) return false;
+  bound_polygon();
+  const NeighbourList list = neighbours.list(slot);
+  const std::size_t listed = static_cast<std::size_t>(list.end - list.begin);
+  Screen& screen = screen_of(list);
+  for (std::size_t k = 0; k < std::min(listed, 4 * kBlocks); k += 4) {
+    if (k == 4 * screen.built) build_block(screen, list, k / 4);
+    const Block& block = screen.blocks[k / 4];
+    if (2 * reach_scaled_ < block.half[0]) return true;
+    const unsigned present = (1u << std::min<std::size_t>(4, listed - k)) - 1;
+    for (unsigned lines = may_cut(block) & present; lines; lines &= lines - 1)
+      if (!certainly_passes(list.begin[k + static_cast<unsigned>(std::countr_zero(lines))])) return false;
+  }
+  return listed <= 4 * kBlocks && (list.radius == kInfinity || 4 * reach_ < list.radius * list.radius * (1 - 1e-9));
+}
+
+bool Clipper::certainly_inside(std::size_t k, const Line& line) const {
+  const Corner& corner = polygon_.corners[k];
+  const double error = corner.slack * (std::abs(line.m.x) + std::abs(line.m.y) + std::abs(line.m.z));
+  if (!is_edge(line.slot)) return dot(corner.at, line.m) + error < 0.5 * line.squared * (1 - 1e-12) - kTiny;
+  // A corner of the facet is on the inner side of the edge opposite; elsewhere the edge's normal points inwards if it
+  // runs from its own corner.
+  const Index before = label(previous(k)), after = label(k);
+  if (is_edge(before) && is_edge(after)) return true;
+  const unsigned edge = line.slot & ~kEdgeLabel, origin = facet_->origin[edge];
+  const double height = dot(line.m, corner.at - local_[origin]);
+  return (origin == edge ? height : -height) > 2 * error + kTiny;
+}
+
+bool Clipper::certainly_passes(Index other) const {
+  if (bounded_by(other)) return true;
+  Line line;
+  line.m = seeds_->x[other] - seeds_->x[slot_];
+  line.squared = norm2(line.m);
+  line.slot = other;
+  for (std::size_t k = 0; k < polygon_.size; ++k)
+    if (!certainly_inside(k, line)) return false;
+  return true;
 }
 
 Clipper::Screen& Clipper::screen_of(const NeighbourList& list) {
@@ -179,15 +262,7 @@ void Clipper::cut(Index other, const Vec3& d, double squared) {
     polygon_.size = 0;
     return;
   }
-  if (lines_.size() == line_count_) lines_.resize(2 * line_count_);
-  const unsigned edge = static_cast<unsigned>(line_count_);
-  Line& line = lines_[line_count_++];
-  line.m = d;
-  line.along = cross(facet_->normal, d);
-  line.offset = 0.5 * squared - height_ * dot(facet_->normal, d);
-  line.squared = squared;
-  line.key = std::uint64_t{3} + seeds_->id[other];
-  line.slot = other;
+  const unsigned edge = add_line(other, d, squared);
   // The polygon is convex: its corners on the positive side are consecutive, from `in` up to `last`.
   std::size_t in = 0;
   while (!(sides_[in] > 0 && sides_[previous(in)] < 0)) ++in;
@@ -200,8 +275,8 @@ void Clipper::cut(Index other, const Vec3& d, double squared) {
     k = k + 1 == n ? 0 : k + 1;
   } while (sides_[k] > 0);
   const unsigned leaving = polygon_.edges[last], entering = polygon_.edges[previous(in)];
-  meet(lines_[leaving], line, kept_.push(edge));
-  meet(line, lines_[entering], kept_.push(entering));
+  add_corner(lines_[leaving], lines_[edge], kept_.push(edge));
+  add_corner(lines_[edge], lines_[entering], kept_.push(entering));
   std::swap(polygon_, kept_);
   bounded_ = false;
 }
@@ -228,18 +303,21 @@ void Clipper::bound_polygon() {
 // cross at (c2 t1 - c1 t2) / (t1 . m2). All data are within the facet's distance P of the seed, and with rounded data and
 // operations each term of the numerator is off by less than 250 u P |m1| |m2| and the determinant by 150 u |m1| |m2|
 // (the normal's own error, at most 60 u, included), which bounds the error of the quotient as coded.
-void Clipper::meet(const Line& before, const Line& after, Corner& corner) const {
+bool Clipper::meet(const Line& before, const Line& after, Corner& corner) const {
   const double determinant = dot(before.along, after.m);
   const double squares = before.squared * after.squared;
   const double square = determinant * determinant;
-  if (!(square > kSteep * squares)) {
-    corner.at = exact_vertex(frame(), exact(before), exact(after));
-    corner.slack = 16 * kUnit * largest_;
-    return;
-  }
+  if (!(square > kSteep * squares)) return false;
   const double inverse = 1 / determinant;
   corner.at = foot_ + inverse * (after.offset * before.along - before.offset * after.along);
   corner.slack = 2000 * kUnit * largest_ * std::sqrt(squares / square);
+  return (determinant > 0) == (points_out(before) == points_out(after));
+}
+
+void Clipper::add_corner(const Line& before, const Line& after, Corner& corner) const {
+  if (meet(before, after, corner)) return;
+  corner.at = exact_vertex(frame(), exact(before), exact(after));
+  corner.slack = 16 * kUnit * largest_;
 }
 
 double Clipper::density(std::size_t k) const {
@@ -250,6 +328,14 @@ double Clipper::density(std::size_t k) const {
   return std::min(std::max(value, std::min({r[0], r[1], r[2]})), std::max({r[0], r[1], r[2]}));
 }
 
+// The start of the edge with the smallest label: where the fan of triangles starts.
+std::size_t Clipper::first_corner() const {
+  std::size_t first = 0;
+  for (std::size_t k = 1; k < polygon_.size; ++k)
+    if (lines_[polygon_.edges[k]].key < lines_[polygon_.edges[first]].key) first = k;
+  return first;
+}
+
 template <bool kUniform>
 Moments Clipper::integrate() {
   const std::size_t n = polygon_.size;
@@ -257,10 +343,7 @@ Moments Clipper::integrate() {
     densities_.resize(n);
     for (std::size_t k = 0; k < n; ++k) densities_[k] = density(k);
   }
-  // The fan starts at the edge with the smallest label.
-  std::size_t apex = 0;
-  for (std::size_t k = 1; k < n; ++k)
-    if (lines_[polygon_.edges[k]].key < lines_[polygon_.edges[apex]].key) apex = k;
+  const std::size_t apex = first_corner();
   const auto next = [n](std::size_t k) { return k + 1 == n ? 0 : k + 1; };
   const Vec3 a = vertex(apex);
   const double squared_a = norm2(a);

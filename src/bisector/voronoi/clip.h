@@ -22,6 +22,9 @@ class Clipper {
   void begin(const Facet& facet);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
+  // The same, if the result is bounded by the lines with these labels in this cyclic order (that of an earlier diagram with
+  // nearby seeds), and that is certain without exact arithmetic. Otherwise false, and nothing is known.
+  bool confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count);
   // Takes the whole facet, which the caller knows to lie in the cell.
   void take(Index slot);
 
@@ -32,6 +35,8 @@ class Clipper {
   Index label(std::size_t k) const { return lines_[polygon_.edges[k]].slot; }
   // Bounds the error of each coordinate of vertex k.
   double slack(std::size_t k) const { return polygon_.corners[k].slack; }
+  // The index of the edge with the smallest label.
+  std::size_t first_corner() const;
   // Integrals over the last polygon.
   template <bool kUniform>
   Moments integrate();
@@ -88,11 +93,23 @@ class Clipper {
   void build_block(Screen& screen, const NeighbourList& list, std::size_t block) const;
   // Bit m is set if line m of the block may cut.
   unsigned may_cut(const Block& block) const;
+  void place_lines();
+  unsigned add_line(Index other, const Vec3& towards, double squared);
+  // Whether corner k is certain to lie on the inner side of the line.
+  bool certainly_inside(std::size_t corner, const Line& line) const;
+  bool certainly_passes(Index other) const;
   // Cuts by one neighbour. False if the polygon is empty then.
   bool visit(Index other);
   void bound_polygon();
   void cut(Index other, const Vec3& towards, double squared);
-  void meet(const Line& before, const Line& after, Corner& corner) const;
+  // Whether m points out of the polygon: for a bisector it does, for a facet edge it depends on which way that was taken.
+  bool points_out(const Line& line) const {
+    return !is_edge(line.slot) || facet_->origin[line.slot & ~kEdgeLabel] != (line.slot & ~kEdgeLabel);
+  }
+  // Sets the corner where the lines meet. False if they do so too steeply to be sure of it.
+  bool meet(const Line& before, const Line& after, Corner& corner) const;
+  // The same, by exact arithmetic where need be.
+  void add_corner(const Line& before, const Line& after, Corner& corner) const;
   bool bounded_by(Index other) const;
   double density(std::size_t corner) const;
   std::size_t previous(std::size_t corner) const { return corner ? corner - 1 : polygon_.size - 1; }

@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::size_t kSumBlock = 32;
 constexpr std::size_t kStepNeighbours = 6;
+constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
 constexpr std::size_t kRanges = 8;  // of triangles, in the sort by cells
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -30,6 +31,8 @@ struct Entry {
 struct Chunk {
   std::vector<Entry> entries;
   std::vector<Moments> moments;
+  std::vector<Index> first_label;  // of each of `moments`, in `labels`; and one past the last
+  std::vector<Index> labels;       // bounding lines in cyclic order: slots or facet edges
   RestrictedPolygons polygons;
   Certification certification;
 };
@@ -159,11 +162,12 @@ struct RestrictedVoronoi::Work {
   NeighbourSource built_source = NeighbourSource::nearest;
   std::vector<Index> owner;   // slot of each site
   std::vector<Index> hint;    // owner's seed index in the last diagram
-  std::vector<Chunk> chunks;
+  std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
   std::uint64_t generation = 0;  // of `seeds`
   ThreadLocal<Walker> walkers;
   std::size_t chunk_size = 1;           // facets
-  std::vector<Index> first_entry;       // of each facet, in its chunk
+  std::vector<Index> first_entry, last_first_entry;  // of each facet, in its chunk
+  bool followed = false;                // the slots are those of the last diagram
   struct Item {
     Index facet, moments;
   };
@@ -177,9 +181,12 @@ struct RestrictedVoronoi::Work {
   void clip_facets(bool want_polygons);
   void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
   void emit(const Clipper& clipper, Index triangle, Index slot, Chunk& chunk) const;
+  bool confirm_last(std::size_t facet, Index slot, Clipper& clipper) const;
+  std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
   void sort_items();
   void sum_cells(std::size_t seed_count, CellMoments& result);
   void set_step_masses(CellMoments& result) const;
+  void gather(RestrictedPolygons& polygons) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
   void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_polygons);
 };
@@ -204,7 +211,9 @@ void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
 void RestrictedVoronoi::Work::emit(const Clipper& clipper, Index triangle, Index slot, Chunk& chunk) const {
   RestrictedPolygons& out = chunk.polygons;
   out.pairs.push_back({triangle, seeds.id[slot]});
-  for (std::size_t k = 0; k < clipper.size(); ++k) {
+  const std::size_t first = clipper.first_corner();
+  for (std::size_t e = 0; e < clipper.size(); ++e) {
+    const std::size_t k = (first + e) % clipper.size();
     const Index label = clipper.label(k);
     out.labels.push_back(is_edge(label) ? label : seeds.id[label]);
     out.vertices.push_back(seeds.x[slot] + clipper.vertex(k));
@@ -232,10 +241,14 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
   for (Index site : summary.site) walker.meet(owner[site]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index slot = walker.queue[head];
-    const bool found = clipper.clip(neighbours, slot);
-    chunk.certification.uncertain += clipper.uncertain();
-    chunk.certification.wider += clipper.wider();
-    if (!found) continue;
+    if (!confirm_last(index, slot, clipper)) {
+      const bool found = clipper.clip(neighbours, slot);
+      chunk.certification.uncertain += clipper.uncertain();
+      chunk.certification.wider += clipper.wider();
+      if (!found) continue;
+    }
+    chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
+    for (std::size_t k = 0; k < clipper.size(); ++k) chunk.labels.push_back(clipper.label(k));
     for (std::size_t k = 0; k < clipper.size(); ++k)
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
     chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
@@ -244,10 +257,33 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
   }
 }
 
+// Whether the pair is bounded as it was in the last diagram.
+bool RestrictedVoronoi::Work::confirm_last(std::size_t facet, Index slot, Clipper& clipper) const {
+  if (!followed) return false;
+  const Chunk& chunk = last_chunks[facet / chunk_size];
+  const std::size_t begin = last_first_entry[facet], end = entries_end(facet, chunk, last_first_entry);
+  if (end - begin > kMostRemembered) return false;
+  for (std::size_t k = begin; k < end; ++k) {
+    const Entry& entry = chunk.entries[k];
+    if (entry.slot != slot || entry.moments == kWhole) continue;
+    const Index first = chunk.first_label[entry.moments];
+    return clipper.confirm(neighbours, slot, chunk.labels.data() + first, chunk.first_label[entry.moments + 1] - first);
+  }
+  return false;
+}
+
+std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk& chunk,
+                                                 const std::vector<Index>& first) const {
+  const bool last = facet + 1 == first.size() || (facet + 1) % chunk_size == 0;
+  return last ? chunk.entries.size() : first[facet + 1];
+}
+
 void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
   const std::size_t n = surface.facets.size();
   // Small chunks where facets are few and large.
   chunk_size = std::clamp<std::size_t>(n / 256, 1, 512);
+  chunks.swap(last_chunks);
+  first_entry.swap(last_first_entry);
   chunks.resize((n + chunk_size - 1) / chunk_size);
   first_entry.resize(n);
   ++generation;
@@ -255,6 +291,8 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
     Chunk& chunk = chunks[c];
     chunk.entries.clear();
     chunk.moments.clear();
+    chunk.first_label.clear();
+    chunk.labels.clear();
     chunk.polygons = {};
     chunk.certification = {};
     Walker& walker = walkers.local();
@@ -266,6 +304,7 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
       first_entry[k] = static_cast<Index>(chunk.entries.size());
       clip_facet(k, walker, chunk, want_polygons);
     }
+    chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
   });
 }
 
@@ -279,8 +318,7 @@ void RestrictedVoronoi::Work::sort_items() {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
       const Chunk& chunk = chunks[facet / chunk_size];
-      const bool last = facet + 1 == first_entry.size() || (facet + 1) % chunk_size == 0;
-      const std::size_t stop = last ? chunk.entries.size() : first_entry[facet + 1];
+      const std::size_t stop = entries_end(facet, chunk, first_entry);
       for (std::size_t k = first_entry[facet]; k < stop; ++k) visit(facet, chunk.entries[k]);
     }
   };
@@ -373,7 +411,8 @@ bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSo
 void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,
                                        bool want_polygons) {
   const auto t0 = std::chrono::steady_clock::now();
-  if (!follow(given, source)) {
+  followed = follow(given, source);
+  if (!followed) {
     seeds = sort_seeds(given);
     neighbours.build(seeds, source);
     built_source = source;
@@ -389,6 +428,35 @@ void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neighbour
                     seconds_since(t2)};
 }
 
+// Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of triangles,
+// then cells.
+void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
+  polygons = {};
+  polygons.pairs.reserve(items.size());
+  polygons.offsets.reserve(items.size() + 1);
+  std::size_t entries = 0;
+  for (const Chunk& chunk : chunks) entries += chunk.polygons.labels.size();
+  polygons.labels.reserve(entries);
+  polygons.vertices.reserve(entries);
+  std::vector<std::size_t> order;
+  for (const Index facet : surface.facet_of) {
+    if (facet == kNone) continue;
+    const Chunk& chunk = chunks[facet / chunk_size];
+    const RestrictedPolygons& from = chunk.polygons;
+    order.clear();
+    for (std::size_t k = first_entry[facet]; k < entries_end(facet, chunk, first_entry); ++k) order.push_back(k);
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return from.pairs[a].cell < from.pairs[b].cell; });
+    for (const std::size_t k : order) {
+      polygons.pairs.push_back(from.pairs[k]);
+      const auto begin = static_cast<std::ptrdiff_t>(from.offsets[k]), end = static_cast<std::ptrdiff_t>(from.offsets[k + 1]);
+      polygons.labels.insert(polygons.labels.end(), from.labels.begin() + begin, from.labels.begin() + end);
+      polygons.vertices.insert(polygons.vertices.end(), from.vertices.begin() + begin, from.vertices.begin() + end);
+      polygons.offsets.push_back(polygons.labels.size());
+    }
+  }
+}
+
 RestrictedVoronoi::RestrictedVoronoi(const Surface& surface) : work_(std::make_unique<Work>(surface)) {}
 RestrictedVoronoi::~RestrictedVoronoi() = default;
 
@@ -399,31 +467,7 @@ void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource
 void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
                                  RestrictedPolygons& polygons) {
   work_->evaluate(seeds, source, result, true);
-  // Chunks are in spatial order; the result is in order of triangles, then cells.
-  struct Place {
-    Index triangle, cell, chunk, piece;
-  };
-  std::vector<Place> order;
-  order.reserve(result.certification.pairs);
-  const auto& chunks = work_->chunks;
-  for (Index c = 0; c < chunks.size(); ++c)
-    for (Index k = 0; k < chunks[c].polygons.pairs.size(); ++k)
-      order.push_back({chunks[c].polygons.pairs[k].triangle, chunks[c].polygons.pairs[k].cell, c, k});
-  sort_in_parallel(order, [](const Place& a, const Place& b) {
-    return a.triangle != b.triangle ? a.triangle < b.triangle : a.cell < b.cell;
-  });
-  polygons = {};
-  polygons.pairs.reserve(order.size());
-  polygons.offsets.reserve(order.size() + 1);
-  for (const Place& e : order) {
-    const RestrictedPolygons& from = chunks[e.chunk].polygons;
-    polygons.pairs.push_back({e.triangle, e.cell});
-    const auto begin = static_cast<std::ptrdiff_t>(from.offsets[e.piece]);
-    const auto end = static_cast<std::ptrdiff_t>(from.offsets[e.piece + 1]);
-    polygons.labels.insert(polygons.labels.end(), from.labels.begin() + begin, from.labels.begin() + end);
-    polygons.vertices.insert(polygons.vertices.end(), from.vertices.begin() + begin, from.vertices.begin() + end);
-    polygons.offsets.push_back(polygons.labels.size());
-  }
+  work_->gather(polygons);
 }
 
 namespace {
