@@ -219,6 +219,35 @@ TEST_P(Medium, EverySourceAndThreadCountGivesTheSameBits) {
   expect_same_moments(moments, reference.moments);
 }
 
+// The optimiser's use: seeds that move a little, or jump, change their number, coincide, and come back.
+TEST_P(Medium, AUsedObjectAnswersAsAFreshOne) {
+  const auto& [name, mesh, seeds] = GetParam();
+  const Surface surface(mesh);
+  const double size = bounding_box(mesh.vertices).diagonal();
+  RestrictedVoronoi used(surface);
+  SplitMix64 random(35);
+  std::vector<Vec3> moving = seeds;
+  for (int step = 0; step < 9; ++step) {
+    const double reach = step % 3 == 2 ? 0.1 : std::pow(10, -2.0 - step);
+    for (Vec3& x : moving)
+      if (step % 4 || random.below(4) == 0)
+        x += reach * size * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    if (step == 3) moving.resize(moving.size() - moving.size() / 3);
+    if (step == 5) moving.push_back(moving[0]);
+    if (step == 6) std::fill(moving.begin(), moving.begin() + static_cast<std::ptrdiff_t>(moving.size() / 2), moving[0]);
+    if (step == 7) moving = seeds;
+    const NeighbourSource source = kSources[step == 4];
+    CellMoments got, want;
+    used.evaluate(moving, source, got);
+    RestrictedVoronoi(surface).evaluate(moving, source, want);
+    SCOPED_TRACE(step);
+    expect_same_moments(got, want);
+    EXPECT_TRUE(same_bits(got.step_mass, want.step_mass));
+    EXPECT_NEAR(got.mass, surface.mass, 1e-12 * surface.mass);
+    if (HasFailure()) return;
+  }
+}
+
 // Step masses steer the optimiser, so they may not depend on the source either.
 TEST_P(Medium, StepMassesAreTheSameForBothSources) {
   const auto& [name, mesh, seeds] = GetParam();
@@ -405,6 +434,31 @@ TEST(Restricted, CoversARotatedRodOfLongTriangles) {
       expect_sound(surface, d);
       expect_same_diagram(diagram_of(surface, seeds, NeighbourSource::delaunay), d);
     }
+  }
+}
+
+// Distances whose squares nearly leave the range of double.
+TEST(Restricted, SeedsMayBeAsCloseAsTheRangeAllows) {
+  const TriangleMesh mesh = grid_patch(2, 2);
+  const Surface surface(mesh);
+  for (double e : {1e-20, 1e-100, 1e-150}) {
+    const std::vector<Vec3> seeds{{1, 1, 0}, {0, 0, 0}, {e, 0, 0}, {0, e, 0}, {0, 0, e}};
+    SCOPED_TRACE(e);
+    for (NeighbourSource source : kSources) expect_sound(surface, diagram_of(surface, seeds, source));
+  }
+}
+
+// All cells meet on the surface, seen from ever farther away.
+TEST(Restricted, SeedsMayBeFarAway) {
+  const TriangleMesh mesh = icosphere(4);
+  const Surface surface(mesh);
+  for (double distance : {10.0, 1e3, 1e4}) {
+    std::vector<Vec3> seeds = round_seeds(100, false);
+    for (Vec3& x : seeds) x = (distance / 0.75) * (x - Vec3{0.5, 0.5, 0.25});
+    SCOPED_TRACE(distance);
+    const Diagram d = diagram_of(surface, seeds, NeighbourSource::nearest);
+    expect_sound(surface, d);
+    expect_same_diagram(diagram_of(surface, seeds, NeighbourSource::delaunay), d);
   }
 }
 

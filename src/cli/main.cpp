@@ -152,7 +152,7 @@ CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
       ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
   app->add_option("--tolerance", command.options.tolerance,
                   "end a level when the energy falls by less than this\n"
-                  "share per iteration; default 1.2e-5")
+                  "share per iteration; default 1e-6")
       ->type_name("T")->check(number_below(1))->group("Optimisation");
   app->add_option("--levels", command.options.levels,
                   "coarse-to-fine levels, 1 to 8; default: as many as the\n"

@@ -11,7 +11,7 @@ namespace bisector {
 
 struct OptimiseOptions {
   int iterations = 100;        // accepted steps at most
-  double tolerance = 1.2e-5;     // stop when the energy falls by less than this share per step, over five steps
+  double tolerance = 1e-6;     // stop when the energy falls by less than this share per step, over five steps
   bool constrained = false;    // CCVT: seeds stay on the surface, gradients in its tangent planes
   std::string phase;           // for progress
   double done = 0, share = 1;  // of the whole run: fraction before this optimisation, and its own

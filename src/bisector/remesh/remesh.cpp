@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -18,7 +19,16 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kConstrainedShare = 0.3;  // of the steps of a level that the last, constrained ones take
+// Of the steps allowed per level: the coarsest of several levels settles soon, the finest starts near its minimum, and seeds that
+// are put on the surface move little.
+constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0.05;
+
+double steps_share(std::size_t level, std::size_t levels) {
+  if (levels == 1) return 1;
+  return level + 1 == levels ? kFinestShare : level == 0 ? kCoarsestShare : 1;
+}
+
+int share_of(int iterations, double share) { return static_cast<int>(std::ceil(iterations * share)); }
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -55,15 +65,16 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   const auto cost = [&](std::size_t seeds) { return static_cast<double>(surface.facets.size() + 3 * seeds); };
   const bool constrain = options.energy == Energy::constrained;
   double total = constrain ? kConstrainedShare * cost(counts.back()) : 0;
-  for (std::size_t count : counts) total += cost(count);
+  for (std::size_t level = 0; level < counts.size(); ++level) total += steps_share(level, counts.size()) * cost(counts[level]);
 
   OptimiseOptions step;
-  step.iterations = options.iterations;
   step.share = 0;
   step.tolerance = options.tolerance;
   for (std::size_t level = 0; level < counts.size(); ++level) {
     step.phase = counts.size() > 1 ? fmt::format("level {}/{}", level + 1, counts.size()) : "optimising";
-    step.done += std::exchange(step.share, cost(counts[level]) / total);
+    const double share = steps_share(level, counts.size());
+    step.iterations = share_of(options.iterations, share);
+    step.done += std::exchange(step.share, share * cost(counts[level]) / total);
     optimise(backend, state, step, totals, context);
     if (level + 1 == counts.size()) break;
     backend.evaluate(state.seeds, state.moments, polygons);
@@ -76,6 +87,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   if (constrain) {
     step.constrained = true;
     step.phase = "on the surface";
+    step.iterations = share_of(options.iterations, kConstrainedShare);
     step.done += std::exchange(step.share, kConstrainedShare * cost(counts.back()) / total);
     optimise(backend, state, step, totals, context);
   }

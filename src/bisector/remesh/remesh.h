@@ -27,8 +27,8 @@ struct RemeshOptions {
   std::size_t vertices = 0;                // wanted; at least 4
   std::vector<Vec3> seeds;                 // start from these instead of random ones, in one level; empty: random
   std::uint64_t random_seed = 1;
-  int iterations = 100;                    // at most, per level
-  double tolerance = 1.2e-5;                 // a level ends when the energy falls by less than this share per step
+  int iterations = 100;                    // at most, per level; fewer on the coarsest and the finest of several
+  double tolerance = 1e-6;                 // a level ends when the energy falls by less than this share per step
   int levels = 0;                          // of the multilevel start; 0: as many as the count allows, at most 3
   Energy energy = Energy::constrained;
   TopologyControl topology = TopologyControl::enforce;

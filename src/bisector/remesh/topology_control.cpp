@@ -134,7 +134,7 @@ bool same_topology(const MeshTopology& dual, const MeshTopology& input) {
 
 void enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
                       OptimiseOptions options, OptimiseTotals& totals, const Context& context) {
-  options.iterations = std::min(options.iterations, kStepsPerRound);
+  options.iterations = kStepsPerRound;
   options.done = 1;
   options.share = 0;
   const std::size_t count = state.seeds.size();
