@@ -175,6 +175,32 @@ TEST_P(Lists, DependOnTheSeedsAlone) {
   }
 }
 
+// After the seeds have moved, lists are either refused or still sorted and certified, as are wider ones.
+TEST_P(Lists, AreCertifiedAfterAnUpdate) {
+  SortedSeeds seeds = sort_seeds(GetParam().seeds);
+  SplitMix64 random(15);
+  Neighbours neighbours;
+  neighbours.build(seeds, NeighbourSource::nearest);
+  // In units of the shortest radius, so that some are worth it.
+  double shortest = 1;
+  for (Index slot = 0; slot < seeds.x.size(); ++slot) shortest = std::min(shortest, neighbours.list(slot).radius);
+  for (double reach : {1e-3, 0.01, 0.03, 0.1}) {
+    for (Vec3& x : seeds.x)
+      x += reach * shortest * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    if (!neighbours.update()) neighbours.build(seeds, NeighbourSource::nearest);
+    const Index step = std::max<Index>(1, static_cast<Index>(seeds.x.size() / 200));
+    for (Index slot = 0; slot < seeds.x.size(); slot += step) {
+      const NeighbourList list = neighbours.list(slot);
+      expect_certified(seeds, slot, list, true);
+      if (HasFatalFailure()) return;
+      if (list.radius == kInfinity) continue;
+      const NeighbourList wider = neighbours.wider(slot, list);
+      expect_certified(seeds, slot, wider, wider.radius < kInfinity);
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
 TEST_P(Lists, NearestAndAroundAgreeWithBruteForce) {
   const SortedSeeds seeds = sort_seeds(GetParam().seeds);
   Neighbours neighbours;

@@ -279,6 +279,25 @@ void PrintTo(const MediumCase& problem, std::ostream* out) { *out << problem.nam
 INSTANTIATE_TEST_SUITE_P(Restricted, Medium, testing::ValuesIn(medium_cases()),
                          [](const auto& instance) { return test_name(instance.param.name); });
 
+// Lists that were made for earlier positions hold seeds beyond the radius that they still answer for.
+TEST(Restricted, FollowsSeedsThatMoveByAFractionOfTheirSpacing) {
+  const TriangleMesh mesh = grid_patch(40, 30);
+  const Surface surface(mesh);
+  for (std::uint64_t trial = 0; trial < 6; ++trial) {
+    SplitMix64 random(trial);
+    RestrictedVoronoi used(surface);
+    std::vector<Vec3> seeds = random_seeds(mesh, 5000, trial);
+    for (int step = 0; step < 4; ++step) {
+      SCOPED_TRACE("trial " + std::to_string(trial) + ", step " + std::to_string(step));
+      const Diagram d = diagram_of(used, seeds, NeighbourSource::nearest);
+      expect_sound(surface, d);
+      expect_same_diagram(d, diagram_of(surface, seeds, NeighbourSource::nearest));
+      if (HasFailure()) return;
+      for (Vec3& x : seeds) x += 0.05 * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    }
+  }
+}
+
 // --- Moments by quadrature ---
 
 // Six points, exact for polynomials of degree 4 (Dunavant 1985).

@@ -13,7 +13,7 @@
 namespace bisector {
 
 enum class TopologyControl {
-  enforce,  // move seeds to where the dual is not a manifold like the input, and optimise again
+  enforce,  // move seeds to where the dual is not a manifold like the input, or add some, and optimise again
   check,    // report only
   off,
 };

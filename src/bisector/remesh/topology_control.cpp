@@ -1,6 +1,7 @@
 #include "bisector/remesh/topology_control.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -10,8 +11,11 @@
 namespace bisector {
 namespace {
 
-constexpr int kRounds = 12;
-constexpr int kStepsPerRound = 30;
+constexpr int kRounds = 24;
+constexpr int kMovingRounds = 4;  // the first; later ones add seeds, for a surface may need more than were asked for
+// Many steps spread what was added all over the surface, few leave it where it is needed: fewer and fewer.
+constexpr int kFirstSteps = 30, kLastSteps = 2;
+constexpr std::size_t kMostAdded = 100;  // and a quarter of the seeds
 
 // Seeds of edges with other than two triangles (one, on an open surface), of vertices without a single fan of triangles, of
 // repeated triangles, and seeds without any.
@@ -134,24 +138,34 @@ bool same_topology(const MeshTopology& dual, const MeshTopology& input) {
 
 void enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
                       OptimiseOptions options, OptimiseTotals& totals, const Context& context) {
-  options.iterations = kStepsPerRound;
   options.done = 1;
   options.share = 0;
-  const std::size_t count = state.seeds.size();
+  const std::size_t most = state.seeds.size() + state.seeds.size() / 4 + kMostAdded;
+  std::vector<Vec3> best;
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (int round = 0;; ++round) {
+    const std::size_t count = state.seeds.size();
     backend.evaluate(state.seeds, state.moments, polygons);
-    if (!input.manifold || !input.oriented || round == kRounds) return;
+    if (!input.manifold || !input.oriented) return;
     const Dual dual = extract_dual(polygons);
     if (same_topology(analyse_topology(dual.triangles, count), input)) return;
     const std::vector<Index> cells = broken_cells(dual, count, input.closed);
+    if (cells.size() < fewest) {
+      fewest = cells.size();
+      best = state.seeds;
+    }
     std::vector<Vec3> points = repair_points(backend.surface(), polygons, state.seeds, cells);
-    if (points.empty()) return;
     points.resize(std::min(points.size(), count / 4));
+    if (points.empty() || round == kRounds || count + points.size() > most) break;
+    options.iterations = std::max(kLastSteps, kFirstSteps * (kRounds - 2 * round) / kRounds);
     options.phase = "topology, round " + std::to_string(round + 1);
-    set_count(polygons, state.moments, count - points.size(), state.seeds);
+    if (round < kMovingRounds) set_count(polygons, state.moments, count - points.size(), state.seeds);
     state.seeds.insert(state.seeds.end(), points.begin(), points.end());
     optimise(backend, state, options, totals, context);
   }
+  // No round did it: the one that came nearest is the result.
+  state.seeds = best;
+  backend.evaluate(state.seeds, state.moments, polygons);
 }
 
 }  // namespace bisector

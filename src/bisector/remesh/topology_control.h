@@ -14,9 +14,10 @@ TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons&
 // Whether `dual` is manifold and oriented, and closed and of Euler characteristic and components as the input.
 bool same_topology(const MeshTopology& dual, const MeshTopology& input);
 
-// While the dual differs in topology from a manifold input: moves seeds from where the energy is lowest to the cells that
-// break it, and optimises again. The number of seeds stays. Gives up after a bounded number of rounds. `polygons` and
-// state.moments are those of the final seeds.
+// While the dual differs in topology from a manifold input: moves seeds from where they are densest to the cells that break
+// it, and optimises again; where that does not do, adds seeds there (thesis 4.4.4). Gives up after a bounded number of rounds,
+// and then goes back to the seeds with the fewest broken cells.
+// `polygons` and state.moments are those of the final seeds.
 void enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
                       OptimiseOptions options, OptimiseTotals& totals, const Context& context);
 
