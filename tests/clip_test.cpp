@@ -1,5 +1,5 @@
-// The clipper's error bounds and filtered decisions against exact arithmetic, and the exact predicates against rationals
-// and their own symmetries.
+// The clipper's error bounds and filtered decisions against exact arithmetic, and the exact predicates against
+// rationals and their own symmetries.
 #include "bisector/voronoi/clip.h"
 
 #include <gmpxx.h>
@@ -99,7 +99,9 @@ struct ExactClipper {
   const Facet& facet;
   Index slot;
 
-  ExactFrame frame() const { return {{facet.corners[0], facet.corners[1], facet.corners[2]}, seeds.x[slot], seeds.id[slot]}; }
+  ExactFrame frame() const {
+    return {{facet.corners[0], facet.corners[1], facet.corners[2]}, seeds.x[slot], seeds.id[slot]};
+  }
   ExactLine line(Index label) const {
     if (is_edge(label)) return ExactLine::edge(static_cast<int>(((label & ~kEdgeLabel) + 2) % 3));
     return ExactLine::bisector(seeds.x[label], seeds.id[label]);
@@ -240,7 +242,8 @@ INSTANTIATE_TEST_SUITE_P(Clip, ClipBounds,
 TEST(Clip, IntegerProblemsAreClippedAsInExactArithmetic) {
   SplitMix64 random(5);
   const auto point = [&] {
-    return Vec3{static_cast<double>(random.below(5)), static_cast<double>(random.below(5)), static_cast<double>(random.below(5))};
+    return Vec3{static_cast<double>(random.below(5)), static_cast<double>(random.below(5)),
+                static_cast<double>(random.below(5))};
   };
   Tally tally;
   for (int trial = 0; trial < 3000; ++trial) {
@@ -343,7 +346,8 @@ TEST(Exact, SideIsTheSignOfTheDeterminantWhereThatIsNotZero) {
 TEST(Exact, CornersAreAntisymmetricAndTiesGoToTheLowerIndex) {
   SplitMix64 random(13);
   const auto point = [&] {
-    return Vec3{static_cast<double>(random.below(4)), static_cast<double>(random.below(4)), static_cast<double>(random.below(4))};
+    return Vec3{static_cast<double>(random.below(4)), static_cast<double>(random.below(4)),
+                static_cast<double>(random.below(4))};
   };
   for (int trial = 0; trial < 20'000; ++trial) {
     const Vec3 q = point(), x = point(), y = point();
@@ -365,7 +369,8 @@ TEST(Exact, CornersAreAntisymmetricAndTiesGoToTheLowerIndex) {
 TEST(Exact, CornersDecideAlikeInBothForms) {
   SplitMix64 random(14);
   const auto point = [&] {
-    return Vec3{static_cast<double>(random.below(4)), static_cast<double>(random.below(4)), static_cast<double>(random.below(4))};
+    return Vec3{static_cast<double>(random.below(4)), static_cast<double>(random.below(4)),
+                static_cast<double>(random.below(4))};
   };
   for (int trial = 0; trial < 10'000; ++trial) {
     const Vec3 a = point(), b = point(), c = point(), x = point(), y = point();
@@ -373,8 +378,9 @@ TEST(Exact, CornersDecideAlikeInBothForms) {
     const Index i = static_cast<Index>(random.below(2)), j = 1 - i;
     const ExactFrame frame{{a, b, c}, x, i};
     for (int m = 0; m < 3; ++m)
-      EXPECT_EQ(exact_side(frame, ExactLine::edge((m + 1) % 3), ExactLine::edge((m + 2) % 3), ExactLine::bisector(y, j)),
-                exact_side(frame.corners[m], x, i, y, j));
+      EXPECT_EQ(
+          exact_side(frame, ExactLine::edge((m + 1) % 3), ExactLine::edge((m + 2) % 3), ExactLine::bisector(y, j)),
+          exact_side(frame.corners[m], x, i, y, j));
   }
 }
 
@@ -382,7 +388,8 @@ TEST(Exact, CornersDecideAlikeInBothForms) {
 TEST(Exact, AVertexDecidesAlikeFromEveryCellItTouches) {
   SplitMix64 random(15);
   const auto point = [&] {
-    return Vec3{static_cast<double>(random.below(4)), static_cast<double>(random.below(4)), static_cast<double>(random.below(4))};
+    return Vec3{static_cast<double>(random.below(4)), static_cast<double>(random.below(4)),
+                static_cast<double>(random.below(4))};
   };
   std::size_t on_edges = 0, inside = 0, ties = 0;
   for (int trial = 0; trial < 100'000; ++trial) {
@@ -392,7 +399,9 @@ TEST(Exact, AVertexDecidesAlikeFromEveryCellItTouches) {
     for (Vec3& p : x) p = point();
     std::array<Index, 4> id{0, 1, 2, 3};
     for (std::size_t k = 4; k > 1; --k) std::swap(id[k - 1], id[random.below(k)]);
-    const auto frame = [&](int i) { return ExactFrame{{corners[0], corners[1], corners[2]}, x[i], id[static_cast<std::size_t>(i)]}; };
+    const auto frame = [&](int i) {
+      return ExactFrame{{corners[0], corners[1], corners[2]}, x[i], id[static_cast<std::size_t>(i)]};
+    };
     const auto line = [&](int i) { return ExactLine::bisector(x[i], id[static_cast<std::size_t>(i)]); };
     const auto turn = [&](const ExactFrame& f, const ExactLine& a, const ExactLine& b) {
       const RationalRow at = cross(rational_row(f, a), rational_row(f, b));
@@ -447,8 +456,8 @@ TEST(Exact, FourCocircularSeedsAreSplitByTheLowestIndex) {
     const Index next = (lowest + 1) % 4, across = (lowest + 2) % 4, last = (lowest + 3) % 4;
     // The heaviest cell grows over the middle: the vertex of the three others belongs to it, from each of their cells.
     const ExactFrame frame{{corners[0], corners[1], corners[2]}, around[next], id(next)};
-    EXPECT_EQ(exact_side(frame, ExactLine::bisector(around[across], id(across)), ExactLine::bisector(around[last], id(last)),
-                         ExactLine::bisector(around[lowest], id(lowest))),
+    EXPECT_EQ(exact_side(frame, ExactLine::bisector(around[across], id(across)),
+                         ExactLine::bisector(around[last], id(last)), ExactLine::bisector(around[lowest], id(lowest))),
               -1);
   }
 }

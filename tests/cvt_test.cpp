@@ -129,8 +129,8 @@ double quadratic(const std::vector<double>& curvature, const std::vector<Vec3>& 
   return value;
 }
 
-// With exact line searches and full memory L-BFGS runs through conjugate directions (Nocedal and Wright, theorem 7.4 and
-// section 7.2): as many steps as there are distinct eigenvalues.
+// With exact line searches and full memory L-BFGS runs through conjugate directions (Nocedal and Wright, theorem 7.4
+// and section 7.2): as many steps as there are distinct eigenvalues.
 TEST(Lbfgs, MinimisesAQuadraticInAsManyStepsAsEigenvalues) {
   constexpr std::size_t n = 40;
   std::vector<double> curvature, diagonal;
@@ -445,7 +445,8 @@ TEST(Constrain, NearestOnTriangleOfCornersEdgesAndFaces) {
 
 // Two parallel sheets: a seed between them goes to the sheet of its own cell, though the other one may be nearer.
 TEST(Constrain, ProjectsToTheOwnCellAndNotThroughAThinPart) {
-  const TriangleMesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0.1}, {1, 0, 0.1}, {0, 1, 0.1}}, {{0, 2, 1}, {3, 4, 5}}, {}};
+  const TriangleMesh mesh{
+      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0.1}, {1, 0, 0.1}, {0, 1, 0.1}}, {{0, 2, 1}, {3, 4, 5}}, {}};
   const Surface surface(mesh);
   Csr<Index> cells;
   cells.offsets = {0, 1, 2, 2};
@@ -477,7 +478,8 @@ TEST(Multilevel, LevelsFollowTheCountOfEdgeMidpoints) {
       }
       if (counts.size() == 3) {
         // DESIGN: a closed surface starts at round((N + 15 chi) / 16), here after two roundings.
-        EXPECT_NEAR(static_cast<double>(counts[0]), (static_cast<double>(count) + 15.0 * static_cast<double>(euler)) / 16, 1);
+        EXPECT_NEAR(static_cast<double>(counts[0]),
+                    (static_cast<double>(count) + 15.0 * static_cast<double>(euler)) / 16, 1);
       }
     }
   EXPECT_EQ(level_counts(10'000, 2, 1, 1), (std::vector<std::size_t>{10'000}));

@@ -12,6 +12,7 @@
 #include "bisector/core/parallel.h"
 #include "bisector/voronoi/dual.h"
 #include "bisector/voronoi/restricted.h"
+#include "bisector/voronoi/tiling.h"
 #include "models.h"
 
 namespace bisector::test {

@@ -78,7 +78,8 @@ std::vector<SeedCase> seed_cases() {
       {"geometric", geometric(300)},
       {"duplicates", repeated(ball({0, 0, 0}, 1, 700, 5), 3)},
       {"two balls", joined(ball({0, 0, 0}, 1e-3, 1000, 6), ball({1, 0, 0}, 1e-4, 1000, 7))},
-      {"nested balls", joined(ball({0, 0, 0}, 1, 500, 8), joined(ball({0, 0, 0}, 1e-3, 500, 9), ball({0, 0, 0}, 1e-7, 500, 10)))},
+      {"nested balls",
+       joined(ball({0, 0, 0}, 1, 500, 8), joined(ball({0, 0, 0}, 1e-3, 500, 9), ball({0, 0, 0}, 1e-7, 500, 10)))},
       {"cluster and a few", joined(ball({0.5, 0.5, 0.5}, 1e-6, 3000, 11), ball({0, 0, 0}, 1, 100, 12))},
       {"cospherical", cospherical_seeds()},
   };
@@ -209,7 +210,8 @@ TEST_P(Lists, NearestAndAroundAgreeWithBruteForce) {
   for (int sample = 0; sample < 300; ++sample) {
     const Vec3 near = seeds.x[random.below(seeds.x.size())];
     const double spread = (0.01 + seeds.extent) * std::pow(10, random.range(-8, 0.5));
-    const Vec3 q = sample % 5 ? near + spread * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)} : near;
+    const Vec3 q =
+        sample % 5 ? near + spread * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)} : near;
     double best = kInfinity;
     for (const Vec3& x : seeds.x) best = std::min(best, norm2(x - q));
     ASSERT_LE(norm2(seeds.x[neighbours.nearest(q)] - q), best * (1 + 1e-12));
@@ -361,7 +363,8 @@ TEST(DelaunayNeighbours, ContainEveryEmptySphereOfIntegerSeeds) {
     std::set<std::array<int, 3>> chosen;
     const std::size_t count = 5 + random.below(14);
     while (chosen.size() < count)
-      chosen.insert({static_cast<int>(random.below(4)), static_cast<int>(random.below(4)), static_cast<int>(random.below(4))});
+      chosen.insert(
+          {static_cast<int>(random.below(4)), static_cast<int>(random.below(4)), static_cast<int>(random.below(4))});
     std::vector<Vec3> seeds;
     for (const auto& [x, y, z] : chosen)
       seeds.push_back({static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
@@ -377,7 +380,8 @@ TEST(DelaunayNeighbours, ContainEveryEmptySphereOfIntegerSeeds) {
             const Vec3 u = seeds[b] - seeds[a], v = seeds[c] - seeds[a], w = seeds[d] - seeds[a];
             const double volume = dot(u, cross(v, w));
             if (volume == 0) continue;
-            const Vec3 centre = norm2(u) * cross(v, w) + norm2(v) * cross(w, u) + norm2(w) * cross(u, v);  // times 2 volume
+            const Vec3 centre =
+                norm2(u) * cross(v, w) + norm2(v) * cross(w, u) + norm2(w) * cross(u, v);  // times 2 volume
             bool empty = true;
             for (Index e = 0; e < n && empty; ++e) {
               const Vec3 p = seeds[e] - seeds[a];

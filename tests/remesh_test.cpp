@@ -229,7 +229,8 @@ TEST(RemeshErrors, AreOneLineThatSaysWhatToDo) {
     }
     return std::string();
   };
-  for (std::size_t vertices : {0u, 1u, 3u}) EXPECT_NE(message(icosphere(1), options_for(vertices)).find("4"), std::string::npos);
+  for (std::size_t vertices : {0u, 1u, 3u})
+    EXPECT_NE(message(icosphere(1), options_for(vertices)).find("4"), std::string::npos);
   RemeshOptions seeded;
   seeded.seeds = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
   EXPECT_FALSE(message(icosphere(1), seeded).empty());

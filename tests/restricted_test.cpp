@@ -32,7 +32,9 @@ std::vector<Index> rotated(std::vector<Index> cycle) {
 }
 
 std::vector<Index> cycle_of(const RestrictedPolygons& polygons, std::size_t k) {
-  const auto at = [&](std::size_t p) { return polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[p]); };
+  const auto at = [&](std::size_t p) {
+    return polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[p]);
+  };
   return rotated({at(k), at(k + 1)});
 }
 
@@ -103,7 +105,8 @@ class Integers : public testing::TestWithParam<std::uint64_t> {};
 constexpr std::uint64_t kIntegerCases = 8000, kIntegerBlock = 500;
 
 TEST_P(Integers, AgreeWithTheOracle) {
-  for (std::uint64_t k = GetParam(); k < GetParam() + kIntegerBlock && !HasFailure(); ++k) expect_oracle(integer_case(k));
+  for (std::uint64_t k = GetParam(); k < GetParam() + kIntegerBlock && !HasFailure(); ++k)
+    expect_oracle(integer_case(k));
 }
 
 INSTANTIATE_TEST_SUITE_P(Restricted, Integers,
@@ -166,9 +169,15 @@ std::vector<MediumCase> medium_cases() {
     const char* name;
     TriangleMesh mesh;
   };
-  const std::vector<Named> meshes{{"icosphere", icosphere(4)}, {"torus", torus(60, 40)},   {"wavy patch", wavy_patch(40)},
-                                  {"box", box(16)},            {"grid patch", grid_patch(40, 30)}, {"pages", pages()},
-                                  {"two spheres", two_spheres()}, {"soup", soup(400, 41)}, {"needles", needles()}};
+  const std::vector<Named> meshes{{"icosphere", icosphere(4)},
+                                  {"torus", torus(60, 40)},
+                                  {"wavy patch", wavy_patch(40)},
+                                  {"box", box(16)},
+                                  {"grid patch", grid_patch(40, 30)},
+                                  {"pages", pages()},
+                                  {"two spheres", two_spheres()},
+                                  {"soup", soup(400, 41)},
+                                  {"needles", needles()}};
   std::vector<MediumCase> cases;
   for (const auto& [name, mesh] : meshes) {
     const auto add = [&](const char* what, std::vector<Vec3> seeds) {
@@ -234,7 +243,8 @@ TEST_P(Medium, AUsedObjectAnswersAsAFreshOne) {
         x += reach * size * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
     if (step == 3) moving.resize(moving.size() - moving.size() / 3);
     if (step == 5) moving.push_back(moving[0]);
-    if (step == 6) std::fill(moving.begin(), moving.begin() + static_cast<std::ptrdiff_t>(moving.size() / 2), moving[0]);
+    if (step == 6)
+      std::fill(moving.begin(), moving.begin() + static_cast<std::ptrdiff_t>(moving.size() / 2), moving[0]);
     if (step == 7) moving = seeds;
     const NeighbourSource source = kSources[step == 4];
     CellMoments got, want;
@@ -495,7 +505,8 @@ TEST(Restricted, NearestSeedsOfRandomPointsArePairs) {
     double r = random.unit(), s = random.unit();
     if (r + s > 1) r = 1 - r, s = 1 - s;
     const auto& [a, b, c] = mesh.triangles[t];
-    const Vec3 p = mesh.vertices[a] + r * (mesh.vertices[b] - mesh.vertices[a]) + s * (mesh.vertices[c] - mesh.vertices[a]);
+    const Vec3 p =
+        mesh.vertices[a] + r * (mesh.vertices[b] - mesh.vertices[a]) + s * (mesh.vertices[c] - mesh.vertices[a]);
     Index owner = 0;
     double best = norm2(p - seeds[0]), second = HUGE_VAL;
     for (Index i = 1; i < seeds.size(); ++i) {
@@ -541,7 +552,8 @@ std::vector<ModelCase> model_cases() {
   std::vector<ModelCase> cases;
   for (const char* model : {"bunny.off", "anchor.off", "beetle.obj", "camel.off", "elephant.off", "face.obj",
                             "fandisk.off", "homer.obj", "igea.ply"})
-    for (SeedKind kind : {SeedKind::ten, SeedKind::thousand, SeedKind::ten_thousand, SeedKind::vertices, SeedKind::grid})
+    for (SeedKind kind :
+         {SeedKind::ten, SeedKind::thousand, SeedKind::ten_thousand, SeedKind::vertices, SeedKind::grid})
       cases.push_back({model, kind});
   return cases;
 }

@@ -11,6 +11,7 @@
 #include "bisector/mesh/preview.h"
 #include "bisector/mesh/sampling.h"
 #include "bisector/voronoi/dual.h"
+#include "bisector/voronoi/tiling.h"
 #include "cells.h"
 #include "console.h"
 #include "outputs.h"

@@ -13,6 +13,7 @@
 #include "bisector/cvt/optimise.h"
 #include "bisector/remesh/topology_control.h"
 #include "bisector/voronoi/dual.h"
+#include "bisector/voronoi/tiling.h"
 
 namespace bisector {
 namespace {
@@ -101,7 +102,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   result.mesh = dual_mesh(state.seeds, polygons);
   result.topology = analyse_topology(result.mesh.triangles, result.mesh.vertices.size());
   result.topology_matches = same_topology(result.topology, result.input_topology);
-  if (result.mesh.vertices.size() > counts.back())
+  if (result.topology_matches && result.mesh.vertices.size() > counts.back())
     context.warn(fmt::format("{} vertices instead of {}: fewer did not give the input's topology",
                              result.mesh.vertices.size(), counts.back()));
   result.iterations = totals.iterations;

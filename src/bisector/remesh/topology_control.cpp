@@ -165,6 +165,8 @@ void enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& pol
   }
   // No round did it: the one that came nearest is the result.
   state.seeds = best;
+  options.iterations = 0;
+  optimise(backend, state, options, totals, context);
   backend.evaluate(state.seeds, state.moments, polygons);
 }
 

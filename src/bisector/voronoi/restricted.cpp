@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <limits>
 
 #include "bisector/core/parallel.h"
 #include "bisector/voronoi/clip.h"
+#include "bisector/voronoi/owner.h"
 
 namespace bisector {
 namespace {
@@ -59,70 +59,6 @@ struct Walker {
     queue.push_back(slot);
   }
 };
-
-// Whether q belongs to slot i rather than to slot j.
-bool owns(const SortedSeeds& seeds, const Vec3& q, Index i, Index j) {
-  const Vec3 d = seeds.x[j] - seeds.x[i], p = q - seeds.x[i];
-  const double h = d.x * (d.x - 2 * p.x) + d.y * (d.y - 2 * p.y) + d.z * (d.z - 2 * p.z);
-  const double largest = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-  const double scale = (std::abs(d.x) + std::abs(d.y) + std::abs(d.z)) *
-                       (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) + 2 * largest);
-  const double bound = 0x1p-50 * scale + 0x1p-1000;
-  if (h > bound) return true;
-  if (h < -bound) return false;
-  return exact_side(q, seeds.x[i], seeds.id[i], seeds.x[j], seeds.id[j]) > 0;
-}
-
-// Whether every seed that could be nearer to q than `owner` is listed and certain not to be.
-bool certainly_owns(const SortedSeeds& seeds, const NeighbourList& list, const Vec3& q, Index owner) {
-  const Vec3 x = seeds.x[owner], p = q - x;
-  const double r2 = norm2(p), reach = 4 * r2 * (1 + 1e-9);
-  // With |d| <= 2 |p| the bound of owns() is below 2^-45 |p|^2.
-  const double bound = 0x1p-45 * r2 + 0x1p-1000;
-  for (const Index* j = list.begin; j != list.end; ++j) {
-    const Vec3 d = seeds.x[*j] - x;
-    const double squared = norm2(d);
-    if (squared > reach) return true;
-    if (!(squared - 2 * dot(d, p) > bound)) return false;
-  }
-  return list.radius * list.radius > reach;
-}
-
-// The cell that q belongs to. Walks from `guess` to ever better seeds; a seed is the owner when no seed within twice its
-// distance is better. The answer does not depend on the guess.
-Index find_owner(const SortedSeeds& seeds, const Neighbours& neighbours, const Vec3& q, Index guess) {
-  Index owner = guess;
-  for (;;) {
-    const NeighbourList list = neighbours.list(owner);
-    if (certainly_owns(seeds, list, q, owner)) return owner;
-    // The nearest of those listed, if it is nearer; else exactly, among those that may be as near.
-    Index better = kNone;
-    double best = norm2(q - seeds.x[owner]);
-    const double reach = 4 * best * (1 + 1e-9);
-    best *= 1 - 1e-9;
-    for (const Index* j = list.begin; j != list.end; ++j) {
-      const double squared = norm2(q - seeds.x[*j]);
-      if (squared < best) {
-        best = squared;
-        better = *j;
-      }
-    }
-    if (better == kNone) {
-      for (const Index* j = list.begin; j != list.end && better == kNone; ++j)
-        if (!owns(seeds, q, owner, *j)) better = *j;
-      if (better == kNone) {
-        if (list.radius * list.radius > reach) return owner;
-        break;
-      }
-    }
-    owner = better;
-  }
-  // The list is too short for a certificate: take the best of all seeds that are nearest up to rounding.
-  owner = neighbours.nearest(q);
-  for (Index k : neighbours.around(q, norm(q - seeds.x[owner]) * (1 + 1e-9)))
-    if (k != owner && !owns(seeds, q, owner, k)) owner = k;
-  return owner;
-}
 
 // The rule of all sums: terms in ascending triangle index, by blocks of 32, the blocks' sums likewise.
 class FixedTreeSum {
@@ -468,78 +404,6 @@ void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource
                                  RestrictedPolygons& polygons) {
   work_->evaluate(seeds, source, result, true);
   work_->gather(polygons);
-}
-
-namespace {
-
-// One edge of a polygon with the labels of the edges before and after it: its ends.
-struct Side {
-  Index cell, label, before, after;
-};
-
-bool tiles(const std::vector<Side>& sides) {
-  std::vector<Side> sorted = sides;
-  const auto less = [](const Side& a, const Side& b) { return a.cell != b.cell ? a.cell < b.cell : a.label < b.label; };
-  std::sort(sorted.begin(), sorted.end(), less);
-  const auto find = [&](Index cell, Index label) -> const Side* {
-    const auto range = std::equal_range(sorted.begin(), sorted.end(), Side{cell, label, 0, 0}, less);
-    return range.second - range.first == 1 ? &*range.first : nullptr;
-  };
-  std::size_t on_edges = 0;
-  for (const Side& s : sorted) {
-    if (is_edge(s.label)) {
-      ++on_edges;
-      continue;
-    }
-    const Side* other = find(s.label, s.cell);
-    if (!other || other->before != s.after || other->after != s.before) return false;
-  }
-  // Along each facet edge from corner to corner: every side continues in the cell that its last vertex names.
-  std::size_t covered = 0;
-  for (Index k = 0; k < 3; ++k) {
-    const Index edge = kEdgeLabel | k, previous = kEdgeLabel | (k + 2) % 3, next = kEdgeLabel | (k + 1) % 3;
-    const Side* side = nullptr;
-    for (const Side& s : sorted)
-      if (s.label == edge && s.before == previous) side = &s;
-    for (std::size_t guard = 0; side && guard < sorted.size(); ++guard) {
-      ++covered;
-      if (is_edge(side->after)) {
-        if (side->after != next) return false;
-        break;
-      }
-      const Side* following = find(side->after, edge);
-      if (!following || following->before != side->cell) return false;
-      side = following;
-    }
-    if (!side) return false;
-  }
-  return covered == on_edges;
-}
-
-}  // namespace
-
-std::size_t count_untiled(const Surface& surface, const RestrictedPolygons& polygons) {
-  // First polygon of each triangle; triangles without area have none and are not asked about.
-  const std::size_t n = surface.mesh.triangles.size();
-  std::vector<std::size_t> begin(n + 1, 0);
-  for (const auto& pair : polygons.pairs) ++begin[pair.triangle + 1];
-  for (std::size_t t = 0; t < n; ++t) begin[t + 1] += begin[t];
-  std::atomic<std::size_t> failed{0};
-  parallel_chunks(n, 512, [&](std::size_t, std::size_t from, std::size_t to) {
-    std::vector<Side> sides;
-    for (std::size_t t = from; t < to; ++t) {
-      if (surface.facet_of[t] == kNone) continue;
-      sides.clear();
-      for (std::size_t k = begin[t]; k < begin[t + 1]; ++k) {
-        const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
-        for (std::size_t e = 0; e < size; ++e)
-          sides.push_back({polygons.pairs[k].cell, polygons.labels[first + e], polygons.labels[first + (e + size - 1) % size],
-                           polygons.labels[first + (e + 1) % size]});
-      }
-      if (!tiles(sides)) failed.fetch_add(1, std::memory_order_relaxed);
-    }
-  });
-  return failed.load();
 }
 
 }  // namespace bisector

@@ -70,8 +70,4 @@ class RestrictedVoronoi {
   std::unique_ptr<Work> work_;
 };
 
-// Verifies that the polygons tile every triangle: each inner edge occurs once on either side with equal ends, and the
-// triangle's edges are covered end to end. Returns the number of triangles where that fails.
-std::size_t count_untiled(const Surface& surface, const RestrictedPolygons& polygons);
-
 }  // namespace bisector
