@@ -158,9 +158,15 @@ TEST(RemeshHard, NonManifoldInputRunsAndReports) {
 TEST(RemeshHard, FewVerticesGiveWhatTheyCan) {
   for (const TriangleMesh& mesh : {icosphere(3), torus(24, 16), box(2), two_spheres()})
     for (std::size_t vertices : {4u, 5u, 12u, 40u}) {
-      const RemeshResult result = remesh(mesh, options_for(vertices));
-      EXPECT_EQ(result.untiled, 0u);
-      EXPECT_LE(result.mesh.vertices.size(), vertices);
+      RemeshOptions options = options_for(vertices);
+      const RemeshResult enforced = remesh(mesh, options);
+      EXPECT_EQ(enforced.untiled, 0u);
+      // Seeds are only added for the sake of the topology.
+      EXPECT_TRUE(enforced.mesh.vertices.size() <= vertices || enforced.topology_matches);
+      options.topology = TopologyControl::check;
+      const RemeshResult checked = remesh(mesh, options);
+      EXPECT_EQ(checked.untiled, 0u);
+      EXPECT_LE(checked.mesh.vertices.size(), vertices);
     }
   const RemeshResult tetrahedron = remesh(icosphere(3), options_for(4));
   EXPECT_TRUE(tetrahedron.topology_matches);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 #include "bisector/mesh/sampling.h"
 #include "bisector/mesh/topology.h"
@@ -117,6 +118,7 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
     around[e.b].push_back(e.a);
   }
   std::vector<char> taken(seeds.size(), 0);
+  std::set<std::array<double, 3>> distinct;
   std::vector<Vec3> points;
   for (bool spread : {true, false}) {
     std::vector<char> blocked(seeds.size(), 0);
@@ -124,6 +126,8 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
       if (points.size() == count) return points;
       if (squared[i] <= 0 || taken[i] || blocked[i]) continue;
       taken[i] = 1;
+      // A corner belongs to several cells.
+      if (!distinct.insert({corner[i].x, corner[i].y, corner[i].z}).second) continue;
       points.push_back(corner[i]);
       if (spread)
         for (Index j : around[i]) blocked[j] = 1;

@@ -22,8 +22,8 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
 std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
                          std::size_t count);
 
-// Removes one end of the shortest dual edges, or adds seeds where the energy is highest, until there are `count`; at most
-// doubles the seeds. `polygons` and `moments` are those of the seeds given.
+// Removes one end of the shortest dual edges, or adds seeds where the energy is highest, to come as near to `count` as one
+// seed per edge or cell allows. `polygons` and `moments` are those of the seeds given.
 void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, std::size_t count,
                std::vector<Vec3>& seeds);
 

@@ -80,7 +80,8 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     if (level + 1 == counts.size()) break;
     backend.evaluate(state.seeds, state.moments, polygons);
     state.seeds = refine(polygons, state.moments, state.seeds, counts[level + 1]);
-    while (state.seeds.size() != counts[level + 1]) {
+    for (std::size_t size = 0; state.seeds.size() != counts[level + 1] && state.seeds.size() != size;) {
+      size = state.seeds.size();
       backend.evaluate(state.seeds, state.moments, polygons);
       set_count(polygons, state.moments, counts[level + 1], state.seeds);
     }

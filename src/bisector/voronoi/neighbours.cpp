@@ -127,6 +127,7 @@ void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
   });
   built_x_ = seeds.x;
   built_radius_ = radius_;
+  built_count_ = count_;
 }
 
 bool Neighbours::update() {
@@ -150,15 +151,21 @@ bool Neighbours::update() {
         return;
       }
       radius_[i] = (built_radius_[i] - lost) * kBelow;
+      // Beyond the radius others may be missing, so what is listed there does not count for now.
+      const double squared = radius_[i] * radius_[i];
+      std::size_t within = 0;
       Index* list = &first_[i * kFirstMost];
-      for (std::size_t k = 0; k < count_[i]; ++k) {
-        const std::uint64_t key = sort_key(norm2(x[list[k]] - x[i]), k);
+      for (std::size_t k = 0; k < built_count_[i]; ++k) {
+        const double d = norm2(x[list[k]] - x[i]);
+        const std::uint64_t key = sort_key(d, k);
+        within += d < squared;
         std::size_t m = k;
         for (; m > 0 && keys[m - 1] > key; --m) keys[m] = keys[m - 1];
         keys[m] = key;
       }
-      for (std::size_t k = 0; k < count_[i]; ++k) sorted[k] = list[keys[k] & kPlaceMask];
-      std::copy(sorted, sorted + count_[i], list);
+      for (std::size_t k = 0; k < built_count_[i]; ++k) sorted[k] = list[keys[k] & kPlaceMask];
+      std::copy(sorted, sorted + built_count_[i], list);
+      count_[i] = static_cast<unsigned char>(within);
     }
   });
   if (!worth_it) return false;
@@ -293,6 +300,27 @@ const Neighbours::LastRung& Neighbours::last_rung() const {
     }
   });
   return *last_rung_;
+}
+
+std::vector<Index> Neighbours::nearest_to(Index slot, std::size_t count) const {
+  const Vec3 p = seeds_->x[slot];
+  const NeighbourList known = list(slot);
+  const std::size_t listed = static_cast<std::size_t>(known.end - known.begin);
+  // The nearest listed seeds bound the distance of the nearest of all.
+  double radius = listed >= count ? norm(seeds_->x[known.begin[count - 1]] - p) * (1 + 1e-9) : seeds_->extent * 1e-3;
+  std::vector<std::pair<double, Index>> nearest;  // squared distance, caller's index
+  for (;; radius *= kGrowth) {
+    const std::vector<Index> found = around(p, radius);
+    nearest.clear();
+    for (const Index j : found)
+      if (j != slot) nearest.emplace_back(norm2(seeds_->x[j] - p), seeds_->id[j]);
+    std::sort(nearest.begin(), nearest.end());
+    if (found.size() == seeds_->x.size()) break;
+    if (nearest.size() >= count && nearest[count - 1].first <= radius * radius) break;
+  }
+  std::vector<Index> slots;
+  for (std::size_t k = 0; k < std::min(count, nearest.size()); ++k) slots.push_back(seeds_->slot[nearest[k].second]);
+  return slots;
 }
 
 std::vector<Index> Neighbours::around(const Vec3& q, double radius) const {

@@ -42,8 +42,8 @@ class Neighbours {
 
   // Builds the lists of all slots. `seeds` must outlive their use.
   void build(const SortedSeeds& seeds, NeighbourSource source);
-  // For the same slots at new positions: sorts the lists of the last build anew and shortens their certificates by how far
-  // seeds have moved since. False if that is not worth it and build() has to be called.
+  // For the same slots at new positions: sorts the lists of the last build anew and shortens them and their certificates by
+  // how far seeds have moved since. False if that is not worth it and build() has to be called.
   bool update();
 
   NeighbourList list(Index slot) const;
@@ -51,6 +51,9 @@ class Neighbours {
   NeighbourList wider(Index slot, const NeighbourList& shorter) const;
   // A slot whose distance to q is the least up to rounding.
   Index nearest(const Vec3& q) const { return tree_.nearest(q); }
+  // The `count` seeds nearest to the one of `slot`, or all others if there are fewer; ties go to the lower index of the
+  // caller. Depends on the seeds alone.
+  std::vector<Index> nearest_to(Index slot, std::size_t count) const;
   // All slots within `radius` of q, and some of the others.
   std::vector<Index> around(const Vec3& q, double radius) const;
 
@@ -71,6 +74,7 @@ class Neighbours {
   std::vector<double> radius_;
   std::vector<Vec3> built_x_;            // positions and radii of the last build
   std::vector<double> built_radius_;
+  std::vector<unsigned char> built_count_;
   bool use_rings_ = false;               // the first lists are Delaunay rings
   std::unique_ptr<LastRung> last_rung_;
   std::unique_ptr<std::atomic<Grown*>[]> heads_;  // grown lists of each slot, the longest first

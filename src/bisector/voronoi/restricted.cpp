@@ -324,16 +324,12 @@ void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
   parallel_each(seeds.x.size(), [&](std::size_t s) {
     double& step_mass = result.step_mass[seeds.id[s]];
     if (step_mass >= 0.25 * largest) return;
-    const NeighbourList list = neighbours.list(static_cast<Index>(s));
-    std::array<double, kStepNeighbours> around;  // sorted
-    std::size_t count = 0;
-    for (const Index* j = list.begin; j != list.end && count < kStepNeighbours; ++j) {
-      const double mass = result.cells[seeds.id[*j]].mass;
-      std::size_t k = count++;
-      for (; k > 0 && around[k - 1] > mass; --k) around[k] = around[k - 1];
-      around[k] = mass;
-    }
-    if (count) step_mass = std::max(step_mass, 0.25 * around[count / 2]);
+    std::vector<double> around;
+    for (const Index j : neighbours.nearest_to(static_cast<Index>(s), kStepNeighbours))
+      around.push_back(result.cells[seeds.id[j]].mass);
+    if (around.empty()) return;
+    std::sort(around.begin(), around.end());
+    step_mass = std::max(step_mass, 0.25 * around[around.size() / 2]);
   });
 }
 
