@@ -211,13 +211,13 @@ void Clipper::build_block(Screen& screen, const NeighbourList& list, std::size_t
   }
 }
 
-// With |d| < 2 r, r the polygon's reach, a product as coded is off by less than 2e-6 |d| r < 4e-6 r^2. Lines with |d| >= 2 r do not
-// cut at all. Whatever overflows or is not a number counts as cutting.
+// With |d| < 2 r, r the polygon's reach, a product as coded is off by less than 2e-6 |d| r < 4e-6 r^2, and by less than
+// 4 r slack for the corner's own error. Lines with |d| >= 2 r do not cut at all. Whatever overflows or is not a number counts
+// as cutting.
 unsigned Clipper::may_cut(const Block& block) const {
   const auto load = [](const float* p) { return *reinterpret_cast<const Four*>(p); };
   const Four x = load(block.x), y = load(block.y), z = load(block.z);
-  const float margin = 4e-6f * reach_scaled_;
-  const Four limit = load(block.half) - margin;
+  const Four limit = load(block.half) - margin_scaled_;
   FourMask below = ~FourMask{};
   for (std::size_t k = 0; k < polygon_.size; ++k) {
     const Splat& corner = splats_[k];
@@ -290,7 +290,9 @@ void Clipper::bound_polygon() {
   }
   // (r + e)^2 <= r^2 (1 + a) + e^2 (1 + 1/a), and no point of the facet is farther than its corners.
   reach_ = std::min(facet_squared_, squared * (1 + 1e-6) + 4e6 * (slack * slack));
-  reach_scaled_ = static_cast<float>(reach_ * (scale_ * scale_) * (1 + 1e-6));
+  const double scaled = scale_ * scale_;
+  reach_scaled_ = static_cast<float>(reach_ * scaled * (1 + 1e-6));
+  margin_scaled_ = static_cast<float>((4e-6 * reach_ + 8 * std::sqrt(reach_) * slack) * scaled * (1 + 1e-6));
   if (splats_.size() < polygon_.size) splats_.resize(2 * polygon_.size);
   for (std::size_t k = 0; k < polygon_.size; ++k) {
     const Vec3 p = scale_ * polygon_.corners[k].at;

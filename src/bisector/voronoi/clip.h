@@ -133,6 +133,7 @@ class Clipper {
   std::vector<Splat> splats_;     // the polygon's corners, scaled
   double scale_ = 1;              // a power of two
   float reach_scaled_ = 0;        // upper bound of reach_, scaled
+  float margin_scaled_ = 0;       // of the screen
   std::vector<signed char> sides_;
   std::vector<double> densities_;
   bool uncertain_ = false, wider_ = false;

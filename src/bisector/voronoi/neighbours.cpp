@@ -159,6 +159,8 @@ bool Neighbours::update() {
         const double d = norm2(x[list[k]] - x[i]);
         const std::uint64_t key = sort_key(d, k);
         within += d < squared;
+        // Seeds that met: only a new build tells which of them keeps its cell.
+        if (d == 0) worth_it.store(false, std::memory_order_relaxed);
         std::size_t m = k;
         for (; m > 0 && keys[m - 1] > key; --m) keys[m] = keys[m - 1];
         keys[m] = key;

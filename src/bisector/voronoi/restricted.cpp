@@ -337,6 +337,7 @@ void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
 bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSource source) {
   if (given.size() != seeds.x.size() || given.size() != seeds.slot.size() || source != built_source) return false;
   parallel_each(given.size(), [&](std::size_t i) { seeds.x[seeds.slot[i]] = given[i]; });
+  seeds.extent = bounding_box(seeds.x).diagonal();
   return neighbours.update();
 }
 
