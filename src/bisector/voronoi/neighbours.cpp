@@ -1,6 +1,7 @@
 #include "bisector/voronoi/neighbours.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -304,25 +305,38 @@ const Neighbours::LastRung& Neighbours::last_rung() const {
   return *last_rung_;
 }
 
-std::vector<Index> Neighbours::nearest_to(Index slot, std::size_t count) const {
+std::size_t Neighbours::nearest_to(Index slot, std::size_t count, Index* slots) const {
   const Vec3 p = seeds_->x[slot];
   const NeighbourList known = list(slot);
   const std::size_t listed = static_cast<std::size_t>(known.end - known.begin);
+  using Near = std::pair<double, Index>;  // squared distance, caller's index
+  const auto take = [&](Near* first, std::size_t size) {
+    const std::size_t taken = std::min(count, size);
+    std::partial_sort(first, first + taken, first + size);
+    for (std::size_t k = 0; k < taken; ++k) slots[k] = seeds_->slot[first[k].second];
+    return taken;
+  };
   // The nearest listed seeds bound the distance of the nearest of all.
   double radius = listed >= count ? norm(seeds_->x[known.begin[count - 1]] - p) * (1 + 1e-9) : seeds_->extent * 1e-3;
-  std::vector<std::pair<double, Index>> nearest;  // squared distance, caller's index
-  for (;; radius *= kGrowth) {
+  if (!use_rings_ && listed >= count && radius < known.radius) {
+    std::array<Near, kFirstMost> nearest;
+    std::size_t size = 0;
+    for (const Index* j = known.begin; j != known.end; ++j) {
+      const double squared = norm2(seeds_->x[*j] - p);
+      if (squared > radius * radius) break;
+      nearest[size++] = {squared, seeds_->id[*j]};
+    }
+    return take(nearest.data(), size);
+  }
+  for (std::vector<Near> nearest;; radius *= kGrowth) {
     const std::vector<Index> found = around(p, radius);
     nearest.clear();
     for (const Index j : found)
       if (j != slot) nearest.emplace_back(norm2(seeds_->x[j] - p), seeds_->id[j]);
     std::sort(nearest.begin(), nearest.end());
-    if (found.size() == seeds_->x.size()) break;
-    if (nearest.size() >= count && nearest[count - 1].first <= radius * radius) break;
+    const bool complete = nearest.size() >= count && nearest[count - 1].first <= radius * radius;
+    if (complete || found.size() == seeds_->x.size()) return take(nearest.data(), nearest.size());
   }
-  std::vector<Index> slots;
-  for (std::size_t k = 0; k < std::min(count, nearest.size()); ++k) slots.push_back(seeds_->slot[nearest[k].second]);
-  return slots;
 }
 
 std::vector<Index> Neighbours::around(const Vec3& q, double radius) const {

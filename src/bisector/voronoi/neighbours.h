@@ -51,9 +51,9 @@ class Neighbours {
   NeighbourList wider(Index slot, const NeighbourList& shorter) const;
   // A slot whose distance to q is the least up to rounding.
   Index nearest(const Vec3& q) const { return tree_.nearest(q); }
-  // The `count` seeds nearest to the one of `slot`, or all others if there are fewer; ties go to the lower index of the
-  // caller. Depends on the seeds alone.
-  std::vector<Index> nearest_to(Index slot, std::size_t count) const;
+  // Writes the `count` (at least 1) slots nearest to `slot`, or all others if there are fewer, in ascending distance; ties go
+  // to the lower index of the caller. Returns how many. Depends on the seeds alone.
+  std::size_t nearest_to(Index slot, std::size_t count, Index* slots) const;
   // All slots within `radius` of q, and some of the others.
   std::vector<Index> around(const Vec3& q, double radius) const;
 

@@ -324,12 +324,13 @@ void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
   parallel_each(seeds.x.size(), [&](std::size_t s) {
     double& step_mass = result.step_mass[seeds.id[s]];
     if (step_mass >= 0.25 * largest) return;
-    std::vector<double> around;
-    for (const Index j : neighbours.nearest_to(static_cast<Index>(s), kStepNeighbours))
-      around.push_back(result.cells[seeds.id[j]].mass);
-    if (around.empty()) return;
-    std::sort(around.begin(), around.end());
-    step_mass = std::max(step_mass, 0.25 * around[around.size() / 2]);
+    Index near[kStepNeighbours];
+    const std::size_t count = neighbours.nearest_to(static_cast<Index>(s), kStepNeighbours, near);
+    if (count == 0) return;
+    double masses[kStepNeighbours] = {};
+    std::transform(near, near + count, masses, [&](Index j) { return result.cells[seeds.id[j]].mass; });
+    std::nth_element(masses, masses + count / 2, masses + count);
+    step_mass = std::max(step_mass, 0.25 * masses[count / 2]);
   });
 }
 
