@@ -51,17 +51,16 @@ void reseed(Backend& backend, CvtState& state) {
 }
 
 void start(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals) {
-  if (options.constrained) {
-    backend.evaluate(state.seeds, state.moments);
-    totals.count(state.moments);
-    state.normals.assign(state.seeds.size(), Vec3{});
-    project_to_cells(backend.surface(), state.moments.triangles, state.seeds, state.normals);
-  }
-  evaluate(backend, options.constrained, state, totals);
-  for (int trial = 0; trial < kReseedTrials && has_empty_cell(state); ++trial) {
-    reseed(backend, state);
+  for (int trial = 0;; ++trial) {
+    if (options.constrained) {
+      backend.evaluate(state.seeds, state.moments);
+      totals.count(state.moments);
+      state.normals.resize(state.seeds.size());
+      project_to_cells(backend.surface(), state.moments.triangles, state.seeds, state.normals);
+    }
     evaluate(backend, options.constrained, state, totals);
-    if (options.constrained) project_to_cells(backend.surface(), state.moments.triangles, state.seeds, state.normals);
+    if (trial == kReseedTrials || !has_empty_cell(state)) break;
+    reseed(backend, state);
   }
   if (!std::isfinite(state.energy))
     throw Error("the diagram does not cover the surface; its coordinates may span too many magnitudes");
