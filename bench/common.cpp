@@ -6,9 +6,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <thread>
 
+#include "bisector/cvt/cpu_backend.h"
 #include "bisector/mesh/sampling.h"
+#include "host/vulkan_backend.h"
 
 namespace bisector::bench {
 
@@ -48,6 +51,49 @@ std::string Table::csv() const {
   std::string text = fmt::format("{}\n", fmt::join(columns, ","));
   for (const auto& row : rows) text += fmt::format("{}\n", fmt::join(row, ","));
   return text;
+}
+
+std::string Table::json() const {
+  const auto quoted = [](const std::string& text) {
+    std::string result = "\"";
+    for (const char c : text) {
+      if (c == '"' || c == '\\') result += '\\';
+      result += c;
+    }
+    return result + '"';
+  };
+  std::string text = "[";
+  for (const auto& row : rows) {
+    text += text.size() > 1 ? ",\n {" : "\n {";
+    for (std::size_t c = 0; c < row.size(); ++c) text += fmt::format("{}{}: {}", c ? ", " : "", quoted(columns[c]), quoted(row[c]));
+    text += '}';
+  }
+  return text + "\n]\n";
+}
+
+void add_device_options(CLI::App& app, DeviceOptions& options) {
+  static const std::map<std::string, Precision> kPrecisions{
+      {"auto", Precision::automatic}, {"single", Precision::single}, {"double", Precision::double_}};
+  static const std::map<std::string, bool> kSwitch{{"on", true}, {"off", false}};
+  app.add_option("--device", options.word, "cpu, vulkan, vulkan:INDEX or vulkan:UUID");
+  app.add_option("--precision", options.precision, "auto, single, double")->transform(CLI::CheckedTransformer(kPrecisions));
+  app.add_option("--double-rung", options.double_rung, "on, off: of single precision")
+      ->transform(CLI::CheckedTransformer(kSwitch));
+}
+
+std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options, NeighbourSource source) {
+  if (options.word == "cpu") return std::make_unique<CpuBackend>(surface, source);
+  host::VulkanOptions vulkan;
+  vulkan.precision = options.precision;
+  vulkan.neighbours = source;
+  vulkan.double_rung = options.double_rung;
+  return host::make_vulkan_backend(surface, host::Device::open(options.word), vulkan);
+}
+
+std::string describe_device(const DeviceOptions& options) {
+  if (options.word == "cpu") return "the CPU";
+  const DeviceDescription device = host::Device::open(options.word)->description();
+  return fmt::format("{} ({}), driver {}, Vulkan {}", device.name, device.kind, device.driver, device.api);
 }
 
 std::string describe_machine() {

@@ -2,10 +2,14 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "bisector/core/types.h"
+#include "bisector/cvt/compute.h"
 
 namespace bisector::bench {
 
@@ -30,10 +34,24 @@ struct Table {
 
   std::string markdown() const;
   std::string csv() const;
+  std::string json() const;  // an array of objects; all values are strings
 };
 
 // One line each: processor, cores and load; compiler; model.
 std::string describe_machine();
+// A device and how it computes, from the command line.
+struct DeviceOptions {
+  std::string word = "cpu";
+  Precision precision = Precision::automatic;
+  bool double_rung = true;  // whether single precision hands uncertain pairs to double precision
+};
+
+void add_device_options(CLI::App& app, DeviceOptions& options);
+
+// Throws Error and DeviceError as bisector::make_backend() does. Not for "auto".
+std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options, NeighbourSource source);
+std::string describe_device(const DeviceOptions& options);
+
 std::string describe_model(const std::string& path, const TriangleMesh& mesh);
 
 }  // namespace bisector::bench

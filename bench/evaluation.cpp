@@ -9,12 +9,14 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "bisector/core/error.h"
 #include "bisector/core/parallel.h"
 #include "bisector/mesh/io.h"
+#include "bisector/cvt/backend.h"
 #include "bisector/voronoi/restricted.h"
 #include "common.h"
 #include "delaunay_time.h"
@@ -32,6 +34,8 @@ struct Options {
   std::vector<unsigned> threads{1, 2};
   std::vector<std::string> sources{"nearest", "delaunay"};
   std::size_t repeat = 5;
+  DeviceOptions device;
+  std::string json;
   bool once = false;  // one evaluation of the first of each list and nothing else, for its memory
 };
 
@@ -44,29 +48,45 @@ struct Run {
   CellMoments moments;
 };
 
-// From seeds to a gradient, with nothing kept from before.
-Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source, unsigned threads) {
+// From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which has
+// compiled its kernels and got its memory. The first such diagram on each device is to be thrown away.
+Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source, unsigned threads,
+             Backend* device) {
   const ThreadLimit limit(threads);
   Run run;
+  if (device && seeds.size() > 1) device->evaluate({seeds.begin(), seeds.end() - 1}, run.moments);
   const Stopwatch watch;
-  RestrictedVoronoi diagram(surface);
-  diagram.evaluate(seeds, source, run.moments);
+  if (device) {
+    device->evaluate(seeds, run.moments);
+  } else {
+    RestrictedVoronoi(surface).evaluate(seeds, source, run.moments);
+  }
   std::vector<Vec3> gradient(seeds.size());
   parallel_each(seeds.size(), [&](std::size_t i) { gradient[i] = -2.0 * run.moments.cells[i].first; });
   run.gradient_norm = std::sqrt(fixed_sum(seeds.size(), [&](std::size_t i) { return norm2(gradient[i]); }));
   const double missing = std::abs(run.moments.mass - surface.mass);
   run.total = watch.seconds();
-  if (!(missing <= 1e-12 * surface.mass))
+  if (!(missing <= (device ? device->mass_tolerance() : 1e-12) * surface.mass))
     throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(), run.moments.mass,
                             surface.mass));
   return run;
+}
+
+const char* precision_word(Precision precision) {
+  return precision == Precision::single ? "single" : precision == Precision::double_ ? "double" : "auto";
+}
+
+std::unique_ptr<Backend> device_of(const Surface& surface, const Options& options, NeighbourSource source) {
+  return options.device.word == "cpu" ? nullptr : make_device_backend(surface, options.device, source);
 }
 
 // Peak resident memory, in MiB, of a process that reads the model and evaluates once. Must come before the first loop of
 // this process: a new process counts what its parent held.
 double peak_memory(const Options& options, std::size_t seeds, const std::string& source, unsigned threads) {
   std::vector<std::string> words{"bench_evaluation", options.model, "--once", "--seeds", std::to_string(seeds), "--sources",
-                                 source, "--threads", std::to_string(threads)};
+                                 source, "--threads", std::to_string(threads), "--device", options.device.word,
+                                 "--precision", precision_word(options.device.precision)};
+  if (!options.device.double_rung) words.insert(words.end(), {"--double-rung", "off"});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
@@ -90,6 +110,7 @@ struct Series {
   std::vector<double> total, neighbours, owners, clip, ratio;
   CellMoments last;
   double gradient_norm = 0;
+  std::unique_ptr<Backend> device;  // none: the CPU
 
   void add(Run run, double delaunay) {
     const DiagramSeconds& phases = run.moments.seconds;
@@ -116,11 +137,12 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
   const std::vector<Vec3> seeds = random_seeds(surface.mesh, count);
   const std::size_t repeat = count < kMany ? options.repeat : (options.repeat + 1) / 2;
   std::vector<double> delaunay;
+  for (Series& s : series) s.device = device_of(surface, options, source_of(s.source));
   for (std::size_t r = 0; r < repeat; ++r) {
     for (Series& s : series) {
       // Its own triangulation right before each: what slows one of the two slows the other.
       delaunay.push_back(delaunay_seconds(seeds));
-      s.add(evaluate(surface, seeds, source_of(s.source), s.threads), delaunay.back());
+      s.add(evaluate(surface, seeds, source_of(s.source), s.threads, s.device.get()), delaunay.back());
     }
     std::fprintf(stderr, "%zu seeds: round %zu of %zu\n", count, r + 1, repeat);
   }
@@ -136,6 +158,12 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
                           fmt::format("{:.0f}", s.memory), std::to_string(m.certification.pairs),
                           std::to_string(m.certification.uncertain), std::to_string(m.certification.wider),
                           fmt::format("{:.1e}", std::abs(m.mass - surface.mass) / surface.mass)});
+    if (options.device.word == "cpu") continue;
+    const DeviceSeconds& d = m.seconds.device;
+    std::vector<std::string>& row = table.rows.back();
+    row.insert(row.end(), {std::to_string(m.certification.doubled), std::to_string(m.certification.cpu)});
+    for (const double seconds : {d.transfer, d.grid, d.neighbours, d.owners, d.clip, d.sort, d.sum})
+      row.push_back(milliseconds(seconds));
   }
 }
 
@@ -144,7 +172,8 @@ void run(const Options& options) {
     const ThreadLimit limit(options.threads.front());
     const Surface surface(read_mesh(options.model));
     const std::vector<Vec3> seeds = random_seeds(surface.mesh, options.seeds.front());
-    evaluate(surface, seeds, source_of(options.sources.front()), options.threads.front());
+    const NeighbourSource source = source_of(options.sources.front());
+    evaluate(surface, seeds, source, options.threads.front(), device_of(surface, options, source).get());
     return;
   }
   const std::string machine = describe_machine();
@@ -168,9 +197,15 @@ void run(const Options& options) {
              1e3 * preparing.seconds());
   Table table{{"seeds", "source", "threads", "total", "neighbours", "owners", "clip", "CGAL", "ratio", "speed-up", "memory",
                "pairs", "uncertain", "wider", "mass error"}, {}};
+  if (options.device.word != "cpu") {
+    fmt::print("device: {}\n\n", describe_device(options.device));
+    for (const char* name : {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort", "d. sum"})
+      table.columns.push_back(name);
+  }
   for (std::size_t k = 0; k < all.size(); ++k) measure(surface, options, options.seeds[k], std::move(all[k]), table);
   fmt::print("{}", table.markdown());
   if (!options.csv.empty()) write_file(options.csv, table.csv());
+  if (!options.json.empty()) write_file(options.json, table.json());
 }
 
 }  // namespace
@@ -184,7 +219,9 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads, "numbers of threads")->delimiter(',')->check(CLI::Range(1, 1024));
   app.add_option("--sources", options.sources, "nearest, delaunay")
       ->delimiter(',')->check(CLI::IsMember({"nearest", "delaunay"}));
+  add_device_options(app, options.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
+  app.add_option("--json", options.json, "the same as JSON");
   app.add_flag("--once", options.once)->group("");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -27,6 +27,8 @@ struct Options {
   std::vector<std::uint64_t> random_seeds{1};
   RemeshOptions remesh;
   std::size_t repeat = 3;
+  DeviceOptions device;
+  std::string json;
 };
 
 struct Series {
@@ -50,10 +52,12 @@ void run(Options options) {
       options.remesh.random_seed = s.random_seed;
       const double before = delaunay_seconds(seeds);
       const Stopwatch watch;
-      s.last = remesh(mesh, options.remesh);
+      const Surface surface(mesh);
+      const auto backend = make_device_backend(surface, options.device, NeighbourSource::nearest);
+      s.last = remesh(*backend, options.remesh);
       s.total.push_back(watch.seconds());
       const double after = delaunay_seconds(seeds);
-      const RemeshSeconds& phases = s.last.seconds;
+      const DiagramSeconds& phases = s.last.seconds.diagrams;
       s.diagram.push_back(phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
       s.ratio.push_back(s.total.back() / (0.5 * (before + after)));
       delaunay.insert(delaunay.end(), {before, after});
@@ -76,6 +80,7 @@ void run(Options options) {
   }
   fmt::print("{}", table.markdown());
   if (!options.csv.empty()) write_file(options.csv, table.csv());
+  if (!options.json.empty()) write_file(options.json, table.json());
 }
 
 }  // namespace
@@ -89,6 +94,8 @@ int main(int argc, char** argv) {
   app.add_option("-n", options.remesh.vertices, "vertices of the result")->check(CLI::Range(4, 100'000'000));
   app.add_option("--repeat", options.repeat, "runs of each")->check(CLI::Range(1, 1000));
   app.add_option("--random-seeds", options.random_seeds, "random starts")->delimiter(',');
+  add_device_options(app, options.device);
+  app.add_option("--json", options.json, "the same as JSON");
   app.add_option("--threads", options.remesh.threads, "of the remesh; 0: all cores")->check(CLI::Range(0, 1024));
   app.add_option("--csv", options.csv, "also write the table to this file");
   CLI11_PARSE(app, argc, argv);

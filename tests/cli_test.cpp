@@ -14,6 +14,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -21,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "bisector/cvt/compute.h"
 #include "bisector/mesh/io.h"
 #include "models.h"
 
@@ -126,7 +128,7 @@ Json timeless(Json report) {
 
 TEST_F(Cli, HelpAndVersion) {
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"--help"}, {"remesh", "--help"}, {"rvd", "--help"}, {"quality", "-h"}, {"--version"}}) {
+           {"--help"}, {"remesh", "--help"}, {"rvd", "--help"}, {"quality", "-h"}, {"check", "--help"}, {"--version"}}) {
     const Result result = run(arguments);
     EXPECT_EQ(result.code, 0);
     EXPECT_NE(result.out.find(arguments.size() > 1 ? arguments[0] : "isector"), std::string::npos);
@@ -160,6 +162,9 @@ TEST_F(Cli, BadUsage) {
   expect_failure(2, {"rvd", sphere}, "--seeds");
   expect_failure(2, {"rvd", sphere, "-n", "0"}, "-n");
   expect_failure(2, {"quality"}, "MESH");
+  for (const char* option : {"--device", "--precision"})
+    for (const char* value : {"nonsense", "gpu", ""}) expect_failure(2, {"check", option, value}, option);
+  expect_failure(2, {"check", sphere}, "sphere.off");
 }
 
 TEST_F(Cli, BadInputAndOutput) {
@@ -172,10 +177,14 @@ TEST_F(Cli, BadInputAndOutput) {
   expect_failure(1, {"remesh", in("flat.off"), "-o", out, "-n", "10", "--quiet"}, "area");
   expect_failure(1, {"remesh", sphere, "-o", out, "--seeds", in("two.xyz")}, "4 seeds");
   expect_failure(1, {"remesh", sphere, "-o", out, "--seeds", in("two.xyz"), "-n", "5"}, "-n");
-  expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", "vulkan"}, "--device");
-  expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", "vulkan:1"}, "--device");
-  expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--precision", "single"}, "--precision");
-  expect_failure(1, {"rvd", sphere, "-n", "10", "--precision", "single"}, "--precision");
+  for (const char* device : {"vulkan:9999", "vulkan:00000000-0000-0000-0000-00000000dead", "vulkan:", "vulkan:x"}) {
+    expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", device}, device);
+    expect_failure(1, {"rvd", sphere, "-n", "10", "--device", device}, device);
+    expect_failure(1, {"check", "--device", device, "--report", in("r.json")}, device);
+  }
+  expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", "cpu", "--precision", "single"}, "--precision");
+  expect_failure(1, {"rvd", sphere, "-n", "10", "--device", "cpu", "--precision", "single"}, "--precision");
+  expect_failure(1, {"check", "--device", "cpu", "--precision", "single"}, "--precision");
   expect_failure(1, {"quality", in("missing.off")}, "missing.off");
   expect_failure(1, {"quality", sphere, "--report", "/dev/full"}, "/dev/full");
 
@@ -201,7 +210,7 @@ TEST_F(Cli, BadInputAndOutput) {
 
 TEST_F(Cli, RemeshWritesWhatItSays) {
   const Result result = run({"remesh", in("sphere.off"), "-o", in("out.obj"), "-n", "200", "--report", in("r.json"),
-                             "--preview", in("out.png"), "--verbose"});
+                             "--preview", in("out.png"), "--verbose", "--device", "cpu"});
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   EXPECT_NE(result.out.find("out.obj"), std::string::npos);
@@ -216,6 +225,8 @@ TEST_F(Cli, RemeshWritesWhatItSays) {
   EXPECT_EQ(report["output"]["faces"], mesh.triangles.size());
   EXPECT_EQ(report["device"]["kind"], "cpu");
   EXPECT_EQ(report["device"]["precision"], "double");
+  EXPECT_FALSE(report["device"].contains("fallback"));
+  EXPECT_FALSE(report.contains("device_seconds"));
   for (const char* key : {"version", "iterations", "evaluations", "energy", "gradient_norm"})
     EXPECT_TRUE(report.contains(key)) << key;
   for (const char* key : {"total", "delaunay", "neighbors", "pairs", "clip", "lbfgs", "extract", "io"})
@@ -345,6 +356,180 @@ TEST_F(Cli, QualityMeasuresDistance) {
   const Result table = run({"quality", in("sphere.off")});
   EXPECT_NE(table.out.find("q_min"), std::string::npos);
   EXPECT_NE(table.out.find("self_intersections"), std::string::npos);
+}
+
+TEST_F(Cli, DevicesAreListed) {
+  const DeviceList list = list_devices();
+  const Json report = report_of({"devices", "--report", "-"});
+  ASSERT_EQ(report["devices"].size(), 1 + list.devices.size());
+  EXPECT_EQ(report["devices"][0]["kind"], "cpu");
+  EXPECT_GE(report["devices"][0]["threads"].get<int>(), 1);
+  const std::string table = run({"devices"}).out;
+  EXPECT_TRUE(table.starts_with("cpu ")) << table;
+  if (list.devices.empty()) {
+    EXPECT_EQ(report["problem"], list.problem);
+    EXPECT_NE(table.find(list.problem), std::string::npos) << table;
+  }
+  for (std::size_t k = 0; k < list.devices.size(); ++k) {
+    const DeviceDescription& device = list.devices[k];
+    const Json& entry = report["devices"][k + 1];
+    EXPECT_EQ(entry["index"], device.index);
+    EXPECT_EQ(entry["uuid"], device.uuid);
+    EXPECT_EQ(entry["name"], device.name);
+    EXPECT_EQ(entry["kind"], device.kind);
+    EXPECT_EQ(entry["precision"], device.float64 ? "double" : "single");
+    EXPECT_EQ(entry["features"].get<std::vector<std::string>>(), device.features);
+    EXPECT_EQ(entry.value("rejected", ""), device.rejected);
+    for (const char* key : {"driver", "api", "memory"}) EXPECT_TRUE(entry.contains(key)) << key;
+    EXPECT_NE(table.find("vulkan:" + std::to_string(device.index)), std::string::npos) << table;
+    EXPECT_NE(table.find(device.uuid), std::string::npos) << table;
+    EXPECT_NE(table.find(device.rejected), std::string::npos) << table;
+  }
+}
+
+TEST_F(Cli, CheckOfTheCpuAgainstItself) {
+  const Result result = run({"check", "--device", "cpu", "--report", in("r.json")});
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("passed"), std::string::npos) << result.out;
+  const Json report = Json::parse(read_text(in("r.json")));
+  EXPECT_EQ(report["command"], "check");
+  EXPECT_EQ(report["device"]["kind"], "cpu");
+  EXPECT_EQ(report["passed"], true);
+  ASSERT_FALSE(report["rows"].empty());
+  for (const Json& row : report["rows"]) {
+    for (const char* key : {"passed", "same_pairs", "same_labels", "same_dual", "bitwise", "repeats"})
+      EXPECT_EQ(row[key], true) << row;
+    for (const char* key : {"mass_error", "centroid_error", "energy_error"}) EXPECT_EQ(row[key], 0.0) << row;
+    EXPECT_LE(row["sum_error"].get<double>(), 1e-12) << row;
+    EXPECT_GT(row["certification"]["pairs"].get<int>(), 0) << row;
+  }
+}
+
+TEST_F(Cli, CheckWithoutAGpuSaysSo) {
+  if (!best_gpu(list_devices()).empty()) GTEST_SKIP() << "there is a GPU";
+  expect_failure(1, {"check"}, "no GPU");
+}
+
+TEST_F(Cli, AutomaticDeviceIsTheCpuWithoutAGpu) {
+  if (!best_gpu(list_devices()).empty()) GTEST_SKIP() << "there is a GPU";
+  const Json report = report_of({"rvd", in("sphere.off"), "-n", "50", "--report", "-"});
+  EXPECT_EQ(report["device"]["kind"], "cpu");
+  EXPECT_FALSE(report["device"].contains("fallback"));
+  expect_failure(1, {"rvd", in("sphere.off"), "-n", "50", "--precision", "single"}, "--precision");
+}
+
+// An environment variable for as long as it lives.
+class Variable {
+ public:
+  Variable(const char* name, const std::string& value) : name_(name) {
+    if (const char* before = std::getenv(name)) before_ = before;
+    setenv(name, value.c_str(), 1);
+  }
+  ~Variable() {
+    if (before_) setenv(name_, before_->c_str(), 1);
+    else unsetenv(name_);
+  }
+  Variable(const Variable&) = delete;
+  Variable& operator=(const Variable&) = delete;
+
+ private:
+  const char* name_;
+  std::optional<std::string> before_;
+};
+
+TEST_F(Cli, WithoutALoaderOrADriverTheCpuComputes) {
+  const std::string nothing = in("nothing");
+  const auto check = [&] {
+    for (const char* command : {"rvd", "remesh"}) {
+      std::vector<std::string> words{command, in("sphere.off"), "-n", "50", "--report", "-"};
+      if (words[0] == "remesh") words.insert(words.end(), {"-o", in("out.off")});
+      const Result result = run(words);
+      EXPECT_EQ(result.code, 0) << result.err;
+      EXPECT_EQ(result.err, "");
+      EXPECT_EQ(Json::parse(result.out, nullptr, false)["device"]["kind"], "cpu");
+      for (const char* device : {"vulkan", "vulkan:0"}) {
+        std::vector<std::string> exact = words;
+        exact.insert(exact.end(), {"--device", device});
+        expect_failure(1, exact, "Vulkan");
+      }
+    }
+    expect_failure(1, {"check", "--device", "vulkan"}, "Vulkan");
+    EXPECT_EQ(run({"devices"}).code, 0);
+  };
+  {
+    SCOPED_TRACE("no loader");
+    const Variable loader("BISECTOR_VULKAN_LOADER", nothing);
+    check();
+  }
+  SCOPED_TRACE("no driver");
+  const Variable files("VK_DRIVER_FILES", nothing), old_files("VK_ICD_FILENAMES", nothing);
+  check();
+}
+
+// The first device that can be used, as `--device` takes it.
+std::string usable_device() {
+  for (const DeviceDescription& device : list_devices().devices)
+    if (device.rejected.empty()) return "vulkan:" + std::to_string(device.index);
+  return {};
+}
+
+TEST_F(Cli, DeviceGivesTheCpusDiagram) {
+  const std::string device = usable_device();
+  if (device.empty()) GTEST_SKIP() << "no Vulkan device";
+  std::vector<Json> reports;
+  std::vector<std::string> pairs;
+  for (const std::string& word : {std::string("cpu"), device}) {
+    reports.push_back(report_of({"rvd", in("sphere.off"), "-n", "300", "--device", word, "--pairs", in("pairs"),
+                                 "--report", "-"}));
+    pairs.push_back(read_text(in("pairs")));
+  }
+  EXPECT_NE(reports[1]["device"]["kind"], "cpu");
+  EXPECT_EQ(reports[0]["rdt"], reports[1]["rdt"]);
+  EXPECT_TRUE(pairs[0] == pairs[1]);
+  for (const char* phase : {"transfer", "grid", "neighbours", "owners", "clip", "sort", "sum"})
+    EXPECT_GE(reports[1]["device_seconds"].value(phase, -1.0), 0) << phase;
+}
+
+TEST_F(Cli, ADamagedPipelineCacheDoesNoHarm) {
+  const std::string device = usable_device();
+  if (device.empty()) GTEST_SKIP() << "no Vulkan device";
+  const Variable cache("BISECTOR_CACHE", in("cache"));
+  const auto pairs = [&] {
+    const Result result = run({"rvd", in("sphere.off"), "-n", "50", "--device", device, "--pairs", in("pairs"), "--quiet"});
+    EXPECT_EQ(result.code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return read_text(in("pairs"));
+  };
+  const std::string expected = pairs(), good = read_text(in("cache"));
+  ASSERT_FALSE(good.empty());
+  std::string flipped = good;
+  flipped[flipped.size() / 2] = static_cast<char>(flipped[flipped.size() / 2] ^ 1);
+  for (const std::string& bad : {std::string(), good.substr(0, good.size() / 2), flipped, std::string(1000, 'x')}) {
+    write_text("cache", bad);
+    EXPECT_TRUE(pairs() == expected);
+    EXPECT_EQ(read_text(in("cache")).size(), good.size());
+  }
+}
+
+TEST_F(Cli, DevicePassesItsCheck) {
+  const std::string device = usable_device();
+  if (device.empty()) GTEST_SKIP() << "no Vulkan device";
+  const Result result = run({"check", "--device", device, "--precision", "single"});
+  EXPECT_EQ(result.code, 0) << result.out << result.err;
+  EXPECT_EQ(result.err, "");
+}
+
+TEST_F(Cli, DeviceRemeshes) {
+  const std::string device = usable_device();
+  if (device.empty()) GTEST_SKIP() << "no Vulkan device";
+  for (const char* precision : {"single", "auto"}) {
+    const Json report = report_of({"remesh", in("sphere.off"), "-o", in("out.off"), "-n", "300", "--device", device,
+                                   "--precision", precision, "--report", "-"});
+    EXPECT_NE(report["device"]["kind"], "cpu");
+    EXPECT_TRUE(report.contains("device_seconds"));
+    EXPECT_EQ(report["topology"]["matches_input"], true);
+    EXPECT_GT(report["quality"]["q_ave"].get<double>(), 0.9);
+  }
 }
 
 TEST_F(Cli, WarningsAreLinesOnStderr) {

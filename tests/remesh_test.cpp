@@ -107,7 +107,7 @@ TEST_P(Remesh, IsTheSameFromEitherSourceOfNeighbours) {
   const auto& [name, mesh, vertices, smooth] = GetParam();
   RemeshOptions options = options_for(std::min<std::size_t>(vertices, 600));
   const TriangleMesh reference = remesh(mesh, options).mesh;
-  options.neighbours = NeighbourSource::delaunay;
+  options.compute.neighbours = NeighbourSource::delaunay;
   EXPECT_TRUE(same_mesh(remesh(mesh, options).mesh, reference));
 }
 

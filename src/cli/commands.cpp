@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "bisector/core/parallel.h"
+#include "bisector/cvt/compute.h"
 #include "bisector/mesh/io.h"
 #include "bisector/mesh/preview.h"
 #include "bisector/mesh/sampling.h"
@@ -20,17 +22,9 @@
 namespace bisector::cli {
 namespace {
 
-// Only the CPU computes so far; what asks for another device is refused rather than served by it.
-Device choose_device(const ComputeOptions& options) {
-  if (options.device != "auto" && options.device != "cpu")
-    throw Error(fmt::format("--device {}: this version computes on the CPU only; use --device cpu", options.device));
-  if (options.precision == "single")
-    throw Error("--precision single: the CPU computes in double precision only; use --precision double");
-  return cpu_device();
-}
-
-NeighbourSource choose_neighbours(const ComputeOptions& options) {
-  return options.neighbours == "delaunay" ? NeighbourSource::delaunay : NeighbourSource::nearest;
+ComputeOptions compute_options(const ComputeWords& words) {
+  return {words.device, parse_precision(words.precision),
+          words.neighbours == "delaunay" ? NeighbourSource::delaunay : NeighbourSource::nearest};
 }
 
 Json seconds_json(const DiagramSeconds& seconds) {
@@ -42,11 +36,6 @@ Json seconds_json(const DiagramSeconds& seconds) {
 
 const char* yes_no(bool b) { return b ? "yes" : "no"; }
 
-// "1 face", "2 faces".
-std::string counted(std::size_t n, const char* one, const char* many) {
-  return fmt::format("{} {}", n, n == 1 ? one : many);
-}
-
 std::string size_of(const Json& mesh) {
   return counted(mesh["vertices"], "vertex", "vertices") + ", " + counted(mesh["faces"], "face", "faces");
 }
@@ -57,17 +46,23 @@ std::string describe(const MeshTopology& topology) {
                      counted(topology.components, "component", "components"), topology.euler);
 }
 
-void print_seconds(Console& console, const Json& seconds) {
-  std::string line = "seconds   ";
+void print_phases(Console& console, const char* title, const Json& seconds) {
+  std::string line = fmt::format("{:<10}", title);
   for (const auto& [phase, value] : seconds.items()) line += fmt::format(" {} {:.3f} ", phase, value.get<double>());
   console.print(line);
 }
 
-void print_written(Console& console, const std::vector<std::string>& paths) {
-  std::string line;
-  for (const std::string& path : paths)
-    if (!path.empty() && path != "-") line += (line.empty() ? "written    " : ", ") + path;
-  if (!line.empty()) console.print(line);
+void print_seconds(Console& console, const Json& seconds, const Json& device_seconds = nullptr) {
+  print_phases(console, "seconds", seconds);
+  if (!device_seconds.is_null()) print_phases(console, "on device", device_seconds);
+}
+
+// What computed, where that was not the CPU all along.
+void print_device(Console& console, const BackendDescription& device) {
+  if (device.kind != "cpu")
+    console.print(fmt::format("device     {}, {} precision", device.name, device.precision));
+  else if (!device.fallback.empty())
+    console.print(fmt::format("device     {}; {}", device.name, device.fallback));
 }
 
 std::vector<Vec3> read_seeds(const std::string& path, std::size_t count) {
@@ -83,7 +78,7 @@ std::vector<Vec3> read_seeds(const std::string& path, std::size_t count) {
 RemeshOptions remesh_options(const RemeshCommand& command) {
   RemeshOptions options = command.options;
   options.threads = command.common.threads;
-  options.neighbours = choose_neighbours(command.compute);
+  options.compute = compute_options(command.compute);
   options.energy = command.energy == "rcvt" ? Energy::restricted : Energy::constrained;
   options.topology = command.topology == "enforce" ? TopologyControl::enforce
                      : command.topology == "check" ? TopologyControl::check
@@ -112,9 +107,9 @@ void warn_of_topology(Console& console, const RemeshResult& result) {
 
 // Everything but the seconds, whose place is kept.
 Json remesh_report(Console& console, const RemeshResult& result, const QualityReport& quality,
-                   const TriangleMesh& input, const Device& device) {
+                   const TriangleMesh& input) {
   Json report = start_report("remesh");
-  report["device"] = device_json(device);
+  report["device"] = device_json(result.device);
   report["input"] = input_json(input);
   report["output"] = output_json(result.mesh);
   report["iterations"] = result.iterations;
@@ -122,6 +117,7 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["energy"] = result.energy;
   report["gradient_norm"] = result.gradient_norm;
   report["seconds"] = nullptr;
+  add_device_seconds(report, result.device, result.seconds.diagrams.device);
   report["certification"] = certification_json(result.certification);
   report["quality"] = quality_json(quality);
   console.phase("measuring the distance to the input");
@@ -135,7 +131,7 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
 
 Json remesh_seconds(const RemeshSeconds& seconds) {
   Json json{{"total", seconds.total}};
-  json.update(seconds_json({seconds.delaunay, seconds.neighbours, seconds.pairs, seconds.clip}));
+  json.update(seconds_json(seconds.diagrams));
   json["lbfgs"] = seconds.lbfgs;
   json["extract"] = seconds.extract;
   json["remesh"] = seconds.total;
@@ -153,23 +149,29 @@ void print_summary(Console& console, const RemeshCommand& command, const RemeshR
   console.print(fmt::format("topology   {}{}", describe(result.topology),
                             result.topology_matches ? "; as the input" : "; NOT as the input"));
   console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));
+  print_device(console, result.device);
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
-  if (command.common.verbose) print_seconds(console, seconds);
-  print_written(console, {command.output, command.preview, command.common.report});
+  if (command.common.verbose)
+    print_seconds(console, seconds, device_seconds_json(result.device, result.seconds.diagrams.device));
+  console.print_written({command.output, command.preview, command.common.report});
 }
 
 // --- rvd ---
 
 struct Diagram {
+  BackendDescription device;
+  double mass_tolerance = 0;
   CellMoments moments;
   RestrictedPolygons polygons;
   Dual dual;
 };
 
-Diagram compute_diagram(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source) {
+Diagram compute_diagram(Backend& backend, const std::vector<Vec3>& seeds) {
   Diagram diagram;
-  RestrictedVoronoi(surface).evaluate(seeds, source, diagram.moments, diagram.polygons);
-  if (const std::size_t untiled = count_untiled(surface, diagram.polygons); untiled > 0)
+  backend.evaluate(seeds, diagram.moments, diagram.polygons);
+  diagram.device = backend.description();
+  diagram.mass_tolerance = backend.mass_tolerance();
+  if (const std::size_t untiled = count_untiled(backend.surface(), diagram.polygons); untiled > 0)
     throw Error(fmt::format("the diagram does not tile {} of the input; please report this as a bug",
                             counted(untiled, "triangle", "triangles")));
   diagram.dual = extract_dual(diagram.polygons);
@@ -225,15 +227,15 @@ void write_cells(const RvdCommand& command, const RestrictedPolygons& polygons, 
   write_preview(command.preview, cells.vertices, cells.polygons, picture);
 }
 
-Json rvd_report(const Diagram& diagram, const TriangleMesh& input, const std::vector<Vec3>& seeds,
-                const Device& device, const Json& seconds) {
+Json rvd_report(const Diagram& diagram, const TriangleMesh& input, const std::vector<Vec3>& seeds, const Json& seconds) {
   Json report = start_report("rvd");
-  report["device"] = device_json(device);
+  report["device"] = device_json(diagram.device);
   report["input"] = input_json(input);
   report["energy"] = diagram.moments.energy;
   report["mass"] = diagram.moments.mass;
   report["untiled"] = 0;  // a diagram that does not tile is not reported
   report["seconds"] = seconds;
+  add_device_seconds(report, diagram.device, diagram.moments.seconds.device);
   report["certification"] = certification_json(diagram.moments.certification);
   report["cells"] = cells_json(diagram.moments, seeds);
   report["rdt"] = rdt_json(diagram.dual);
@@ -249,11 +251,13 @@ void print_summary(Console& console, const RvdCommand& command, const Diagram& d
   console.print(fmt::format("cells      {}, {} of them empty; energy {:.6e}", moments.cells.size(), empty,
                             moments.energy));
   console.print(fmt::format("pairs      {} of a cell and a triangle, {} decided in exact arithmetic",
-                            moments.certification.pairs, moments.certification.uncertain));
+                            moments.certification.pairs, moments.certification.cpu));
   console.print(fmt::format("dual       {}", counted(diagram.dual.triangles.size(), "triangle", "triangles")));
+  print_device(console, diagram.device);
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
-  if (command.common.verbose) print_seconds(console, seconds);
-  print_written(console, {command.output, command.preview, command.pairs, command.common.report});
+  if (command.common.verbose)
+    print_seconds(console, seconds, device_seconds_json(diagram.device, moments.seconds.device));
+  console.print_written({command.output, command.preview, command.pairs, command.common.report});
 }
 
 // --- quality ---
@@ -307,9 +311,12 @@ void print_quality(Console& console, const QualityCommand& command, const Qualit
 
 }  // namespace
 
+Precision parse_precision(const std::string& word) {
+  return word == "single" ? Precision::single : word == "double" ? Precision::double_ : Precision::automatic;
+}
+
 void run(const RemeshCommand& command) {
   const Stopwatch total;
-  const Device device = choose_device(command.compute);
   const std::string& report_path = command.common.report;
   check_outputs({{command.output, kMeshFormats}, {command.preview, {".png"}}, {report_path, {}}},
                 {command.input, command.seeds});
@@ -331,7 +338,7 @@ void run(const RemeshCommand& command) {
   const Stopwatch measuring;
   const QualityReport quality = measure_quality(result.mesh);
   Json report;
-  if (!report_path.empty()) report = remesh_report(console, result, quality, input, device);
+  if (!report_path.empty()) report = remesh_report(console, result, quality, input);
   Json seconds = remesh_seconds(result.seconds);
   seconds["quality"] = measuring.seconds();
 
@@ -354,7 +361,6 @@ void run(const RemeshCommand& command) {
 
 void run(const RvdCommand& command) {
   const Stopwatch total;
-  const Device device = choose_device(command.compute);
   const std::string& report_path = command.common.report;
   check_outputs({{command.output, {".ply"}}, {command.preview, {".png"}}, {command.pairs, {}}, {report_path, {}}},
                 {command.input, command.seeds});
@@ -369,10 +375,11 @@ void run(const RvdCommand& command) {
 
   console.phase("computing the diagram");
   const Surface surface(input);
+  const std::unique_ptr<Backend> backend = make_backend(surface, compute_options(command.compute), console.context());
   const Stopwatch computing;
-  const Diagram diagram = compute_diagram(surface, seeds, choose_neighbours(command.compute));
+  const Diagram diagram = compute_diagram(*backend, seeds);
   const double computed = computing.seconds();
-  if (std::abs(diagram.moments.mass - surface.mass) > 1e-12 * surface.mass)
+  if (std::abs(diagram.moments.mass - surface.mass) > diagram.mass_tolerance * surface.mass)
     console.warn(fmt::format("the masses of the cells sum to {}, the area is {}", diagram.moments.mass, surface.mass));
 
   console.phase("writing");
@@ -387,7 +394,7 @@ void run(const RvdCommand& command) {
   seconds.update(seconds_json(phases));
   seconds["extract"] = computed - (phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
   seconds["io"] = io;
-  if (!report_path.empty()) write_report(report_path, rvd_report(diagram, input, seeds, device, seconds));
+  if (!report_path.empty()) write_report(report_path, rvd_report(diagram, input, seeds, seconds));
   print_summary(console, command, diagram, input, seconds);
 }
 
@@ -434,24 +441,7 @@ void run(const QualityCommand& command) {
   }
   print_quality(console, command, measures, input_json(mesh));
   if (command.common.verbose) print_seconds(console, seconds);
-  print_written(console, {report_path});
-}
-
-void run(const DevicesCommand& command) {
-  check_outputs({{}, {command.report, {}}}, {});
-  const Device device = cpu_device();
-  if (!command.report.empty()) {
-    Json entry = device_json(device);
-    entry["threads"] = device.threads;
-    entry["memory"] = device.memory;
-    Json report = start_report("devices");
-    report["devices"] = Json::array({entry});
-    write_report(command.report, report);
-  }
-  Console console(false, command.report == "-");
-  console.print(fmt::format("cpu   {}: {}, {:.1f} GiB of memory, double precision", device.name,
-                            counted(device.threads, "thread", "threads"), device.memory / 0x1p30));
-  print_written(console, {command.report});
+  console.print_written({report_path});
 }
 
 }  // namespace bisector::cli

@@ -17,17 +17,20 @@ struct CommonOptions {
 };
 
 // What computes diagrams, as the words of the command line.
-struct ComputeOptions {
+struct ComputeWords {
   std::string device = "auto";
   std::string precision = "auto";
   std::string neighbours = "auto";
 };
 
+// "auto", "single" or "double".
+Precision parse_precision(const std::string& word);
+
 struct RemeshCommand {
   std::string input, output, seeds, preview;
   std::string topology = "enforce", energy = "ccvt";
   RemeshOptions options;
-  ComputeOptions compute;
+  ComputeWords compute;
   CommonOptions common;
 };
 
@@ -35,7 +38,7 @@ struct RvdCommand {
   std::string input, output, seeds, pairs, preview;
   std::size_t count = 0;
   std::uint64_t random_seed = 1;
-  ComputeOptions compute;
+  ComputeWords compute;
   CommonOptions common;
 };
 
@@ -48,10 +51,16 @@ struct DevicesCommand {
   std::string report;
 };
 
-// All throw Error and Cancelled; then no output was written.
+struct CheckCommand {
+  std::string device = "auto", precision = "auto";
+  CommonOptions common;
+};
+
+// All throw Error and Cancelled; then no output was written, except for a check whose report tells what does not agree.
 void run(const RemeshCommand& command);
 void run(const RvdCommand& command);
 void run(const QualityCommand& command);
 void run(const DevicesCommand& command);
+void run(const CheckCommand& command);
 
 }  // namespace bisector::cli

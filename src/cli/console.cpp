@@ -56,6 +56,10 @@ void stop_watching_interrupts() {
 
 void print_error(std::string_view message) { fmt::print(stderr, "bisector: error: {}\n", one_line(message)); }
 
+std::string counted(std::size_t n, const char* one, const char* many) {
+  return fmt::format("{} {}", n, n == 1 ? one : many);
+}
+
 Console::Console(bool quiet, bool stdout_is_taken)
     : quiet_(quiet), live_(!quiet && isatty(STDERR_FILENO)), out_(stdout_is_taken ? stderr : stdout) {}
 
@@ -84,6 +88,13 @@ void Console::print(std::string_view line) {
   if (quiet_) return;
   clear_line();
   fmt::print(out_, "{}\n", line);
+}
+
+void Console::print_written(const std::vector<std::string>& paths) {
+  std::string line;
+  for (const std::string& path : paths)
+    if (!path.empty() && path != "-") line += (line.empty() ? "written    " : ", ") + path;
+  if (!line.empty()) print(line);
 }
 
 void Console::show(const Progress& progress) {

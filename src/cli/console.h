@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "bisector/core/context.h"
 
@@ -25,6 +26,9 @@ void stop_watching_interrupts();
 // One line on stderr: "bisector: error: ...". Control characters in it are replaced.
 void print_error(std::string_view message);
 
+// "1 face", "2 faces".
+std::string counted(std::size_t n, const char* one, const char* many);
+
 class Console {
  public:
   // `quiet` leaves errors only. With `stdout_is_taken`, text for people goes to stderr.
@@ -40,6 +44,8 @@ class Console {
   void warn(std::string_view message);
   // One line of the summary.
   void print(std::string_view line);
+  // The line that a summary ends with; empty names and "-" are left out.
+  void print_written(const std::vector<std::string>& paths);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -90,12 +90,15 @@ CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const 
   return app->add_option(name, path, help)->type_name(type)->check(not_empty());
 }
 
-void add_compute_options(CLI::App* app, ComputeOptions& options) {
+void add_compute_options(CLI::App* app, ComputeWords& options) {
   app->add_option("--device", options.device,
-                  "what computes: auto, cpu, vulkan, vulkan:INDEX or\n"
-                  "vulkan:UUID; this version has cpu only")
+                  "what computes: auto (the best GPU, or the CPU; default),\n"
+                  "cpu, vulkan (the best device), vulkan:INDEX or\n"
+                  "vulkan:UUID as 'bisector devices' lists them")
       ->type_name("DEVICE")->check(device_name())->group("Computation");
-  app->add_option("--precision", options.precision, "auto, single or double; cpu has double only")
+  app->add_option("--precision", options.precision,
+                  "auto (double where the device has it), single or double;\n"
+                  "the CPU has double only")
       ->type_name("WORD")->check(one_of({"auto", "single", "double"}))->group("Computation");
   app->add_option("--neighbors", options.neighbours,
                   "where neighbours of seeds come from: auto, nearest or\n"
@@ -210,6 +213,23 @@ CLI::App* add_devices(CLI::App& program, DevicesCommand& command) {
   return app;
 }
 
+CLI::App* add_check(CLI::App& program, CheckCommand& command) {
+  CLI::App* app = add_command(
+      program, "check", "Compare a device's diagrams with the CPU's.", "bisector check [--device DEVICE] [options]",
+      "Examples:\n"
+      "  bisector check\n"
+      "  bisector check --device vulkan:1 --precision single --report check.json\n\n"
+      "Prints one line for each case, and exits with 1 if any does not agree.");
+  app->add_option("--device", command.device,
+                  "what to check: auto (the best GPU; default), cpu (against\n"
+                  "itself), vulkan, vulkan:INDEX or vulkan:UUID")
+      ->type_name("DEVICE")->check(device_name())->group("Computation");
+  app->add_option("--precision", command.precision, "auto (both, where the device has double), single or double")
+      ->type_name("WORD")->check(one_of({"auto", "single", "double"}))->group("Computation");
+  add_common_options(app, command.common, "write a JSON report with one row for each case; - for\nstdout");
+  return app;
+}
+
 // What options ask of each other.
 void check_usage(const RemeshCommand& command) {
   if (command.seeds.empty() && command.options.vertices == 0)
@@ -265,10 +285,12 @@ int main(int argc, char** argv) {
   RvdCommand rvd;
   QualityCommand quality;
   DevicesCommand devices;
+  CheckCommand check;
   CLI::App* const remesh_app = add_remesh(program, remesh);
   CLI::App* const rvd_app = add_rvd(program, rvd);
   CLI::App* const quality_app = add_quality(program, quality);
   CLI::App* const devices_app = add_devices(program, devices);
+  CLI::App* const check_app = add_check(program, check);
   const auto chosen = [&]() -> const CLI::App* {
     const auto parsed = program.get_subcommands();
     return parsed.empty() ? nullptr : parsed.front();
@@ -293,5 +315,6 @@ int main(int argc, char** argv) {
     if (rvd_app->parsed()) run(rvd);
     if (quality_app->parsed()) run(quality);
     if (devices_app->parsed()) run(devices);
+    if (check_app->parsed()) run(check);
   });
 }

@@ -1,13 +1,10 @@
 #include "report.h"
 
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdio>
-#include <fstream>
+#include <utility>
 
 #include "bisector/core/error.h"
-#include "bisector/core/parallel.h"
 #include "bisector/mesh/io.h"
 
 namespace bisector::cli {
@@ -41,26 +38,27 @@ void append(std::string& out, const Json& value, std::size_t indent) {
   out += '\n' + std::string(indent, ' ') + (rows ? ']' : '}');
 }
 
-std::string processor_name() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);)
-    if (line.starts_with("model name"))
-      if (const std::size_t begin = line.find_first_not_of(" \t:", 10); begin != std::string::npos)
-        return line.substr(begin);
-  return "CPU";
-}
-
 }  // namespace
-
-Device cpu_device() {
-  const long pages = sysconf(_SC_PHYS_PAGES), page_size = sysconf(_SC_PAGE_SIZE);
-  const double memory = pages > 0 && page_size > 0 ? static_cast<double>(pages) * static_cast<double>(page_size) : 0;
-  return {processor_name(), thread_count(), memory};
-}
 
 Json start_report(const char* command) { return {{"command", command}, {"version", BISECTOR_VERSION}}; }
 
-Json device_json(const Device& device) { return {{"name", device.name}, {"kind", "cpu"}, {"precision", "double"}}; }
+Json device_json(const BackendDescription& device) {
+  Json json{{"name", device.name}, {"kind", device.kind}, {"precision", device.precision}};
+  if (!device.fallback.empty()) json["fallback"] = device.fallback;
+  return json;
+}
+
+Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds) {
+  if (device.kind == "cpu" && device.fallback.empty()) return nullptr;
+  return {{"transfer", seconds.transfer}, {"grid", seconds.grid}, {"neighbours", seconds.neighbours},
+          {"owners", seconds.owners},     {"clip", seconds.clip}, {"sort", seconds.sort},
+          {"sum", seconds.sum}};
+}
+
+void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds) {
+  Json json = device_seconds_json(device, seconds);
+  if (!json.is_null()) report["device_seconds"] = std::move(json);
+}
 
 Json input_json(const TriangleMesh& mesh) {
   const std::size_t faces =
@@ -76,8 +74,8 @@ Json certification_json(const Certification& certification) {
   return {{"pairs", certification.pairs},
           {"uncertain", certification.uncertain},
           {"wider", certification.wider},
-          {"double", 0},
-          {"cpu", certification.uncertain}};
+          {"double", certification.doubled},
+          {"cpu", certification.cpu}};
 }
 
 Json topology_json(const MeshTopology& topology) {

@@ -22,19 +22,13 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// What computes: the processor of this machine.
-struct Device {
-  std::string name;
-  unsigned threads;
-  double memory;  // bytes; 0 if unknown
-};
-Device cpu_device();
-
 Json start_report(const char* command);  // command and version
-Json device_json(const Device& device);
+Json device_json(const BackendDescription& device);
+// Null where no device took part.
+Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds);
+void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds);
 Json input_json(const TriangleMesh& mesh);   // faces as in the file
 Json output_json(const TriangleMesh& mesh);
-// Pairs that the filter did not decide are all settled by the CPU's exact arithmetic.
 Json certification_json(const Certification& certification);
 Json topology_json(const MeshTopology& topology);
 Json quality_json(const QualityReport& quality);

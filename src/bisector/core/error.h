@@ -1,4 +1,4 @@
-// The two exceptions that leave the library.
+// The exceptions that leave the library.
 #pragma once
 
 #include <stdexcept>
@@ -10,6 +10,12 @@ namespace bisector {
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+// A compute device is missing, was lost, or has run out of memory. Nothing it computed is used.
+class DeviceError : public Error {
+ public:
+  using Error::Error;
 };
 
 // The caller's cancel flag was set; nothing was written.

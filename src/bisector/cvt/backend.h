@@ -1,12 +1,20 @@
 // The contract between the optimiser and whatever computes restricted Voronoi diagrams.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "bisector/core/types.h"
 #include "bisector/voronoi/restricted.h"
 
 namespace bisector {
+
+struct BackendDescription {
+  std::string name;       // of the processor or device
+  std::string kind;       // "cpu", or a device's: "discrete", "integrated", "virtual", "software", "other"
+  std::string precision;  // "single" or "double"
+  std::string fallback;   // why a device was given up for this one; empty if none was
+};
 
 // A backend holds one surface. Every backend returns the same pairs and labels for the same seeds; moments agree to
 // rounding, and runs repeat bit for bit.
@@ -15,7 +23,12 @@ class Backend {
   virtual ~Backend() = default;
 
   virtual const Surface& surface() const = 0;
-  // Moments of all cells of the seeds' diagram.
+  virtual BackendDescription description() const = 0;
+  // By how much, relative to the whole, rounding may make the sum of all masses miss the surface's.
+  virtual double mass_tolerance() const = 0;
+  // Energies nearer than this, relative, may compare wrongly because of rounding; 0 if comparing them is good enough.
+  virtual double energy_noise() const { return 0; }
+  // Moments of all cells of the seeds' diagram. After a DeviceError neither results nor backend are good for anything.
   virtual void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) = 0;
   // The same, and the polygons.
   virtual void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) = 0;

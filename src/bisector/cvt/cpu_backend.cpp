@@ -1,9 +1,17 @@
 #include "bisector/cvt/cpu_backend.h"
 
+#include <utility>
+
+#include "bisector/core/processor.h"
+
 namespace bisector {
 
-CpuBackend::CpuBackend(const Surface& surface, NeighbourSource source)
-    : surface_(surface), source_(source), diagram_(surface) {}
+CpuBackend::CpuBackend(const Surface& surface, NeighbourSource source) : CpuBackend(surface, source, {}) {}
+
+CpuBackend::CpuBackend(const Surface& surface, NeighbourSource source, std::string fallback)
+    : surface_(surface), source_(source), fallback_(std::move(fallback)), diagram_(surface) {}
+
+BackendDescription CpuBackend::description() const { return {processor_name(), "cpu", "double", fallback_}; }
 
 void CpuBackend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) {
   diagram_.evaluate(seeds, source_, moments);

@@ -13,7 +13,6 @@
 namespace bisector {
 namespace {
 
-constexpr double kMassTolerance = 1e-12;   // relative; a diagram whose cells do not add up is never used
 constexpr double kArmijo = 1e-4;
 constexpr double kFlatGradient = 1e-8;     // relative to the first; what is left is rounding
 constexpr int kLineSearchTrials = 8;
@@ -24,7 +23,8 @@ void evaluate(Backend& backend, bool constrained, CvtState& state, OptimiseTotal
   backend.evaluate(state.seeds, state.moments);
   totals.count(state.moments);
   const double total = backend.surface().mass;
-  const bool covers = std::abs(state.moments.mass - total) <= kMassTolerance * total;
+  // A diagram whose cells do not add up is never used.
+  const bool covers = std::abs(state.moments.mass - total) <= backend.mass_tolerance() * total;
   state.energy = covers ? state.moments.energy : std::numeric_limits<double>::infinity();
   state.gradient.resize(state.seeds.size());
   parallel_each(state.seeds.size(), [&](std::size_t i) {
@@ -73,6 +73,16 @@ std::vector<double> preconditioner(const CellMoments& moments) {
   return d;
 }
 
+// Whether a step lowers the energy enough; where rounding hides that, whether the slope says so: the approximate Wolfe
+// condition (Hager and Zhang 2005, section 2).
+bool is_descent(const Backend& backend, const CvtState& state, const CvtState& next, const std::vector<Vec3>& direction,
+                double slope, double step) {
+  if (next.energy <= state.energy + kArmijo * step * slope) return true;
+  const double noise = backend.energy_noise() * state.energy;
+  return noise > 0 && next.energy <= state.energy + noise &&
+         inner(next.gradient, direction) <= (2 * kArmijo - 1) * slope;
+}
+
 // Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then `next`
 // is not to be used.
 bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3>& direction, bool constrained,
@@ -88,7 +98,7 @@ bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3
       project_to_cells(backend.surface(), state.moments.triangles, next.seeds, next.normals);
     }
     evaluate(backend, constrained, next, totals);
-    if (next.energy <= state.energy + kArmijo * step * slope) return true;
+    if (is_descent(backend, state, next, direction, slope, step)) return true;
     const double excess = next.energy - state.energy - step * slope;
     const double vertex = std::isfinite(excess) ? -0.5 * slope * step * step / excess : 0;
     step = std::clamp(vertex, 0.1 * step, 0.5 * step);
@@ -100,10 +110,7 @@ bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3
 
 void OptimiseTotals::count(const CellMoments& moments) {
   ++evaluations;
-  seconds.delaunay += moments.seconds.delaunay;
-  seconds.neighbours += moments.seconds.neighbours;
-  seconds.pairs += moments.seconds.pairs;
-  seconds.clip += moments.seconds.clip;
+  seconds += moments.seconds;
 }
 
 void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,

@@ -195,7 +195,7 @@ double edge_strength(const Scene& scene, std::size_t polygon) {
   for (std::size_t k = first; k < last; ++k) {
     const Projected &a = scene.point(k), &b = scene.point(k + 1 < last ? k + 1 : first);
     twice_area += a.x * b.y - b.x * a.y;
-    perimeter += std::hypot(b.x - a.x, b.y - a.y);
+    perimeter += std::sqrt((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y));
   }
   const double inradius = perimeter > 0 ? std::abs(twice_area) / perimeter : 0;
   return 0.78 * std::clamp((inradius / kSub - 0.25) / 1.75, 0.0, 1.0);
@@ -229,7 +229,7 @@ double Band::edge_distance(std::size_t polygon, double x, double y) const {
   double least = 1e9;
   for (std::size_t k = first; k < last; ++k) {
     const Projected &a = scene_.point(k), &b = scene_.point(k + 1 < last ? k + 1 : first);
-    const double dx = b.x - a.x, dy = b.y - a.y, length = std::hypot(dx, dy);
+    const double dx = b.x - a.x, dy = b.y - a.y, length = std::sqrt(dx * dx + dy * dy);
     if (length > 0) least = std::min(least, std::abs(dx * (y - a.y) - dy * (x - a.x)) / length);
   }
   return least;

@@ -4,11 +4,11 @@
 
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "bisector/core/parallel.h"
-#include "bisector/cvt/cpu_backend.h"
 #include "bisector/cvt/multilevel.h"
 #include "bisector/cvt/optimise.h"
 #include "bisector/remesh/topology_control.h"
@@ -47,11 +47,21 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   check_options(options);
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
-  RemeshResult result;
-  result.input_topology = analyse_topology(input.triangles, input.vertices.size());
-
   const Surface surface(input);
-  CpuBackend backend(surface, options.neighbours);
+  const std::unique_ptr<Backend> backend = make_backend(surface, options.compute, context);
+  RemeshResult result = remesh(*backend, options, context);
+  result.seconds.total = seconds_since(begin);
+  return result;
+}
+
+RemeshResult remesh(Backend& backend, const RemeshOptions& options, const Context& context) {
+  const auto begin = Clock::now();
+  check_options(options);
+  std::optional<ThreadLimit> limit;
+  if (options.threads) limit.emplace(options.threads);
+  const Surface& surface = backend.surface();
+  RemeshResult result;
+  result.input_topology = analyse_topology(surface.mesh.triangles, surface.mesh.vertices.size());
   CvtState state;
   OptimiseTotals totals;
   RestrictedPolygons polygons;
@@ -111,8 +121,8 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   result.energy = state.energy;
   result.gradient_norm = state.gradient_norm;
   result.certification = state.moments.certification;
-  result.seconds = {seconds_since(begin), totals.seconds.delaunay, totals.seconds.neighbours, totals.seconds.pairs,
-                    totals.seconds.clip, totals.seconds_lbfgs, seconds_since(extraction)};
+  result.device = backend.description();
+  result.seconds = {seconds_since(begin), totals.seconds_lbfgs, seconds_since(extraction), totals.seconds};
   return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include "bisector/core/context.h"
 #include "bisector/core/types.h"
+#include "bisector/cvt/compute.h"
 #include "bisector/mesh/topology.h"
 #include "bisector/voronoi/restricted.h"
 
@@ -32,12 +33,13 @@ struct RemeshOptions {
   int levels = 0;                          // of the multilevel start; 0: as many as the count allows, at most 3
   Energy energy = Energy::constrained;
   TopologyControl topology = TopologyControl::enforce;
-  NeighbourSource neighbours = NeighbourSource::nearest;
+  ComputeOptions compute;
   unsigned threads = 0;                    // 0: all cores
 };
 
 struct RemeshSeconds {
-  double total = 0, delaunay = 0, neighbours = 0, pairs = 0, clip = 0, lbfgs = 0, extract = 0;
+  double total = 0, lbfgs = 0, extract = 0;
+  DiagramSeconds diagrams;        // of the optimiser, summed over its evaluations
 };
 
 struct RemeshResult {
@@ -51,11 +53,15 @@ struct RemeshResult {
   double gradient_norm = 0;       // Euclidean norm over all seeds (tangential where constrained)
   Certification certification;    // of the final diagram
   std::size_t untiled = 0;        // triangles that fail the tiling check of the final diagram: 0, or the run is wrong
+  BackendDescription device;      // that computed the final diagram
   RemeshSeconds seconds;
 };
 
-// Remeshes a surface with `options.vertices` vertices. Throws Error on input without area or fewer than 4 vertices, and
-// Cancelled.
+// Remeshes a surface with `options.vertices` vertices. Throws Error on input without area or fewer than 4 vertices, DeviceError
+// if the device asked for is missing or fails, and Cancelled.
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context = {});
+
+// The same of a backend's surface, with no heed to `options.compute`.
+RemeshResult remesh(Backend& backend, const RemeshOptions& options, const Context& context = {});
 
 }  // namespace bisector

@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kUnit = 0x1p-53;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Lines that meet at a smaller angle (sine, squared) have their vertex computed exactly.
-constexpr double kSteep = 1e-8;
+// Lines that meet at a smaller angle (sine, squared) have their vertex computed exactly, and below the second in two steps.
+constexpr double kSteep = 1e-12, kShallow = 1e-8;
 // No product of coordinates this small is told from 0, for the bounds below do not cover underflow.
 constexpr double kTiny = 1e-300;
 
@@ -120,21 +120,38 @@ unsigned Clipper::add_line(Index other, const Vec3& d, double squared) {
   return static_cast<unsigned>(line_count_++);
 }
 
-// A closed chain of corners, each where two lines that follow each other meet, that all lie strictly within every other line
-// is the boundary of the clipped facet: each is a vertex of it, and two on one line end that line's edge.
-bool Clipper::confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count) {
-  start(slot);
-  place_lines();
+void Clipper::set_labels(const Index* labels, std::size_t count) {
   polygon_.reserve(count);
   polygon_.size = 0;
   for (std::size_t k = 0; k < count; ++k) {
     if (is_edge(labels[k])) {
       polygon_.push(labels[k] & ~kEdgeLabel);
     } else {
-      const Vec3 d = seeds_->x[labels[k]] - seeds_->x[slot];
+      const Vec3 d = seeds_->x[labels[k]] - seeds_->x[slot_];
       polygon_.push(add_line(labels[k], d, norm2(d)));
     }
   }
+}
+
+void Clipper::take(Index slot, const Index* labels, std::size_t count) {
+  start(slot);
+  place_lines();
+  set_labels(labels, count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Line &before = lines_[polygon_.edges[previous(k)]], &after = lines_[polygon_.edges[k]];
+    if (is_edge(before.slot) && is_edge(after.slot))
+      polygon_.corners[k] = {local_[after.slot & ~kEdgeLabel], 8 * kUnit * largest_};
+    else
+      add_corner(before, after, polygon_.corners[k]);
+  }
+}
+
+// A closed chain of corners, each where two lines that follow each other meet, that all lie strictly within every other line
+// is the boundary of the clipped facet: each is a vertex of it, and two on one line end that line's edge.
+bool Clipper::confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count) {
+  start(slot);
+  place_lines();
+  set_labels(labels, count);
   for (std::size_t k = 0; k < count; ++k) {
     const Line &before = lines_[polygon_.edges[previous(k)]], &after = lines_[polygon_.edges[k]];
     if (is_edge(before.slot) && is_edge(after.slot)) {
@@ -311,7 +328,16 @@ bool Clipper::meet(const Line& before, const Line& after, Corner& corner) const 
   const double square = determinant * determinant;
   if (!(square > kSteep * squares)) return false;
   const double inverse = 1 / determinant;
-  corner.at = foot_ + inverse * (after.offset * before.along - before.offset * after.along);
+  Vec3 w = inverse * (after.offset * before.along - before.offset * after.along);
+  if (!(square > kShallow * squares)) {
+    // The determinant's error takes w off both lines; what is left then is an error along them, which hardly changes an area.
+    // Only the lines' normals in the plane will do for it: m times the error of w across the plane may be far larger.
+    const Vec3 n = facet_->normal;
+    const double left_before = before.offset - dot(cross(before.along, n), w);
+    const double left_after = after.offset - dot(cross(after.along, n), w);
+    w += inverse * (left_after * before.along - left_before * after.along);
+  }
+  corner.at = foot_ + w;
   corner.slack = 2000 * kUnit * largest_ * std::sqrt(squares / square);
   return (determinant > 0) == (points_out(before) == points_out(after));
 }

@@ -27,6 +27,8 @@ class Clipper {
   bool confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count);
   // Takes the whole facet, which the caller knows to lie in the cell.
   void take(Index slot);
+  // Takes the polygon bounded by the lines with these labels in this cyclic order, which the caller knows to be the result.
+  void take(Index slot, const Index* labels, std::size_t count);
 
   // The last polygon, counter-clockwise: vertex k relative to the seed, and the label (a slot or a facet edge) of the edge
   // that starts there.
@@ -95,6 +97,7 @@ class Clipper {
   unsigned may_cut(const Block& block) const;
   void place_lines();
   unsigned add_line(Index other, const Vec3& towards, double squared);
+  void set_labels(const Index* labels, std::size_t count);
   // Whether corner k is certain to lie on the inner side of the line.
   bool certainly_inside(std::size_t corner, const Line& line) const;
   bool certainly_passes(Index other) const;

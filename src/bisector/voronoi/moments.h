@@ -18,6 +18,9 @@ struct Moments {
   }
 };
 
+// Quotients are products with rounded reciprocals, for not every device divides as the CPU does.
+inline constexpr double kThird = 1.0 / 3, kTwelfth = 1.0 / 12, kThirtieth = 1.0 / 30;
+
 // The moments about x of a shape whose moments about `origin` are m; `to_origin` is origin - x.
 inline Moments moved(const Moments& m, const Vec3& to_origin) {
   return {m.mass, m.mass * to_origin + m.first,
@@ -26,7 +29,7 @@ inline Moments moved(const Moments& m, const Vec3& to_origin) {
 
 // Moments of a triangle of signed area `area` with density 1, from the sum of its corners and of their squared lengths.
 inline Moments triangle_moments(const Vec3& sum, double squares, double area) {
-  return {area, (area / 3) * sum, (area / 12) * (norm2(sum) + squares)};
+  return {area, (kThird * area) * sum, (kTwelfth * area) * (norm2(sum) + squares)};
 }
 
 // Moments of the triangle (a, b, c) with the density linear, ra, rb and rc at the corners.
@@ -35,7 +38,7 @@ inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, dou
   const Vec3 first = (s + ra) * a + (s + rb) * b + (s + rc) * c;
   const double squares = (s + ra + ra) * norm2(a) + (s + rb + rb) * norm2(b) + (s + rc + rc) * norm2(c);
   const double products = (s + ra + rb) * dot(a, b) + (s + rb + rc) * dot(b, c) + (s + rc + ra) * dot(c, a);
-  return {(area / 3) * s, (area / 12) * first, (area / 30) * (squares + products)};
+  return {(kThird * area) * s, (kTwelfth * area) * first, (kThirtieth * area) * (squares + products)};
 }
 
 }  // namespace bisector

@@ -101,7 +101,7 @@ void Neighbours::drop_grown() {
   head_count_ = 0;
 }
 
-void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
+void Neighbours::start(const SortedSeeds& seeds) {
   const std::size_t n = seeds.x.size();
   drop_grown();
   heads_ = std::make_unique<std::atomic<Grown*>[]>(n);
@@ -109,6 +109,20 @@ void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
   seeds_ = &seeds;
   last_rung_ = std::make_unique<LastRung>();
   if (n) tree_.build(seeds.x);
+}
+
+void Neighbours::build_on_demand(const SortedSeeds& seeds, double radius) {
+  start(seeds);
+  use_rings_ = false;
+  built_x_.clear();
+  on_demand_ = true;
+  first_radius_ = radius > 0 ? radius : 1e-3 * seeds.extent;
+}
+
+void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
+  const std::size_t n = seeds.x.size();
+  start(seeds);
+  on_demand_ = false;
   use_rings_ = source == NeighbourSource::delaunay && last_rung().rings.has_value();
   built_x_.clear();
   if (use_rings_) return;
@@ -247,6 +261,7 @@ NeighbourList Neighbours::list(Index slot) const {
     const auto& rings = *last_rung_->rings;
     return {rings.begin(slot), rings.end(slot), kInfinity, kRingLevel};
   }
+  if (on_demand_) return {};
   const Index* begin = first_.data() + slot * kFirstMost;
   return {begin, begin + count_[slot], radius_[slot], 0};
 }
@@ -255,7 +270,7 @@ NeighbourList Neighbours::wider(Index slot, const NeighbourList& shorter) const 
   Grown* head = heads_[slot].load(std::memory_order_acquire);
   while (!head || head->level <= shorter.level) {
     std::unique_ptr<Grown> fresh =
-        head ? grow(slot, head->level + 1, head->radius) : grow(slot, 1, radius_[slot]);
+        head ? grow(slot, head->level + 1, head->radius) : grow(slot, 1, on_demand_ ? first_radius_ : radius_[slot]);
     fresh->next = head;
     if (heads_[slot].compare_exchange_strong(head, fresh.get(), std::memory_order_acq_rel)) head = fresh.release();
   }

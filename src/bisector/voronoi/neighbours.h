@@ -42,6 +42,8 @@ class Neighbours {
 
   // Builds the lists of all slots. `seeds` must outlive their use.
   void build(const SortedSeeds& seeds, NeighbourSource source);
+  // No lists at first: each is grown on demand, from about `radius` on.
+  void build_on_demand(const SortedSeeds& seeds, double radius);
   // For the same slots at new positions: sorts the lists of the last build anew and shortens them and their certificates by
   // how far seeds have moved since. False if that is not worth it and build() has to be called.
   bool update();
@@ -66,6 +68,7 @@ class Neighbours {
   const LastRung& last_rung() const;
   std::unique_ptr<Grown> grow(Index slot, int level, double radius) const;
   void drop_grown();
+  void start(const SortedSeeds& seeds);
 
   const SortedSeeds* seeds_ = nullptr;
   SeedTree tree_;
@@ -76,6 +79,8 @@ class Neighbours {
   std::vector<double> built_radius_;
   std::vector<unsigned char> built_count_;
   bool use_rings_ = false;               // the first lists are Delaunay rings
+  bool on_demand_ = false;               // there are no first lists, and they grow from first_radius_ on
+  double first_radius_ = 0;
   std::unique_ptr<LastRung> last_rung_;
   std::unique_ptr<std::atomic<Grown*>[]> heads_;  // grown lists of each slot, the longest first
   std::size_t head_count_ = 0;

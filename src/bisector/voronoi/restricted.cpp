@@ -6,12 +6,13 @@
 #include "bisector/core/parallel.h"
 #include "bisector/voronoi/clip.h"
 #include "bisector/voronoi/owner.h"
+#include "bisector/voronoi/polygons.h"
+#include "bisector/voronoi/step_mass.h"
 
 namespace bisector {
 namespace {
 
 constexpr std::size_t kSumBlock = 32;
-constexpr std::size_t kStepNeighbours = 6;
 constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
 constexpr std::size_t kRanges = 8;  // of triangles, in the sort by cells
 
@@ -116,12 +117,10 @@ struct RestrictedVoronoi::Work {
   void find_owners(std::size_t seed_count);
   void clip_facets(bool want_polygons);
   void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
-  void emit(const Clipper& clipper, Index triangle, Index slot, Chunk& chunk) const;
   bool confirm_last(std::size_t facet, Index slot, Clipper& clipper) const;
   std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
   void sort_items();
   void sum_cells(std::size_t seed_count, CellMoments& result);
-  void set_step_masses(CellMoments& result) const;
   void gather(RestrictedPolygons& polygons) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
   void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_polygons);
@@ -144,19 +143,6 @@ void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
   });
 }
 
-void RestrictedVoronoi::Work::emit(const Clipper& clipper, Index triangle, Index slot, Chunk& chunk) const {
-  RestrictedPolygons& out = chunk.polygons;
-  out.pairs.push_back({triangle, seeds.id[slot]});
-  const std::size_t first = clipper.first_corner();
-  for (std::size_t e = 0; e < clipper.size(); ++e) {
-    const std::size_t k = (first + e) % clipper.size();
-    const Index label = clipper.label(k);
-    out.labels.push_back(is_edge(label) ? label : seeds.id[label]);
-    out.vertices.push_back(seeds.x[slot] + clipper.vertex(k));
-  }
-  out.offsets.push_back(out.labels.size());
-}
-
 void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk, bool want_polygons) const {
   const FacetSummary& summary = surface.summaries[index];
   Clipper& clipper = walker.clipper;
@@ -167,7 +153,7 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
     if (want_polygons) {
       clipper.begin(surface.facets[index]);
       clipper.take(first);
-      emit(clipper, summary.triangle, first, chunk);
+      append_polygon(clipper, seeds, summary.triangle, first, chunk.polygons);
     }
     return;
   }
@@ -189,7 +175,7 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
     chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
     chunk.moments.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
-    if (want_polygons) emit(clipper, summary.triangle, slot, chunk);
+    if (want_polygons) append_polygon(clipper, seeds, summary.triangle, slot, chunk.polygons);
   }
 }
 
@@ -304,7 +290,7 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
       result.cells[seeds.id[s]] = sum.finish();
     }
   });
-  set_step_masses(result);
+  set_step_masses(seeds, neighbours, result);
   result.mass = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].second; });
   result.certification = {};
@@ -313,25 +299,7 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
     result.certification.uncertain += chunk.certification.uncertain;
     result.certification.wider += chunk.certification.wider;
   }
-}
-
-void RestrictedVoronoi::Work::set_step_masses(CellMoments& result) const {
-  const std::size_t n = result.cells.size();
-  double largest = 0;
-  for (const Moments& cell : result.cells) largest = std::max(largest, cell.mass);
-  result.step_mass.resize(n);
-  parallel_each(n, [&](std::size_t i) { result.step_mass[i] = result.cells[i].mass; });
-  parallel_each(seeds.x.size(), [&](std::size_t s) {
-    double& step_mass = result.step_mass[seeds.id[s]];
-    if (step_mass >= 0.25 * largest) return;
-    Index near[kStepNeighbours];
-    const std::size_t count = neighbours.nearest_to(static_cast<Index>(s), kStepNeighbours, near);
-    if (count == 0) return;
-    double masses[kStepNeighbours] = {};
-    std::transform(near, near + count, masses, [&](Index j) { return result.cells[seeds.id[j]].mass; });
-    std::nth_element(masses, masses + count / 2, masses + count);
-    step_mass = std::max(step_mass, 0.25 * masses[count / 2]);
-  });
+  result.certification.cpu = result.certification.uncertain;
 }
 
 // Moves the seeds of the last diagram in place if these are as many and not far off.
@@ -359,7 +327,7 @@ void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neighbour
   const double building = std::chrono::duration<double>(t1 - t0).count();
   const bool delaunay = source == NeighbourSource::delaunay;
   result.seconds = {delaunay ? building : 0, delaunay ? 0 : building, std::chrono::duration<double>(t2 - t1).count(),
-                    seconds_since(t2)};
+                    seconds_since(t2), {}};
 }
 
 // Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of triangles,
@@ -389,6 +357,26 @@ void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
       polygons.offsets.push_back(polygons.labels.size());
     }
   }
+}
+
+DeviceSeconds& DeviceSeconds::operator+=(const DeviceSeconds& b) {
+  transfer += b.transfer;
+  grid += b.grid;
+  neighbours += b.neighbours;
+  owners += b.owners;
+  clip += b.clip;
+  sort += b.sort;
+  sum += b.sum;
+  return *this;
+}
+
+DiagramSeconds& DiagramSeconds::operator+=(const DiagramSeconds& b) {
+  delaunay += b.delaunay;
+  neighbours += b.neighbours;
+  pairs += b.pairs;
+  clip += b.clip;
+  device += b.device;
+  return *this;
 }
 
 RestrictedVoronoi::RestrictedVoronoi(const Surface& surface) : work_(std::make_unique<Work>(surface)) {}

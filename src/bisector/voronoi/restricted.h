@@ -29,15 +29,27 @@ struct RestrictedPolygons {
   std::vector<Vec3> vertices;
 };
 
+// Seconds on a device, from its own clock; all 0 where the CPU computed.
+struct DeviceSeconds {
+  double transfer = 0, grid = 0, neighbours = 0, owners = 0, clip = 0, sort = 0, sum = 0;
+
+  DeviceSeconds& operator+=(const DeviceSeconds& b);
+};
+
 struct DiagramSeconds {
   double delaunay = 0, neighbours = 0, pairs = 0, clip = 0;
+  DeviceSeconds device;  // within those above
+
+  DiagramSeconds& operator+=(const DiagramSeconds& b);
 };
 
 // How the pairs of a diagram were certified.
 struct Certification {
   std::size_t pairs = 0;
-  std::size_t uncertain = 0;  // a decision was within the filter's error bound and taken in exact arithmetic
+  std::size_t uncertain = 0;  // a decision was within the filter's error bound at first
   std::size_t wider = 0;      // needed a longer list of neighbours
+  std::size_t doubled = 0;    // of a device: uncertain in single precision and clipped anew in double
+  std::size_t cpu = 0;        // settled by the CPU's exact arithmetic
 };
 
 // Integrals over the restricted cells; positions are relative to the seed.

@@ -1,0 +1,26 @@
+// What is left of the host layer in a build without Vulkan.
+#include "host/device.h"
+#include "host/vulkan_backend.h"
+
+namespace bisector {
+namespace {
+constexpr const char* kWithout = "built without Vulkan; use --device cpu";
+}
+
+DeviceList list_devices() { return {.devices = {}, .problem = kWithout}; }
+
+namespace host {
+
+struct Device::Impl {};
+
+std::unique_ptr<Device> Device::open(const std::string& request) {
+  throw DeviceError("--device " + request + ": " + kWithout);
+}
+Device::~Device() = default;
+
+std::unique_ptr<Backend> make_vulkan_backend(const Surface&, std::unique_ptr<Device>, const VulkanOptions&) {
+  throw DeviceError(kWithout);
+}
+
+}  // namespace host
+}  // namespace bisector

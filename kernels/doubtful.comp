@@ -1,0 +1,34 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Lists the pairs of cells whose masses single precision may have off by too much.
+#include "common.glsl"
+
+layout(constant_id = 0) const bool kDoubleNext = false;
+
+const float kMassError = 1e-4;  // of a cell's; what is found is off by a tenth of its bound or less
+const uint kClipped = 1;        // of clipper.glsl
+
+layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
+layout(std430, binding = 1) readonly buffer Status { uint status_of[]; };
+layout(std430, binding = 2) readonly buffer Doubts { uint doubts[]; };
+layout(std430, binding = 3) readonly buffer Cells { float cells[]; };  // of cells.comp
+layout(std430, binding = 4) buffer Counters { uint counters[]; };
+layout(std430, binding = 5) writeonly buffer Flagged { uint flagged[]; };
+layout(push_constant) uniform Push {
+  uint first_pair;
+  uint pair_count;
+  uint flagged_room;
+};
+#include "counters.glsl"
+
+void main() {
+  const uint index = invocation();
+  if (index >= pair_count) return;
+  const uint pair = first_pair + index, slot = pairs[pair].y;
+  if (status_of[pair] != kClipped) return;
+  precise float least = 0.25 * cells[6 * slot + 5];
+  precise float allowed = kMassError * max(cells[6 * slot], least);
+  if (!(uintBitsToFloat(doubts[slot]) > allowed)) return;
+  const uint at = atomicAdd(counters[kDoubleNext ? kUncertain : kForCpu], 1u);
+  if (at < flagged_room) flagged[(kDoubleNext ? 1 : 2) * flagged_room + at] = pair;
+}

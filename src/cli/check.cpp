@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "bisector/core/parallel.h"
+#include "bisector/cvt/device_check.h"
+#include "commands.h"
+#include "console.h"
+#include "outputs.h"
+#include "report.h"
+
+namespace bisector::cli {
+namespace {
+
+std::string choose_device(const std::string& word) {
+  if (word != "auto") return word;
+  const DeviceList list = list_devices();
+  const std::string gpu = best_gpu(list);
+  if (!gpu.empty()) return gpu;
+  if (list.devices.empty()) throw Error(fmt::format("there is no GPU to check: {}", list.problem));
+  throw Error("there is no GPU to check; --device vulkan checks what 'bisector devices' lists");
+}
+
+std::string differences(const DeviceCheckRow& row) {
+  if (row.passed) return row.parity.bitwise ? "equal" : "same";
+  if (!row.parity.same_pairs) return "PAIRS";
+  if (!row.parity.same_labels) return "LABELS";
+  if (!row.parity.same_dual) return "DUAL";
+  return row.repeats ? "ERROR" : "REPEAT";
+}
+
+void print_head(Console& console) {
+  console.print(fmt::format("{:<10} {:<10} {:<9} {:<7} {:>6} {:>7}  {:<7} {:>8} {:>8} {:>8} {:>8}  "
+                            "{:>9} {:>6} {:>6}  {:>8} {:>8}",
+                            "model", "seeds", "neighbors", "prec.", "seeds", "pairs", "result", "mass", "centroid",
+                            "energy", "sum", "uncertain", "double", "cpu", "seconds", "CPU s"));
+}
+
+double uncertain_share(const Certification& certification) {
+  return static_cast<double>(certification.uncertain) / static_cast<double>(std::max<std::size_t>(certification.pairs, 1));
+}
+
+const char* word(NeighbourSource source) { return source == NeighbourSource::delaunay ? "delaunay" : "nearest"; }
+
+void print_row(Console& console, const DeviceCheckRow& row) {
+  const Parity& p = row.parity;
+  const Certification& c = row.certification;
+  console.print(fmt::format(
+      "{:<10} {:<10} {:<9} {:<7} {:>6} {:>7}  {:<7} {:>8.1e} {:>8.1e} {:>8.1e} {:>8.1e}  "
+      "{:>8.3f}% {:>6} {:>6}  {:>8.4f} {:>8.4f}",
+      row.model, row.seeds, word(row.neighbours), row.device.precision, row.seed_count, c.pairs, differences(row),
+      p.mass_error, p.centroid_error, p.energy_error, p.sum_error, 100 * uncertain_share(c), c.doubled, c.cpu, row.seconds,
+      row.cpu_seconds));
+}
+
+Json row_json(const DeviceCheckRow& row) {
+  const Parity& p = row.parity;
+  return {{"model", row.model},
+          {"seeds", row.seeds},
+          {"neighbors", word(row.neighbours)},
+          {"precision", row.device.precision},
+          {"triangles", row.triangles},
+          {"seed_count", row.seed_count},
+          {"passed", row.passed},
+          {"same_pairs", p.same_pairs},
+          {"same_labels", p.same_labels},
+          {"same_dual", p.same_dual},
+          {"bitwise", p.bitwise},
+          {"repeats", row.repeats},
+          {"mass_error", p.mass_error},
+          {"centroid_error", p.centroid_error},
+          {"energy_error", p.energy_error},
+          {"sum_error", p.sum_error},
+          {"uncertain_share", uncertain_share(row.certification)},
+          {"certification", certification_json(row.certification)},
+          {"seconds", row.seconds},
+          {"cpu_seconds", row.cpu_seconds}};
+}
+
+Json check_report(const std::vector<DeviceCheckRow>& rows, std::size_t failed, double seconds) {
+  Json report = start_report("check");
+  report["device"] = device_json(rows.back().device);
+  report["passed"] = failed == 0;
+  report["seconds"] = {{"total", seconds}};
+  report["rows"] = Json::array();
+  for (const DeviceCheckRow& row : rows) report["rows"].push_back(row_json(row));
+  return report;
+}
+
+}  // namespace
+
+void run(const CheckCommand& command) {
+  const Stopwatch total;
+  const std::string& report_path = command.common.report;
+  check_outputs({{}, {report_path, {}}}, {});
+  const ThreadLimit limit(command.common.threads);
+  Console console(command.common.quiet, report_path == "-");
+  const std::string device = choose_device(command.device);
+
+  console.phase("making models");
+  const Context context = console.context();
+  bool first = true;
+  const auto rows = check_device(device, parse_precision(command.precision), context, [&](const DeviceCheckRow& row) {
+    if (std::exchange(first, false)) {
+      console.print(fmt::format("{} ({}) against the CPU: results, worst relative errors, shares of exact work, times",
+                                row.device.name, row.device.kind));
+      print_head(console);
+    }
+    print_row(console, row);
+  });
+
+  const auto failed = static_cast<std::size_t>(
+      std::count_if(rows.begin(), rows.end(), [](const DeviceCheckRow& row) { return !row.passed; }));
+  const std::string cases = counted(rows.size(), "case", "cases");
+  if (!report_path.empty()) write_report(report_path, check_report(rows, failed, total.seconds()));
+  if (failed > 0) {
+    console.print(fmt::format("FAILED: {} of {} do not agree with the CPU", failed, cases));
+    throw Error(fmt::format("{} of {} do not agree with the CPU; do not compute on this device, and please report this",
+                            failed, cases));
+  }
+  console.print(fmt::format("passed: {}, all as the CPU has them; {:.1f} s", cases, total.seconds()));
+  console.print_written({report_path});
+}
+
+}  // namespace bisector::cli

@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include "bisector/core/parallel.h"
+#include "bisector/core/processor.h"
+#include "bisector/cvt/compute.h"
+#include "commands.h"
+#include "console.h"
+#include "outputs.h"
+#include "report.h"
+
+namespace bisector::cli {
+namespace {
+
+std::string gibibytes(double bytes) { return fmt::format("{:.1f} GiB", bytes / 0x1p30); }
+
+// Bytes; 0 if unknown.
+double installed_memory() {
+  const long pages = sysconf(_SC_PHYS_PAGES), page_size = sysconf(_SC_PAGE_SIZE);
+  return pages > 0 && page_size > 0 ? static_cast<double>(pages) * static_cast<double>(page_size) : 0;
+}
+
+Json cpu_entry() {
+  return {{"name", processor_name()},
+          {"kind", "cpu"},
+          {"precision", "double"},
+          {"threads", thread_count()},
+          {"memory", installed_memory()}};
+}
+
+Json device_entry(const DeviceDescription& device) {
+  Json entry{{"name", device.name},
+             {"kind", device.kind},
+             {"precision", device.float64 ? "double" : "single"},
+             {"index", device.index},
+             {"uuid", device.uuid},
+             {"driver", device.driver},
+             {"api", device.api},
+             {"memory", device.memory},
+             {"float64", device.float64},
+             {"features", device.features}};
+  if (!device.rejected.empty()) entry["rejected"] = device.rejected;
+  return entry;
+}
+
+std::string describe(const DeviceDescription& device) {
+  std::string line = fmt::format("vulkan:{}  {}: {}, driver {}, Vulkan {}, {} of memory, {}, uuid {}", device.index,
+                                 device.name, device.kind, device.driver, device.api,
+                                 gibibytes(static_cast<double>(device.memory)),
+                                 device.features.empty() ? "no optional features"
+                                                         : fmt::format("features {}", fmt::join(device.features, " ")),
+                                 device.uuid);
+  if (!device.rejected.empty()) line += "; cannot be used: " + device.rejected;
+  return line;
+}
+
+}  // namespace
+
+void run(const DevicesCommand& command) {
+  check_outputs({{}, {command.report, {}}}, {});
+  const DeviceList list = list_devices();
+  Console console(false, command.report == "-");
+  console.print(fmt::format("cpu       {}: {}, {} of memory, double precision", processor_name(),
+                            counted(thread_count(), "thread", "threads"), gibibytes(installed_memory())));
+  for (const DeviceDescription& device : list.devices) console.print(describe(device));
+  if (list.devices.empty()) console.print("vulkan    none: " + list.problem);
+
+  if (command.report.empty()) return;
+  Json report = start_report("devices");
+  report["devices"] = Json::array({cpu_entry()});
+  for (const DeviceDescription& device : list.devices) report["devices"].push_back(device_entry(device));
+  if (list.devices.empty()) report["problem"] = list.problem;
+  write_report(command.report, report);
+  console.print_written({command.report});
+}
+
+}  // namespace bisector::cli
