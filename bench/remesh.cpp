@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bisector/core/error.h"
+#include "bisector/core/parallel.h"
 #include "bisector/mesh/distance.h"
 #include "bisector/mesh/io.h"
 #include "bisector/mesh/quality.h"
@@ -52,6 +53,7 @@ void run(Options options) {
       options.remesh.random_seed = s.random_seed;
       const double before = delaunay_seconds(seeds);
       const Stopwatch watch;
+      const ThreadLimit limit(options.remesh.threads);
       const Surface surface(mesh);
       const auto backend = make_device_backend(surface, options.device, NeighbourSource::nearest);
       s.last = remesh(*backend, options.remesh);

@@ -441,7 +441,7 @@ TEST_F(Cli, WithoutALoaderOrADriverTheCpuComputes) {
   const std::string nothing = in("nothing");
   const auto check = [&] {
     for (const char* command : {"rvd", "remesh"}) {
-      std::vector<std::string> words{command, in("sphere.off"), "-n", "50", "--report", "-"};
+      std::vector<std::string> words{command, in("sphere.off"), "-n", "50", "--quiet", "--report", "-"};
       if (words[0] == "remesh") words.insert(words.end(), {"-o", in("out.off")});
       const Result result = run(words);
       EXPECT_EQ(result.code, 0) << result.err;
