@@ -1,5 +1,5 @@
-// How many pairs climb which rung of certification, time and memory: one evaluation for each kind of seeds and precision, each in a
-// process of its own.
+// How many pairs climb which rung of certification, time and memory: for each kind of seeds and precision in a process of its
+// own.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -32,13 +32,14 @@ struct Options {
   std::vector<std::string> models{BISECTOR_DEFAULT_MODEL};
   std::string csv, json;
   std::size_t seeds = 100'000;
-  std::vector<std::string> patterns{"random", "grid"}, rungs{"double", "single", "single-only"};
+  std::vector<std::string> patterns{"random", "grid", "dyadic"}, rungs{"double", "single", "single-only"};
   DeviceOptions device;
   bool once = false;  // the first of each list, in this process
 };
 
-// Layers through the bounding box, as many in each direction as give about that many seeds.
-std::vector<Vec3> grid_seeds(const TriangleMesh& mesh, std::size_t count) {
+// Layers through the bounding box, as many in each direction as give about that many seeds. If they are dyadic, they lie at whole
+// multiples of powers of two, so that far more ties are exact, and may reach beyond the box.
+std::vector<Vec3> grid_seeds(const TriangleMesh& mesh, std::size_t count, bool dyadic) {
   const int n = std::max(2, static_cast<int>(std::lround(std::cbrt(static_cast<double>(count)))));
   Box box{mesh.vertices.front(), mesh.vertices.front()};
   for (const Vec3& v : mesh.vertices)
@@ -46,6 +47,13 @@ std::vector<Vec3> grid_seeds(const TriangleMesh& mesh, std::size_t count) {
       box.lo[k] = std::min(box.lo[k], v[k]);
       box.hi[k] = std::max(box.hi[k], v[k]);
     }
+  for (int k = 0; k < 3 && dyadic; ++k) {
+    const double extent = box.hi[k] - box.lo[k];
+    double spacing = extent > 0 ? std::exp2(std::ceil(std::log2(extent / (n - 1)))) : 1;
+    while (spacing * (std::floor(box.lo[k] / spacing) + n - 1) < box.hi[k]) spacing *= 2;
+    box.lo[k] = spacing * std::floor(box.lo[k] / spacing);
+    box.hi[k] = box.lo[k] + spacing * (n - 1);
+  }
   std::vector<Vec3> seeds;
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
@@ -70,9 +78,9 @@ std::string device_phases(const DeviceSeconds& s) {
 void run_once(Options options) {
   const std::string& model = options.models.front();
   const Surface surface(read_mesh(model));
-  const bool grid = options.patterns.front() == "grid";
-  const std::vector<Vec3> seeds =
-      grid ? grid_seeds(surface.mesh, options.seeds) : random_seeds(surface.mesh, options.seeds);
+  const std::string& pattern = options.patterns.front();
+  const std::vector<Vec3> seeds = pattern == "random" ? random_seeds(surface.mesh, options.seeds)
+                                                      : grid_seeds(surface.mesh, options.seeds, pattern == "dyadic");
   const std::string& rung = options.rungs.front();
   options.device.precision = rung == "double" ? Precision::double_ : Precision::single;
   options.device.double_rung = rung != "single-only";
@@ -97,7 +105,7 @@ void run_once(Options options) {
   const double share = static_cast<double>(c.cpu) / static_cast<double>(c.pairs);
   const double missing = std::abs(moments.mass - surface.mass) / surface.mass;
   fmt::print("{},{},{},{},{},{},{},{},{},{:.5f} %,{},{:.1e},{:.2f},{}{}\n", std::filesystem::path(model).stem().string(),
-             seeds.size(), options.patterns.front(), rung, c.pairs, c.uncertain, c.wider, c.doubled, c.cpu, 100 * share,
+             seeds.size(), pattern, rung, c.pairs, c.uncertain, c.wider, c.doubled, c.cpu, 100 * share,
              same ? "yes" : "NO", missing, cold, warm, device_phases(moments.seconds.device));
 }
 
@@ -119,7 +127,8 @@ std::vector<std::string> row_of(const std::vector<std::string>& arguments) {
   close(ends[1]);
   std::string text;
   std::array<char, 4096> piece;
-  for (ssize_t size; (size = read(ends[0], piece.data(), piece.size())) > 0;) text.append(piece.data(), static_cast<std::size_t>(size));
+  for (ssize_t size; (size = read(ends[0], piece.data(), piece.size())) > 0;)
+    text.append(piece.data(), static_cast<std::size_t>(size));
   close(ends[0]);
   int status = 0;
   rusage usage{};
@@ -159,7 +168,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Counts the pairs that climb each rung of certification on a device, with time and memory."};
   app.add_option("MESH", options.models, "surfaces; default: examples/smooth.off");
   app.add_option("--seeds", options.seeds, "about how many")->check(CLI::Range(2, 100'000'000));
-  app.add_option("--patterns", options.patterns, "random, grid")->delimiter(',')->check(CLI::IsMember({"random", "grid"}));
+  app.add_option("--patterns", options.patterns, "random, grid, dyadic")
+      ->delimiter(',')->check(CLI::IsMember({"random", "grid", "dyadic"}));
   app.add_option("--rungs", options.rungs, "double; single; single-only, without the double rung")
       ->delimiter(',')->check(CLI::IsMember({"double", "single", "single-only"}));
   app.add_option("--device", options.device.word, "of 'bisector devices'; default: the best");

@@ -65,7 +65,8 @@ std::string Table::json() const {
   std::string text = "[";
   for (const auto& row : rows) {
     text += text.size() > 1 ? ",\n {" : "\n {";
-    for (std::size_t c = 0; c < row.size(); ++c) text += fmt::format("{}{}: {}", c ? ", " : "", quoted(columns[c]), quoted(row[c]));
+    for (std::size_t c = 0; c < row.size(); ++c)
+      text += fmt::format("{}{}: {}", c ? ", " : "", quoted(columns[c]), quoted(row[c]));
     text += '}';
   }
   return text + "\n]\n";

@@ -49,7 +49,7 @@ struct Run {
 };
 
 // From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which has
-// compiled its kernels and got its memory. The first such diagram on each device is to be thrown away.
+// compiled its kernels and got its memory.
 Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source, unsigned threads,
              Backend* device) {
   const ThreadLimit limit(threads);
@@ -199,7 +199,8 @@ void run(const Options& options) {
                "pairs", "uncertain", "wider", "mass error"}, {}};
   if (options.device.word != "cpu") {
     fmt::print("device: {}\n\n", describe_device(options.device));
-    for (const char* name : {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort", "d. sum"})
+    for (const char* name : {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort",
+                             "d. sum"})
       table.columns.push_back(name);
   }
   for (std::size_t k = 0; k < all.size(); ++k) measure(surface, options, options.seeds[k], std::move(all[k]), table);

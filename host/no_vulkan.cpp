@@ -17,6 +17,7 @@ std::unique_ptr<Device> Device::open(const std::string& request) {
   throw DeviceError("--device " + request + ": " + kWithout);
 }
 Device::~Device() = default;
+const DeviceDescription& Device::description() const { throw DeviceError(kWithout); }
 
 std::unique_ptr<Backend> make_vulkan_backend(const Surface&, std::unique_ptr<Device>, const VulkanOptions&) {
   throw DeviceError(kWithout);

@@ -29,6 +29,7 @@ struct AdmitPush {
 };
 struct DoubtfulPush {
   std::uint32_t first, count, flagged_room;
+  float mean_density;
 };
 struct GatherPush {
   std::uint32_t first, count;
@@ -46,8 +47,8 @@ struct PairPass::Kind {
 
 PairPass::PairPass(Device& device, bool is_double, const Rooms& rooms)
     : device_(device), double_(is_double), proposals_(device), table_(device), flagged_(device), gathered_(device),
-      settled_(device), values_(device), no_labels_(device), sample_facets_(device), doubts_(device), proposal_room_(rooms.proposals),
-      table_size_(rooms.table), first_room_(rooms.pairs) {}
+      settled_(device), values_(device), no_labels_(device), sample_facets_(device), doubts_(device),
+      proposal_room_(rooms.proposals), table_size_(rooms.table), first_room_(rooms.pairs) {}
 
 void PairPass::set_plan(Commands& commands, const FacetSamples& plan) { upload(commands, sample_facets_, plan.facets); }
 
@@ -75,7 +76,7 @@ void PairPass::make_room(const PairJob& job) {
   table_.reserve(table_size_ * kWord);
   flagged_.reserve(3 * table_size_ * kWord);
   no_labels_.reserve(kWord);
-  doubts_.reserve(job.seeds.count() * kWord);
+  doubts_.reserve(2 * job.seeds.count() * kWord);
   if (sample_facets_.size() == 0) sample_facets_.reserve(kWord);
 }
 
@@ -87,7 +88,7 @@ void PairPass::run(const PairJob& job, Certification& certification) {
     job.store.ranges.clear();
     job.store.count = 0;
     job.commands.fill(job.counters, 0, (kForCpu + 1) * kWord, 0);
-    job.commands.fill(doubts_, 0, job.seeds.count() * kWord, 0);
+    job.commands.fill(doubts_, 0, 2 * job.seeds.count() * kWord, 0);
     bool complete = true;
     std::size_t chunk = 0;
     for (const FacetBatch& batch : job.plan.batches) {
@@ -160,7 +161,8 @@ std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, Certificat
   for (const PairStore::Range& range : job.store.ranges)
     // No more at once than the lists of flagged pairs hold.
     for (std::size_t first = range.begin; first < range.end; first += table_size_) {
-      const DoubtfulPush push{word(first), word(std::min(table_size_, range.end - first)), word(table_size_)};
+      const DoubtfulPush push{word(first), word(std::min(table_size_, range.end - first)), word(table_size_),
+                              static_cast<float>(job.surface.surface->mass / job.surface.surface->area)};
       job.commands.phase(Phase::clip);
       job.commands.fill(job.counters, kProposals * kWord, 3 * kWord, 0);
       job.commands.dispatch({"doubtful", {double_next}},

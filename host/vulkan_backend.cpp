@@ -72,8 +72,8 @@ VulkanBackend::VulkanBackend(const Surface& surface, std::unique_ptr<Device> dev
                              bool is_double)
     : surface_(surface), device_(std::move(device)), options_(options), double_(is_double), commands_(*device_),
       scan_(*device_), counters_(*device_), seeds_(*device_), neighbours_(*device_, is_double), sites_(*device_, is_double),
-      samples_(*device_, is_double), exact_(surface), pairs_(*device_, is_double, options.rooms), store_(*device_), cells_(*device_, is_double),
-      polygons_(*device_), cpu_(surface, options.neighbours) {
+      samples_(*device_, is_double), exact_(surface), pairs_(*device_, is_double, options.rooms), store_(*device_),
+      cells_(*device_, is_double), polygons_(*device_), cpu_(surface, options.neighbours) {
   counters_.reserve(kCounters * sizeof(std::uint32_t));
   buffers_.surface = &surface_;
   seeds_.scale = device_scale(surface_);

@@ -19,7 +19,7 @@ layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
 layout(std430, binding = 2) readonly buffer Facets { real facet_words[]; };
 layout(std430, binding = 3) readonly buffer FacetMeta { uint facet_meta[]; };
 layout(std430, binding = 4) readonly buffer Info { uvec4 list_info[]; };
-layout(std430, binding = 5) buffer Doubts { uint doubts[]; };  // per cell: the bits of its pairs' largest mass error, in single
+layout(std430, binding = 5) buffer Doubts { uint doubts[]; };  // in single, per cell: the bits of its pairs' largest errors of mass and energy
 layout(std430, binding = 6) readonly buffer Lists { uint lists[]; };
 layout(std430, binding = 7) readonly buffer WideLists { uint wide_lists[]; };
 layout(std430, binding = 8) readonly buffer Pairs { uvec2 pairs[]; };       // facet, slot
@@ -103,7 +103,10 @@ void main() {
   if (status == kClipped) {
     store_moments(pair, integrate(kUniform));
 #if !BISECTOR_DOUBLE
-    atomicMax(doubts[slot], floatBitsToUint(mass_error()));
+    const real error = mass_error();
+    precise real energy_error = error * reach;
+    atomicMax(doubts[2 * slot], floatBitsToUint(error));
+    atomicMax(doubts[2 * slot + 1], floatBitsToUint(energy_error));
 #endif
     propose(facet);
   } else if (kRung == 0 && (status == kShortList || status == kCrowded)) {

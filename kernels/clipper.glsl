@@ -237,6 +237,56 @@ int tie_of(uint slot, uint a, uint b, uint c) {
   return lowest == ids[c].x || lowest == ids[opposite].x ? -1 : 1;
 }
 
+#if BISECTOR_DOUBLE
+// The only axis along which c lies apart from the reference, if the reference is level with the own seed there; else -1.
+int layer_axis(Point reference, Point c) {
+  int axis = -1;
+  for (int a = 0; a < 3; ++a)
+    if (c.high[a] != reference.high[a]) {
+      if (axis >= 0) return -1;
+      axis = a;
+    }
+  return axis >= 0 && reference.high[axis] == own.high[axis] ? axis : -1;
+}
+
+// The side of corner k with respect to the bisector of c, exactly, if c lies one layer of a grid from a reference on whose bisector
+// the corner is, or from the own seed, and if the corner's coordinate across the layers is known: for a corner of the facet,
+// and where an edge or all of the facet has but one. Else 0. Models made by hand lie half way between layers. The row
+// of c is that of the reference plus that of a seed across the layers, whose sign depends on this coordinate alone; where it is
+// 0 the cofactors are -1 for c and +1 for the reference, times the corner's denominator.
+int layer_side(uint k, uint c) {
+  const uint after = corner_label[k], before = corner_label[k == 0 ? corner_count - 1 : k - 1];
+  const bool on_after = (after & kEdgeLabel) != 0, on_before = (before & kEdgeLabel) != 0;
+  const Point other = seed(c);
+  uint reference = own_slot;
+  int axis = layer_axis(own, other);
+  if (axis < 0 && !on_after) {
+    reference = after;
+    axis = layer_axis(seed(after), other);
+  }
+  if (axis < 0 && !on_before) {
+    reference = before;
+    axis = layer_axis(seed(before), other);
+  }
+  if (axis < 0) return 0;
+  const uint edge = on_after ? after & 3u : on_before ? before & 3u : 0u;
+  const double at = facet_point(at_facet + kPointWords * edge).high[axis];
+  if (!(on_after && on_before)) {
+    if (facet_point(at_facet + kPointWords * ((edge + 1) % 3)).high[axis] != at) return 0;
+    if (!on_after && !on_before && facet_point(at_facet + kPointWords * 2).high[axis] != at) return 0;
+  }
+  // The sum of both layers less twice the coordinate, the sum as two doubles.
+  const double a = own.high[axis], b = other.high[axis];
+  precise double sum = a + b;
+  precise double t = sum - a;
+  precise double lost = (a - (sum - t)) + (b - t);
+  precise double twice = 2.0LF * at;
+  precise double above = (sum - twice) + lost;
+  if (above == 0.0LF) return ids[reference].x < ids[c].x ? 1 : -1;
+  return (above > 0.0LF) == (b > a) ? 1 : -1;
+}
+#endif
+
 // The side of corner k with respect to the bisector of the own seed and that at d: +1 inside, -1 outside, 0 if the bounds do not
 // tell.
 int side_of(uint k, real3 d, real squared) {
@@ -270,8 +320,11 @@ uint cut(uint other, real3 d, real squared) {
   [[dont_unroll]] for (uint k = 0; k < n; ++k) {
     int side = side_of(k, d, squared);
     if (side == 0) {
+#if BISECTOR_DOUBLE
+      side = layer_side(k, other);
+#endif
       const uint a = corner_label[k == 0 ? n - 1 : k - 1], b = corner_label[k];
-      if (((a | b) & kEdgeLabel) == 0) side = tie_of(own_slot, a, b, other);
+      if (side == 0 && ((a | b) & kEdgeLabel) == 0) side = tie_of(own_slot, a, b, other);
       if (side == 0) return kUnsure;
     }
     const bool inside = side > 0;

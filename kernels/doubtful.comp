@@ -1,11 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Lists the pairs of cells whose masses single precision may have off by too much.
+// Lists the pairs of cells whose masses or energies single precision may have off by too much.
 #include "common.glsl"
 
 layout(constant_id = 0) const bool kDoubleNext = false;
 
-const float kMassError = 4e-4;  // of a cell's; masses are found to be off by a fiftieth of their bounds or less
+// Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a polygon for as
+// far off as its farthest corner, by less still.
+const float kMassError = 4e-4, kEnergyError = 1.2e-3;
 const uint kClipped = 1;        // of clipper.glsl
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
@@ -18,6 +20,7 @@ layout(push_constant) uniform Push {
   uint first_pair;
   uint pair_count;
   uint flagged_room;
+  float mean_density;
 };
 #include "counters.glsl"
 
@@ -27,8 +30,11 @@ void main() {
   const uint pair = first_pair + index, slot = pairs[pair].y;
   if (status_of[pair] != kClipped) return;
   precise float least = 0.25 * cells[6 * slot + 5];
-  precise float allowed = kMassError * max(cells[6 * slot], least);
-  if (!(uintBitsToFloat(doubts[slot]) > allowed)) return;
+  precise float mass = max(cells[6 * slot], least);
+  precise float energy = max(cells[6 * slot + 4], mass * mass / mean_density);
+  precise float most_mass = kMassError * mass;
+  precise float most_energy = kEnergyError * energy;
+  if (!(uintBitsToFloat(doubts[2 * slot]) > most_mass) && !(uintBitsToFloat(doubts[2 * slot + 1]) > most_energy)) return;
   const uint at = atomicAdd(counters[kDoubleNext ? kUncertain : kForCpu], 1u);
   if (at < flagged_room) flagged[(kDoubleNext ? 1 : 2) * flagged_room + at] = pair;
 }

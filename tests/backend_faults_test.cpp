@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -502,8 +501,10 @@ TEST_P(Room, CellsWithManyNeighbours) {
     options.neighbours = source;
     const Diagram found = diagram_of(*device_backend(surface, options), seeds);
     expect_parity(surface, reference, found, GetParam());
-    RecordProperty("cpu", std::to_string(found.moments.certification.cpu));
-    std::printf("cpu %zu of %zu\n", found.moments.certification.cpu, found.moments.certification.pairs);
+    // llvmpipe's loops end early, which must be noticed.
+    if (device_name().starts_with("llvmpipe")) {
+      EXPECT_GT(found.moments.certification.cpu, 0u);
+    }
   }
 }
 
