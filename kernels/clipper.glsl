@@ -249,13 +249,12 @@ int layer_axis(Point reference, Point c) {
   return axis >= 0 && reference.high[axis] == own.high[axis] ? axis : -1;
 }
 
-// The side of corner k with respect to the bisector of c, exactly, if c lies one layer of a grid from a reference on whose bisector
+// The side of the corner with these labels with respect to the bisector of c, exactly, if c lies one layer of a grid from a reference on whose bisector
 // the corner is, or from the own seed, and if the corner's coordinate across the layers is known: for a corner of the facet,
 // and where an edge or all of the facet has but one. Else 0. Models made by hand lie half way between layers. The row
 // of c is that of the reference plus that of a seed across the layers, whose sign depends on this coordinate alone; where it is
 // 0 the cofactors are -1 for c and +1 for the reference, times the corner's denominator.
-int layer_side(uint k, uint c) {
-  const uint after = corner_label[k], before = corner_label[k == 0 ? corner_count - 1 : k - 1];
+int layer_side(uint before, uint after, uint c) {
   const bool on_after = (after & kEdgeLabel) != 0, on_before = (before & kEdgeLabel) != 0;
   const Point other = seed(c);
   uint reference = own_slot;
@@ -286,6 +285,17 @@ int layer_side(uint k, uint c) {
   return (above > 0.0LF) == (b > a) ? 1 : -1;
 }
 #endif
+
+// The side of the corner with these labels with respect to the bisector of c, where bounds do not tell but equal coordinates do; 0
+// if they do not either.
+int tie_side(uint before, uint after, uint c) {
+  int side = 0;
+#if BISECTOR_DOUBLE
+  side = layer_side(before, after, c);
+#endif
+  if (side == 0 && ((before | after) & kEdgeLabel) == 0) side = tie_of(own_slot, before, after, c);
+  return side;
+}
 
 // The side of corner k with respect to the bisector of the own seed and that at d: +1 inside, -1 outside, 0 if the bounds do not
 // tell.
@@ -319,14 +329,8 @@ uint cut(uint other, real3 d, real squared) {
   bool before_inside = true, first_inside = true;
   [[dont_unroll]] for (uint k = 0; k < n; ++k) {
     int side = side_of(k, d, squared);
-    if (side == 0) {
-#if BISECTOR_DOUBLE
-      side = layer_side(k, other);
-#endif
-      const uint a = corner_label[k == 0 ? n - 1 : k - 1], b = corner_label[k];
-      if (side == 0 && ((a | b) & kEdgeLabel) == 0) side = tie_of(own_slot, a, b, other);
-      if (side == 0) return kUnsure;
-    }
+    if (side == 0) side = tie_side(corner_label[k == 0 ? n - 1 : k - 1], corner_label[k], other);
+    if (side == 0) return kUnsure;
     const bool inside = side > 0;
     if (k == 0) {
       first_inside = inside;

@@ -32,7 +32,6 @@ void main() {
   if (index >= count) return;
   const uint slot = corners[index].y, before = corners[index].z, after = corners[index].w;
   begin_facet(corners[index].x, slot);
-  const bool by_seeds = ((before | after) & kEdgeLabel) == 0;
   uint k = 3;
   bool certain = true;
   if ((before & after & kEdgeLabel) != 0) k = after & 3u;
@@ -41,7 +40,7 @@ void main() {
     const uint other = slot + 3 + t;
     const real3 d = difference(seed(other), own);
     int side = certain ? side_of(k, d, norm2(d)) : 0;
-    if (certain && side == 0 && by_seeds) side = 2 * tie_of(slot, before, after, other);
+    if (certain && side == 0) side = 2 * tie_side(before, after, other);
     sides[kTested * index + t] = side;
   }
   for (uint c = 0; c < 3; ++c) places[4 * index + c] = corner_at[k][c];
