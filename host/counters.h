@@ -22,6 +22,8 @@ enum Counter : std::size_t {
   kMet,
   kLostSites,
   kTwice,
+  kUnsureMet,
+  kUnsettled,
   kProposalGroups = 16,
   kPairGroups = 20,
   kCounters = 24,

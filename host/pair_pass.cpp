@@ -29,7 +29,7 @@ struct AdmitPush {
 };
 struct DoubtfulPush {
   std::uint32_t first, count, flagged_room;
-  float mean_density;
+  float mean_density, share;
 };
 struct GatherPush {
   std::uint32_t first, count;
@@ -88,6 +88,8 @@ void PairPass::run(const PairJob& job, Certification& certification) {
     job.store.ranges.clear();
     job.store.count = 0;
     job.commands.fill(job.counters, 0, (kForCpu + 1) * kWord, 0);
+    job.commands.fill(job.counters, kUnsureMet * kWord, 2 * kWord, 0);
+    unsettled_ = 0;
     job.commands.fill(doubts_, 0, 2 * job.seeds.count() * kWord, 0);
     bool complete = true;
     std::size_t chunk = 0;
@@ -131,6 +133,7 @@ bool PairPass::run_batch(const PairJob& job, const FacetBatch& batch, std::size_
       clip_flagged(job, chunk, 1, 0, count);
       set_counter(job, kShort, 0);
     } else if (!climb(job, chunk, counters, certification)) {
+      certification.uncertain = counters[kUnsureMet];
       return true;
     }
   }
@@ -139,7 +142,6 @@ bool PairPass::run_batch(const PairJob& job, const FacetBatch& batch, std::size_
 // Takes uncertain pairs to the next rung. False if there are none.
 bool PairPass::climb(const PairJob& job, std::size_t chunk, const Counters& counters, Certification& certification) {
   if (const std::size_t count = counters[kUncertain]) {
-    certification.uncertain += count;
     certification.doubled += count;
     clip_flagged(job, chunk, 2, 1, count);
     set_counter(job, kUncertain, 0);
@@ -147,22 +149,22 @@ bool PairPass::climb(const PairJob& job, std::size_t chunk, const Counters& coun
   }
   if (const std::size_t count = counters[kForCpu]) {
     certification.cpu += count;
-    if (job.surface.double_facets.empty()) certification.uncertain += count;
-    else certification.doubled -= std::min(certification.doubled, count);
+    certification.doubled -= counters[kUnsettled] - unsettled_;
+    unsettled_ = counters[kUnsettled];
     settle_exactly(job, counters);
     return true;
   }
   return false;
 }
 
-std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, Certification& certification) {
+std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, float share, Certification& certification) {
   std::size_t refined = 0;
   const bool double_next = !job.surface.double_facets.empty();
   for (const PairStore::Range& range : job.store.ranges)
     // No more at once than the lists of flagged pairs hold.
     for (std::size_t first = range.begin; first < range.end; first += table_size_) {
       const DoubtfulPush push{word(first), word(std::min(table_size_, range.end - first)), word(table_size_),
-                              static_cast<float>(job.surface.surface->mass / job.surface.surface->area)};
+                              static_cast<float>(job.surface.surface->mass / job.surface.surface->area), share};
       job.commands.phase(Phase::clip);
       job.commands.fill(job.counters, kProposals * kWord, 3 * kWord, 0);
       job.commands.dispatch({"doubtful", {double_next}},
@@ -170,7 +172,9 @@ std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, Certificat
                              updates(flagged_)},
                             push, push.count);
       Counters counters = read_counters(job);
-      refined += counters[kUncertain] + counters[kForCpu];
+      const std::size_t found = counters[kUncertain] + counters[kForCpu];
+      refined += found;
+      certification.uncertain += found;
       // What these pairs propose has been met before.
       while (climb(job, range.chunk, counters, certification)) {
         job.commands.fill(job.counters, kProposals * kWord, 3 * kWord, 0);

@@ -69,8 +69,8 @@ class PairPass {
   // Finds all pairs. The owners of sites and samples must have been found. Counts in `certification` what climbed which rung.
   void run(const PairJob& job, Certification& certification);
   // In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs. `cells` are those of
-  // CellPass. Returns how many pairs there were.
-  std::size_t refine(const PairJob& job, const Buffer& cells, Certification& certification);
+  // CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there were.
+  std::size_t refine(const PairJob& job, const Buffer& cells, float share, Certification& certification);
   // Records the clipping of `count` pairs from `first` on, of one batch, for their labels: for each the number of corners (or
   // kNone where that is not certain) and as many labels.
   void label(const PairJob& job, std::size_t chunk, std::size_t first, std::size_t count, const Buffer& labels);
@@ -96,6 +96,7 @@ class PairPass {
   Device& device_;
   bool double_;
   Buffer proposals_, table_, flagged_, gathered_, settled_, values_, no_labels_, sample_facets_, doubts_;
+  std::uint32_t unsettled_ = 0;  // pairs that double precision did not settle, as far as they are counted
   std::size_t proposal_room_, table_size_;
   std::size_t first_room_;  // of pairs, 0: by what is expected
 };

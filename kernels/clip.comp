@@ -100,6 +100,8 @@ void main() {
     return;
   }
   status_of[pair] = status;
+  if (kRung != 2 && status == kUnsure) atomicAdd(counters[kUnsureMet], 1u);
+  if (kRung == 2 && status != kClipped && status != kEmpty) atomicAdd(counters[kUnsettled], 1u);
   if (status == kClipped) {
     store_moments(pair, integrate(kUniform));
 #if !BISECTOR_DOUBLE

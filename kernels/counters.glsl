@@ -13,6 +13,8 @@ const uint kTargetCount = 10;     // cells that need a wider list
 const uint kMet = 11;             // seeds that this precision cannot tell apart
 const uint kLostSites = 12;       // sites without a certain owner
 const uint kTwice = 13;           // pairs met twice: must stay 0
+const uint kUnsureMet = 14;       // pairs with an uncertain decision, over the whole evaluation
+const uint kUnsettled = 15;       // and those of them that double precision did not settle
 const uint kProposalGroups = 16;  // indirect arguments
 const uint kPairGroups = 20;
 

@@ -21,6 +21,7 @@ layout(push_constant) uniform Push {
   uint pair_count;
   uint flagged_room;
   float mean_density;
+  float share;         // of the errors that are allowed
 };
 #include "counters.glsl"
 
@@ -32,8 +33,8 @@ void main() {
   precise float least = 0.25 * cells[6 * slot + 5];
   precise float mass = max(cells[6 * slot], least);
   precise float energy = max(cells[6 * slot + 4], mass * mass / mean_density);
-  precise float most_mass = kMassError * mass;
-  precise float most_energy = kEnergyError * energy;
+  precise float most_mass = kMassError * share * mass;
+  precise float most_energy = kEnergyError * share * energy;
   if (!(uintBitsToFloat(doubts[2 * slot]) > most_mass) && !(uintBitsToFloat(doubts[2 * slot + 1]) > most_energy)) return;
   const uint at = atomicAdd(counters[kDoubleNext ? kUncertain : kForCpu], 1u);
   if (at < flagged_room) flagged[(kDoubleNext ? 1 : 2) * flagged_room + at] = pair;

@@ -11,6 +11,9 @@
 namespace bisector {
 namespace {
 
+// Of the mean mass of a cell; less is what rounding makes of 0.
+constexpr double kLeastShare = 1e-12;
+
 template <class T>
 bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -56,10 +59,11 @@ Parity compare(const CellMoments& a, const RestrictedPolygons& polygons_a, const
     return parity;
   }
   const double area_per_mass = surface.area / surface.mass;
+  const double least_mass = kLeastShare * surface.mass / static_cast<double>(std::max<std::size_t>(1, a.cells.size()));
   for (std::size_t i = 0; i < a.cells.size(); ++i) {
     const Moments &expected = a.cells[i], &found = b.cells[i];
-    const double mass = a.step_mass[i];
-    const double length2 = mass > 0 ? std::max(mass * area_per_mass, expected.second / mass) : 0;
+    const double mass = std::max(a.step_mass[i], least_mass);
+    const double length2 = std::max(mass * area_per_mass, expected.second / mass);
     worsen(parity.mass_error, std::abs(found.mass - expected.mass), mass);
     worsen(parity.centroid_error, norm(found.first - expected.first), mass * std::sqrt(length2));
     worsen(parity.energy_error, std::abs(found.second - expected.second), mass * length2);

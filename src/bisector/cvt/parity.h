@@ -6,7 +6,7 @@
 namespace bisector {
 
 // Errors are the worst over all cells and infinite where a value is not a number. A cell's size is that of `a`: the mass
-// is CellMoments::step_mass, so that slivers of cells do not count as cells of their own size, and the length the square root
+// is CellMoments::step_mass, so that slivers of cells do not count as cells of their own size (at least 1e-12 of the mean), and the length the square root
 // of the area that this mass has at the surface's mean density, or the cell's root mean square distance if that is more.
 struct Parity {
   bool same_pairs = false;   // of cell and triangle

@@ -46,7 +46,7 @@ struct DiagramSeconds {
 // How the pairs of a diagram were certified.
 struct Certification {
   std::size_t pairs = 0;
-  std::size_t uncertain = 0;  // a decision was within the filter's error bound at first
+  std::size_t uncertain = 0;  // a decision, or a cell's mass in single precision, was within its error bound at first
   std::size_t wider = 0;      // needed a longer list of neighbours
   std::size_t doubled = 0;    // of a device: uncertain in single precision and clipped anew in double
   std::size_t cpu = 0;        // settled by the CPU's exact arithmetic
