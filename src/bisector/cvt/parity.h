@@ -6,8 +6,9 @@
 namespace bisector {
 
 // Errors are the worst over all cells and infinite where a value is not a number. A cell's size is that of `a`: the mass
-// is CellMoments::step_mass, so that slivers of cells do not count as cells of their own size (at least 1e-12 of the mean), and the length the square root
-// of the area that this mass has at the surface's mean density, or the cell's root mean square distance if that is more.
+// is CellMoments::step_mass, so that slivers of cells do not count as cells of their own size (at least 1e-12 of the mean), and
+// the length the square root of the area that this mass has at the surface's mean density, or the cell's root mean square
+// distance if that is more.
 struct Parity {
   bool same_pairs = false;   // of cell and triangle
   bool same_labels = false;  // of all polygons, in order
