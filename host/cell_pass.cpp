@@ -45,8 +45,8 @@ void CellPass::sort(Commands& commands, std::size_t cells, Scan& scan, const Pai
   commands.fill(begins_, 0, (cells + 1) * kWord, 0);
   const std::uint32_t pairs = word(store.count);
   commands.dispatch({"count_pairs", {}},
-                    {reads(store.pairs), reads(store.status), reads(triangle_of_), updates(by_triangle_), updates(begins_)}, pairs,
-                    store.count);
+                    {reads(store.pairs), reads(store.status), reads(triangle_of_), updates(by_triangle_), updates(begins_)},
+                    pairs, store.count);
   scan.record(commands, by_triangle_, triangles_ + 1);
   scan.record(commands, begins_, cells + 1);
   commands.dispatch({"scatter_pairs", {}},

@@ -97,7 +97,8 @@ void NeighbourPass::widen(Commands& commands, const DeviceSeeds& seeds, Scan& sc
   wide_grid_built_ = true;
   const TargetsPush push{static_cast<std::uint32_t>(flagged_count), static_cast<std::uint32_t>(target_room_)};
   commands.dispatch({"targets", {}},
-                    {reads(flagged), reads(pairs), updates(is_target_), writes(targets_), updates(counters)}, push, flagged_count);
+                    {reads(flagged), reads(pairs), updates(is_target_), writes(targets_), updates(counters)}, push,
+                    flagged_count);
   const std::size_t first = std::min(targets, target_room_);
   search(commands, seeds, wide_grid_, counters, true, first, std::min(flagged_count, target_room_ - first));
 }

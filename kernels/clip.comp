@@ -19,7 +19,8 @@ layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
 layout(std430, binding = 2) readonly buffer Facets { real facet_words[]; };
 layout(std430, binding = 3) readonly buffer FacetMeta { uint facet_meta[]; };
 layout(std430, binding = 4) readonly buffer Info { uvec4 list_info[]; };
-layout(std430, binding = 5) buffer Doubts { uint doubts[]; };  // in single, per cell: the bits of its pairs' largest errors of mass and energy
+// In single, per cell: the bits of the largest errors of mass and of energy that its pairs may have.
+layout(std430, binding = 5) buffer Doubts { uint doubts[]; };
 layout(std430, binding = 6) readonly buffer Lists { uint lists[]; };
 layout(std430, binding = 7) readonly buffer WideLists { uint wide_lists[]; };
 layout(std430, binding = 8) readonly buffer Pairs { uvec2 pairs[]; };       // facet, slot

@@ -150,8 +150,8 @@ bool points_out(uint label) {
 // and the corner w, seen from the foot, by
 //   (e1 + e2 + 10 u (|c1| / |m1| + |c2| / |m2|) + 22 u |w|) / sine + 6 u |w|,
 // to which come 6 u |h| + a of the foot, u |corner| of the sum, and 8 u |corner| for the products that the corner is tested in.
-// What positions lack turns bisectors of seeds that are close together: by `vague` radians, so that (|w| + |h|) vague / sine comes
-// to it. Where that turns the lines by over a hundredth of their angle, or u does, all is left to exact arithmetic.
+// What positions lack turns bisectors of seeds that are close together: by `vague` radians, so that (|w| + |h|) vague / sine
+// comes to it. Where that turns the lines by over a hundredth of their angle, or u does, all is left to exact arithmetic.
 bool meet(Line before, uint before_label, Line after, uint after_label, uint k) {
   precise real determinant = dot3(before.along, after.m);
   precise real squares = before.squared * after.squared;
@@ -249,11 +249,11 @@ int layer_axis(Point reference, Point c) {
   return axis >= 0 && reference.high[axis] == own.high[axis] ? axis : -1;
 }
 
-// The side of the corner with these labels with respect to the bisector of c, exactly, if c lies one layer of a grid from a reference on whose bisector
-// the corner is, or from the own seed, and if the corner's coordinate across the layers is known: for a corner of the facet,
-// and where an edge or all of the facet has but one. Else 0. Models made by hand lie half way between layers. The row
-// of c is that of the reference plus that of a seed across the layers, whose sign depends on this coordinate alone; where it is
-// 0 the cofactors are -1 for c and +1 for the reference, times the corner's denominator.
+// The side of the corner with these labels with respect to the bisector of c, exactly, if c lies one layer of a grid from the own
+// seed or from a reference on whose bisector the corner is, and if the corner's coordinate across the layers is known: for a
+// corner of the facet, and where an edge or all of the facet has but one. Else 0. Models made by hand lie half way between
+// layers. The row of c is that of the reference plus that of a seed across the layers, whose sign depends on this coordinate
+// alone; where it is 0 the cofactors are -1 for c and +1 for the reference, times the corner's denominator.
 int layer_side(uint before, uint after, uint c) {
   const bool on_after = (after & kEdgeLabel) != 0, on_before = (before & kEdgeLabel) != 0;
   const Point other = seed(c);
@@ -286,8 +286,8 @@ int layer_side(uint before, uint after, uint c) {
 }
 #endif
 
-// The side of the corner with these labels with respect to the bisector of c, where bounds do not tell but equal coordinates do; 0
-// if they do not either.
+// The side of the corner with these labels with respect to the bisector of c, where bounds do not tell but equal coordinates
+// do; 0 if they do not either.
 int tie_side(uint before, uint after, uint c) {
   int side = 0;
 #if BISECTOR_DOUBLE

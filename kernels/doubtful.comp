@@ -5,8 +5,8 @@
 
 layout(constant_id = 0) const bool kDoubleNext = false;
 
-// Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a polygon for as
-// far off as its farthest corner, by less still.
+// Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a polygon
+// for as far off as its farthest corner, by less still.
 const float kMassError = 4e-4, kEnergyError = 1.2e-3;
 const uint kClipped = 1;        // of clipper.glsl
 
