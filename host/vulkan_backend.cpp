@@ -175,7 +175,7 @@ void VulkanBackend::set_step_masses(CellMoments& moments) {
 }
 
 void VulkanBackend::run(const std::vector<Vec3>& given, CellMoments& moments, RestrictedPolygons* polygons) {
-  if (!within_reach(given)) {
+  if (given.empty() || !within_reach(given)) {
     if (polygons) cpu_.evaluate(given, moments, *polygons);
     else cpu_.evaluate(given, moments);
     moments.certification.cpu = moments.certification.pairs;
