@@ -2,7 +2,7 @@
 // A bucket may hold seeds of several cells; each is asked for its own cell before it counts. The order within a bucket depends
 // on a race, so nothing may depend on it.
 //
-// To include: `seeds`, `bucket_begin`, `bucket_slots` and a push constant block with `grid_lower`, `grid_inverse`, `bucket_mask`.
+// To include: a push constant block with `grid_lower`, `grid_inverse` and `bucket_mask`.
 
 // The place of a position in units of cells, off by 2^-22 of itself: it is rounded twice.
 vec3 place_at(Point p) {
