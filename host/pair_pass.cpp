@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "host/packing.h"
 
@@ -52,9 +51,13 @@ PairPass::PairPass(Device& device, bool is_double, const Rooms& rooms)
 
 void PairPass::set_plan(Commands& commands, const FacetSamples& plan) { upload(commands, sample_facets_, plan.facets); }
 
+// As many as there is room for first moments in one binding.
+std::size_t PairPass::most_pairs() const {
+  return std::min<std::size_t>(device_.limits().storage_range / (3 * real_size()), kNone - 1);
+}
+
 void PairPass::make_room(const PairJob& job) {
-  const std::size_t real = double_ ? sizeof(double) : sizeof(float);
-  const std::size_t most = std::min<std::size_t>(device_.limits().storage_range / (3 * real), kNone - 1);
+  const std::size_t real = real_size(), most = most_pairs();
   PairStore& store = job.store;
   if (first_room_) {
     if (store.room == 0) store.room = first_room_;
@@ -114,8 +117,7 @@ bool PairPass::run_batch(const PairJob& job, const FacetBatch& batch, std::size_
       if (overflow & kOverflowProposals) proposal_room_ *= 2;
       if (overflow & kOverflowTable) table_size_ *= 2;
       if (overflow & kOverflowPairs) {
-        const std::size_t real = double_ ? sizeof(double) : sizeof(float);
-        const std::size_t most = device_.limits().storage_range / (3 * real);
+        const std::size_t most = most_pairs();
         if (job.store.room >= most)
           throw DeviceError(fmt::format("{}: more than {} pairs of cells and triangles, which its buffers do not hold; use "
                                         "--device cpu, or fewer vertices",
@@ -193,7 +195,7 @@ void PairPass::start(const PairJob& job, const FacetBatch& batch, std::size_t ch
   commands.fill(table_, 0, table_size_ * kWord, 0);
   commands.fill(job.counters, kProposals * kWord, 3 * kWord, 0);
   const StartPush push{word(facets.first), word(batch.first), word(batch.count), word(proposal_room_), word(store.room)};
-  commands.dispatch(kernel("start", double_, {0, job.surface.surface->density.empty()}),
+  commands.dispatch(kernel("start", double_),
                     {reads(job.seeds.words), reads(facets.words), reads(facets.meta), reads(facets.wholes),
                      reads(job.sites.owners()), updates(store.pairs), updates(store.status), updates(store.mass_second),
                      updates(store.first), writes(proposals_), updates(job.counters)},

@@ -79,6 +79,8 @@ class PairPass {
 
  private:
   struct Kind;
+  std::size_t real_size() const { return double_ ? sizeof(double) : sizeof(float); }
+  std::size_t most_pairs() const;
   void make_room(const PairJob& job);
   bool climb(const PairJob& job, std::size_t chunk, const Counters& counters, Certification& certification);
   bool run_batch(const PairJob& job, const FacetBatch& batch, std::size_t chunk, Certification& certification);

@@ -6,9 +6,7 @@
 #include "real.glsl"
 #include "points.glsl"
 
-layout(constant_id = 1) const bool kUniform = true;
 const bool kNarrow = false;
-const uint kMostCorners = 3;
 
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Facets { real facet_words[]; };
