@@ -531,7 +531,8 @@ TEST(Multilevel, SetCountComesAsNearAsOneSeedPerCellAllows) {
     backend.evaluate(seeds, moments, polygons);
     for (std::size_t count : {150u, 290u, 299u, 300u, 301u, 310u, 450u, 600u}) {
       std::vector<Vec3> changed = seeds;
-      set_count(polygons, moments, count, changed);
+      std::vector<SeedPlace> free;
+      set_count(polygons, moments, count, changed, free);
       if (count <= 310) {
         EXPECT_EQ(changed.size(), count);
       } else {
@@ -544,7 +545,8 @@ TEST(Multilevel, SetCountComesAsNearAsOneSeedPerCellAllows) {
       EXPECT_EQ(distinct.size(), changed.size()) << count;
     }
     std::vector<Vec3> doubled = seeds;
-    set_count(polygons, moments, 5000, doubled);
+    std::vector<SeedPlace> free;
+    set_count(polygons, moments, 5000, doubled, free);
     EXPECT_GT(doubled.size(), 300u);
     EXPECT_LE(doubled.size(), 600u);
   }
@@ -557,12 +559,13 @@ TEST(Multilevel, SetCountGetsFarByRepetition) {
   CpuBackend backend(surface, NeighbourSource::nearest);
   for (std::size_t count : {4u, 50u, 2000u}) {
     std::vector<Vec3> seeds = random_seeds(mesh, 300, 15);
+    std::vector<SeedPlace> free;
     int rounds = 0;
     for (; seeds.size() != count && rounds < 20; ++rounds) {
       CellMoments moments;
       RestrictedPolygons polygons;
       backend.evaluate(seeds, moments, polygons);
-      set_count(polygons, moments, count, seeds);
+      set_count(polygons, moments, count, seeds, free);
     }
     EXPECT_EQ(seeds.size(), count);
     EXPECT_LT(rounds, 8);

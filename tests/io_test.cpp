@@ -97,6 +97,8 @@ void expect_same(const TriangleMesh& a, const TriangleMesh& b) {
   for (std::size_t v = 0; v < a.vertices.size(); ++v) EXPECT_TRUE(same_bits(a.vertices[v], b.vertices[v])) << v;
   EXPECT_EQ(a.triangles, b.triangles);
   EXPECT_EQ(a.face_of_triangle, b.face_of_triangle);
+  EXPECT_EQ(a.labels, b.labels);
+  EXPECT_EQ(a.feature_edges, b.feature_edges);
 }
 
 TriangleMesh awkward_numbers() {
@@ -187,6 +189,13 @@ constexpr const char* kStl = "solid square\nfacet normal 0 0 1\nouter loop\nvert
 
 const TriangleMesh kSquare{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}};
 
+TriangleMesh marked_square() {
+  TriangleMesh mesh = kSquare;
+  mesh.labels = {-3, 2000000000};
+  mesh.feature_edges = {{0, 1}, {0, 2}, {2, 3}};
+  return mesh;
+}
+
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
     text.replace(at, from.size(), to);
@@ -245,7 +254,7 @@ TEST_F(Io, ToleratesHowTextIsLaidOut) {
                                                     "0 1 0 1 2 3 4\n3 0 1 2\n3 0 2 3\n"),
                 kSquare);
   expect_same(read("a.obj", "mtllib a.mtl\no thing\nv 0 0 0 1\nv 1 0 \\\n 0\nv 1 1 0 0.5 0.5 0.5\n# path C:\\\n"
-                            "v 0 1 0\nvt 0 0\nvn 0 0 1\ng a\ns off\nusemtl m\nf -4 -3/1 \\\r\n -2//1\nl 1 2\n"
+                            "v 0 1 0\nvt 0 0\nvn 0 0 1\ng a\ns off\nusemtl m\nf -4 -3/1 \\\r\n -2//1\n"
                             "p 1\nf 1/1/1 3/1/1 4/1/1\n"),
               kSquare);
   expect_same(read("a.obj", "f 1 2 3\nf 1 3 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"), kSquare);
@@ -406,6 +415,9 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
   std::string bstl_many = bstl;
   for (std::size_t i = 80; i < 84; ++i) bstl_many[i] = '\xff';
   const float nan = std::nanf(""), inf = HUGE_VALF;
+  const std::string labelled = replaced(ply, "end_header", "property int label\nend_header");
+  const std::string edged =
+      replaced(ply, "end_header", "element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header");
 
   const std::vector<Malformed> cases{
       {"a.off", "", ": the file is empty"},
@@ -500,6 +512,16 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
       {"a.ply", bply_with(1, 3, 2).substr(0, bply_head.size() + 20), ": vertex 1: the file ends here, of 3 declared"},
       {"a.ply", replaced(bply_with(1, 3, 2), "vertex 3", "vertex 4000000000"), ": vertex 4: the file ends here"},
       {"a.ply", bply.substr(0, bply.size() - 3), ": face 3: the file ends here"},
+      {"a.ply", replaced(labelled, "3 0 1 2", "3 0 1 2 0.5"), ":15: 0.5 is not a label"},
+      {"a.ply", replaced(labelled, "3 0 1 2", "3 0 1 2 4294967296"), ":15: 4294967296 is not a label"},
+      {"a.ply", replaced(labelled, "end_header", "property int label\nend_header"),
+       ":11: element 'face' has several properties 'label'"},
+      {"a.ply", edged + "0 4\n", ":19: index 4 is out of range"},
+      {"a.ply", replaced(edged, "edge 1", "edge 4000000000") + "0 1\n",
+       ":20: the file ends after 1 of 4000000000 items of 'edge'"},
+      {"a.obj", replaced(obj, "f 1 2 3", "l 1 5\nf 1 2 3"), ":5: index 5 is out of range"},
+      {"a.obj", replaced(obj, "f 1 2 3", "l 1\nf 1 2 3"), ":5: a line has 1 vertex"},
+      {"a.obj", replaced(obj, "f 1 2 3", "l 1 0\nf 1 2 3"), ":5: index 0 is out of range"},
       // STL
       {"a.stl", "solid nothing\nendsolid nothing\n", ": face 0: there is no face"},
       {"a.stl", "solid", ":1: the file ends after 0 faces"},
@@ -552,7 +574,10 @@ TEST_F(Io, RefusesWhatIsNotAFile) {
 }
 
 TEST_F(Io, SurvivesTruncationAndDamage) {
+  write_mesh(path("marked.obj"), marked_square());
+  write_mesh(path("marked.ply"), marked_square());
   const std::vector<std::pair<const char*, std::string>> valid{
+      {"a.obj", slurp(path("marked.obj"))}, {"a.ply", slurp(path("marked.ply"))},
       {"a.off", kOff}, {"a.off", replaced(kOff, "3 0 1 2\n3 0 2 3", "4 0 1 2 3\n4 3 2 1 0")}, {"a.obj", kObj},
       {"a.ply", kPly}, {"a.ply", rich_ply(false)}, {"a.ply", rich_ply(true)},
       {"a.stl", kStl}, {"a.stl", binary_stl(kTwoFacets)}};
@@ -580,6 +605,8 @@ TEST_F(Io, SurvivesTruncationAndDamage) {
         for (const Triangle& t : mesh.triangles)
           for (const Index v : t) EXPECT_LT(v, mesh.vertices.size());
         EXPECT_TRUE(mesh.face_of_triangle.empty() || mesh.face_of_triangle.size() == mesh.triangles.size());
+        EXPECT_TRUE(mesh.labels.empty() || mesh.labels.size() == mesh.triangles.size());
+        for (const auto& e : mesh.feature_edges) EXPECT_LT(e[0], e[1]);
       } catch (const Error& error) {
         ++refused;
         EXPECT_EQ(std::string(error.what()).rfind(file, 0), 0u) << error.what();
@@ -589,6 +616,136 @@ TEST_F(Io, SurvivesTruncationAndDamage) {
     }
   EXPECT_GT(refused, 1000u);
   EXPECT_GT(accepted, 1000u);
+}
+
+using Edges = std::vector<std::array<Index, 2>>;
+
+TEST_F(Io, LabelsAndFeatureEdgesRoundTrip) {
+  TriangleMesh several = icosphere(2);
+  for (std::size_t t = 0; t < several.triangles.size(); ++t)
+    several.labels.push_back(static_cast<std::int32_t>(t % 5) - 2);
+  TriangleMesh one = kSquare, only_edges = kSquare;
+  one.labels = {7, 7};
+  only_edges.feature_edges = {{1, 2}};
+  for (const TriangleMesh& mesh : {marked_square(), several, one, only_edges})
+    for (const char* name : {"a.ply", "a.obj"}) {
+      write_mesh(path(name), mesh);
+      expect_same(read_mesh(path(name)), mesh);
+    }
+  for (const char* name : {"a.off", "a.stl"}) {
+    write_mesh(path(name), marked_square());
+    const TriangleMesh back = read_mesh(path(name));
+    EXPECT_TRUE(back.labels.empty());
+    EXPECT_TRUE(back.feature_edges.empty());
+  }
+}
+
+TEST_F(Io, ReadsLabelsOfPly) {
+  const std::string head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                           "property float z\nelement face 2\nproperty TYPE label\n"
+                           "property list uchar int vertex_indices\nelement edge 2\nproperty float length\n"
+                           "property uchar vertex2\nproperty short vertex1\nend_header\n"
+                           "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  for (const char* type : {"char", "uchar", "short", "ushort", "int", "uint"}) {
+    const TriangleMesh mesh =
+        read("a.ply", replaced(head, "TYPE", type) + "5 4 0 1 2 3\n9 3 0 1 2\n1.5 3 2\n2.5 1 2\n");
+    EXPECT_EQ(mesh.labels, (std::vector<std::int32_t>{5, 5, 9}));  // both halves of the quad
+    EXPECT_EQ(mesh.feature_edges, (Edges{{1, 2}, {2, 3}}));
+  }
+  // Of other types it is something else.
+  EXPECT_TRUE(read("a.ply", replaced(head, "TYPE", "float") + "5 3 0 1 2\n9 3 0 2 3\n1 3 2\n1 1 2\n").labels.empty());
+  for (const bool big_endian : {false, true}) {
+    std::string bytes = std::string("ply\nformat binary_") + (big_endian ? "big" : "little") +
+                        "_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                        "element edge 2\nproperty ushort vertex1\nproperty int vertex2\nproperty uchar flag\n"
+                        "element face 2\nproperty list uchar int vertex_indices\nproperty short label\nend_header\n";
+    for (const Vec3& p : kSquare.vertices)
+      for (int k = 0; k < 3; ++k) put(bytes, static_cast<float>(p[k]), big_endian);
+    for (const auto& [a, b] : {std::pair{3, 2}, {1, 3}}) {  // the second is not an edge
+      put(bytes, static_cast<std::uint16_t>(a), big_endian);
+      put(bytes, std::int32_t{b}, big_endian);
+      put(bytes, std::uint8_t{1}, big_endian);
+    }
+    for (std::size_t t = 0; t < 2; ++t) {
+      put(bytes, std::uint8_t{3}, big_endian);
+      for (const Index v : kSquare.triangles[t]) put(bytes, v, big_endian);
+      put(bytes, static_cast<std::int16_t>(t == 0 ? -5 : 300), big_endian);
+    }
+    const TriangleMesh mesh = read("a.ply", bytes);
+    EXPECT_EQ(mesh.labels, (std::vector<std::int32_t>{-5, 300}));
+    EXPECT_EQ(mesh.feature_edges, (Edges{{2, 3}}));
+    ASSERT_EQ(warnings_.size(), 1u);
+    EXPECT_NE(warnings_[0].find("1 marked edge off the surface"), std::string::npos) << warnings_[0];
+  }
+}
+
+TEST_F(Io, ReadsGroupsAndLinesOfObj) {
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+  const auto labels = [&](const std::string& rest) { return read("a.obj", vertices + rest).labels; };
+  using Labels = std::vector<std::int32_t>;
+  EXPECT_EQ(labels("g b\nf 1 2 3\ng a\nf 1 3 4\ng b\nf 1 2 4\n"), (Labels{0, 1, 0}));
+  EXPECT_EQ(labels("usemtl red\nf 1 2 3\nusemtl blue\nf 1 2 3 4\n"), (Labels{0, 1, 1}));
+  EXPECT_EQ(labels("f 1 2 3\ng  a  b\nf 1 3 4\nusemtl m\nf 1 2 4\ng a b\nf 1 2 4\n"), (Labels{0, 1, 2, 2}));
+  EXPECT_EQ(labels("g empty\ng a\nf 1 2 3\nf 1 3 4\n"), Labels{});
+  EXPECT_EQ(labels("g label_5\nf 1 2 3\ng label_-7\nf 1 3 4\n"), (Labels{5, -7}));
+  EXPECT_EQ(labels("g label_5\nf 1 2 3\ng label_x\nf 1 3 4\n"), (Labels{0, 1}));
+  EXPECT_EQ(labels("g label_5\nf 1 2 3\ng label_99999999999\nf 1 3 4\n"), (Labels{0, 1}));
+  // Lines of several vertices, from the end, before the vertices, with texture coordinates, closed, off the surface.
+  EXPECT_EQ(read("a.obj", "l 4/1 1/2 2/\n" + vertices + "f 1 2 3 4\nl -2 -1\nl 2 1 \\\n3\nl 2 4 4\n").feature_edges,
+            (Edges{{0, 1}, {0, 2}, {0, 3}, {2, 3}}));
+  ASSERT_EQ(warnings_.size(), 2u);
+  EXPECT_NE(warnings_[1].find("2 marked edges off the surface"), std::string::npos) << warnings_[1];
+}
+
+TEST_F(Io, ReadsFeatureEdges) {
+  EXPECT_EQ(read_feature_edges(store("e.txt", "# edges\n2 0\n\n 1 2 # again\r\n0 2 7\n"), kSquare),
+            (Edges{{0, 2}, {1, 2}}));
+  write_feature_edges(path("e.txt"), {{0, 1}, {2, 3}});
+  EXPECT_EQ(read_feature_edges(path("e.txt"), kSquare), (Edges{{0, 1}, {2, 3}}));
+  write_feature_edges(path("e.txt"), {});
+  EXPECT_TRUE(read_feature_edges(path("e.txt"), kSquare).empty());
+  for (const auto& [text, place] : {std::pair{"0 1\n1\n", ":2: an edge has one vertex"},
+                                    {"0 4\n", ":1: index 4 is out of range"},
+                                    {"-1 0\n", ":1: index -1 is out of range"},
+                                    {"0 1\n# no\n3 1\n", ":3: 3 1 is not an edge"},
+                                    {"1 1\n", ":1: 1 1 is not an edge"},
+                                    {"a b\n", ":1: 'a' is not an integer"}, {"", ": the file is empty"}}) {
+    const std::string file = store("e.txt", text);
+    try {
+      read_feature_edges(file, kSquare);
+      ADD_FAILURE() << text;
+    } catch (const Error& error) {
+      EXPECT_EQ(std::string(error.what()).rfind(file + place, 0), 0u) << error.what();
+    }
+  }
+}
+
+TEST_F(Io, ReadsVertexAttributes) {
+  EXPECT_EQ(read_vertex_attribute(store("a.ply", rich_ply(false)), "red"), (std::vector<double>{200, 200, 200, 200}));
+  EXPECT_EQ(read_vertex_attribute(store("a.ply", rich_ply(true)), "z"), (std::vector<double>{0, 0, 0, 0.1}));
+  const std::string text = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n"
+                           "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                           "property double size\nend_header\n3 0 1 2\n0 0 0 1.5\n1 0 0 -2\n0 1 0 1e-3\n";
+  EXPECT_EQ(read_vertex_attribute(store("a.ply", text), "size"), (std::vector<double>{1.5, -2, 1e-3}));
+  const auto message = [&](const std::string& file, const char* name) -> std::string {
+    largest_allocation = 0;
+    try {
+      read_vertex_attribute(file, name);
+    } catch (const Error& error) {
+      EXPECT_EQ(std::string(error.what()).rfind(file, 0), 0u) << error.what();
+      EXPECT_LE(largest_allocation, std::size_t{1} << 18);
+      return std::string(error.what()).substr(file.size());
+    }
+    return "nothing";
+  };
+  EXPECT_NE(message(store("a.ply", text), "tags").find("use one of x, y, z, size"), std::string::npos);
+  const auto begins = [&](const std::string& bytes, const char* what) {
+    EXPECT_EQ(message(store("a.ply", bytes), "size").rfind(what, 0), 0u) << what;
+  };
+  begins(replaced(text, "-2", "nan"), ": vertex 1: 'size' is not finite");
+  begins(replaced(text, "-2", ""), ":13: a number is missing");
+  begins(replaced(text, "vertex 3", "vertex 4000000000"), ":15: the file ends");
+  EXPECT_NE(message(store("a.off", kOff), "size").find(".off files have none"), std::string::npos);
 }
 
 TEST_F(Io, ReadsPoints) {
@@ -620,6 +777,7 @@ TEST_F(Io, WritesPolygons) {
   EXPECT_EQ(back.vertices, mesh.vertices);
   EXPECT_EQ(back.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {3, 2, 4}}));
   EXPECT_EQ(back.face_of_triangle, (std::vector<Index>{0, 0, 1}));
+  EXPECT_EQ(back.labels, (std::vector<std::int32_t>{7, 7, static_cast<std::int32_t>(4000000000u)}));
   std::string tail;
   put(tail, std::uint8_t{3});
   for (const Index v : {3u, 2u, 4u}) put(tail, v);
@@ -649,6 +807,12 @@ TEST_F(Io, WritesNothingThatCannotBeRead) {
   mesh.vertices[2].y = 1e39;
   EXPECT_THROW(write_mesh(path("a.stl"), mesh), Error);
   mesh.triangles[1][1] = 4;
+  EXPECT_THROW(write_mesh(path("a.obj"), mesh), Error);
+  mesh = kSquare;
+  mesh.labels = {1};
+  EXPECT_THROW(write_mesh(path("a.ply"), mesh), Error);
+  mesh = kSquare;
+  mesh.feature_edges = {{0, 4}};
   EXPECT_THROW(write_mesh(path("a.obj"), mesh), Error);
   EXPECT_THROW(write_mesh(path("a.txt"), kSquare), Error);
   EXPECT_TRUE(files().empty());

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -75,11 +76,23 @@ std::vector<Vec3> read_seeds(const std::string& path, std::size_t count) {
 
 // --- remesh ---
 
-RemeshOptions remesh_options(const RemeshCommand& command) {
+RemeshOptions remesh_options(const RemeshCommand& command, const TriangleMesh& input) {
   RemeshOptions options = command.options;
+  const SizingOptions density = parse_density(command.density);
+  options.sizing.kind = density.kind;
+  options.sizing.exponent = density.exponent;
+  if (const std::string name = density_attribute(command.density); !name.empty())
+    options.sizing.attribute = read_vertex_attribute(command.input, name);
+  options.features = parse_features(command.features);
+  if (!command.feature_file.empty()) options.features.given = read_feature_edges(command.feature_file, input);
+  if (command.edge_length_relative > 0)
+    options.edge_length = command.edge_length_relative * bounding_box(input.vertices).diagonal();
+  if (command.weld >= 0) options.weld = command.weld;
   options.threads = command.common.threads;
   options.compute = compute_options(command.compute);
-  options.energy = command.energy == "rcvt" ? Energy::restricted : Energy::constrained;
+  options.energy = command.energy == "rcvt"   ? Energy::restricted
+                   : command.energy == "ccvt" ? Energy::constrained
+                                              : Energy::automatic;
   options.topology = command.topology == "enforce" ? TopologyControl::enforce
                      : command.topology == "check" ? TopologyControl::check
                                                    : TopologyControl::off;
@@ -98,7 +111,16 @@ void require_sound(const RemeshResult& result) {
     throw Error("the seeds are too few to span a triangle of this surface; ask for more vertices");
 }
 
+void warn_of_features(Console& console, const RemeshResult& result) {
+  if (result.features.broken > 0)
+    console.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices",
+                             result.features.broken, counted(result.features.curves, "feature curve", "feature curves")));
+}
+
 void warn_of_topology(Console& console, const RemeshResult& result) {
+  if (result.topology_matches && result.mesh.vertices.size() > result.wanted + result.wanted / 100)
+    console.warn(fmt::format("{} instead of {}: fewer did not give the input's topology and features",
+                             counted(result.mesh.vertices.size(), "vertex", "vertices"), result.wanted));
   if (result.topology_matches) return;
   console.warn(fmt::format("the output's topology ({}) is not the input's ({}); {}", describe(result.topology),
                            describe(result.input_topology),
@@ -106,8 +128,30 @@ void warn_of_topology(Console& console, const RemeshResult& result) {
 }
 
 // Everything but the seconds, whose place is kept.
+Json faults_json(const RemeshResult& result) {
+  Json faults = Json::array();
+  for (const TopologyFault& fault : result.faults) {
+    Json vertices = Json::array();
+    for (Index v : fault.seeds) vertices.push_back(v == kNone ? Json(nullptr) : Json(v));
+    faults.push_back({{"vertices", vertices}, {"position", point_json(fault.position)}, {"what", fault.what}});
+  }
+  return faults;
+}
+
+Json features_json(const FeatureResult& features, std::size_t edges) {
+  const FeatureDistance& d = features.distance;
+  return {{"curves", features.curves}, {"corners", features.corners}, {"broken", features.broken}, {"edges", edges},
+          {"distance_vertices", d.vertices}, {"distance_max", std::max(d.to_reference, d.from_reference)}};
+}
+
+Json weld_json(const WeldResult& welded) {
+  return {{"merged_vertices", welded.merged_vertices}, {"split_edges", welded.split_edges},
+          {"removed_triangles", welded.degenerate_triangles + welded.duplicate_triangles},
+          {"border_edges_before", welded.border_before}, {"border_edges_after", welded.border_after}};
+}
+
 Json remesh_report(Console& console, const RemeshResult& result, const QualityReport& quality,
-                   const TriangleMesh& input) {
+                   const TriangleMesh& input, const RemeshOptions& options) {
   Json report = start_report("remesh");
   report["device"] = device_json(result.device);
   report["input"] = input_json(input);
@@ -126,6 +170,19 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["quality"]["self_intersections"] = count_self_intersections(result.mesh);
   report["topology"] = topology_json(result.topology);
   report["topology"]["matches_input"] = result.topology_matches;
+  report["topology"]["ball_property"] = result.ball_property;
+  report["topology"]["divided"] = result.divided;
+  report["topology"]["faults"] = faults_json(result);
+  report["features"] = features_json(result.features, result.mesh.feature_edges.size());
+  report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length}};
+  report["noisy"] = result.noisy;
+  report["weld"] = weld_json(result.welded);
+  if (options.min_angle > 0)
+    report["improved"] = {{"made", result.improved.made}, {"inserted", result.improved.inserted},
+                          {"removed", result.improved.removed}, {"missed", result.improved.missed}};
+  if (options.fit)
+    report["fit"] = {{"iterations", result.fitted.iterations}, {"damped", result.fitted.damped},
+                     {"restored", result.fitted.restored}};
   return report;
 }
 
@@ -134,6 +191,11 @@ Json remesh_seconds(const RemeshSeconds& seconds) {
   json.update(seconds_json(seconds.diagrams));
   json["lbfgs"] = seconds.lbfgs;
   json["extract"] = seconds.extract;
+  json["prepare"] = seconds.prepare;
+  json["features"] = seconds.features;
+  json["topology"] = seconds.topology;
+  json["improve"] = seconds.improve;
+  json["fit"] = seconds.fit;
   json["remesh"] = seconds.total;
   return json;
 }
@@ -148,12 +210,17 @@ void print_summary(Console& console, const RemeshCommand& command, const RemeshR
                             quality.theta_min_ave, 100 * quality.valence6));
   console.print(fmt::format("topology   {}{}", describe(result.topology),
                             result.topology_matches ? "; as the input" : "; NOT as the input"));
+  if (result.features.curves > 0)
+    console.print(fmt::format("features   {} of {} kept, {}", result.features.curves - result.features.broken,
+                              counted(result.features.curves, "curve", "curves"),
+                              counted(result.features.corners, "corner", "corners")));
+  if (result.noisy) console.print("noise      seeds were left off the surface, whose normals are noise at this edge length");
   console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));
   print_device(console, result.device);
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose)
     print_seconds(console, seconds, device_seconds_json(result.device, result.seconds.diagrams.device));
-  console.print_written({command.output, command.preview, command.common.report});
+  console.print_written({command.output, command.preview, command.feature_output, command.common.report});
 }
 
 // --- rvd ---
@@ -311,6 +378,44 @@ void print_quality(Console& console, const QualityCommand& command, const Qualit
 
 }  // namespace
 
+SizingOptions parse_density(const std::string& word) {
+  SizingOptions options;
+  const std::size_t colon = word.find(':');
+  const std::string kind = word.substr(0, colon), rest = colon == std::string::npos ? "" : word.substr(colon + 1);
+  const Error wrong("'" + word + "' is none of uniform, lfs[:EXP], curvature[:EXP], attribute:NAME");
+  if (kind == "attribute" && !rest.empty()) {
+    options.kind = DensityKind::attribute;
+    return options;
+  }
+  if (word == "uniform") return options;
+  if (kind != "lfs" && kind != "curvature") throw wrong;
+  options.kind = kind == "lfs" ? DensityKind::lfs : DensityKind::curvature;
+  if (colon == std::string::npos) return options;
+  const auto [stop, error] = std::from_chars(rest.data(), rest.data() + rest.size(), options.exponent);
+  if (error != std::errc{} || stop != rest.data() + rest.size() || !(options.exponent > 0 && options.exponent <= 8))
+    throw Error("'" + word + "': the exponent is not a number above 0 and at most 8");
+  return options;
+}
+
+std::string density_attribute(const std::string& word) {
+  const std::string prefix = "attribute:";
+  return word.rfind(prefix, 0) == 0 ? word.substr(prefix.size()) : "";
+}
+
+FeatureOptions parse_features(const std::string& word) {
+  FeatureOptions options;
+  if (word == "auto") return options;
+  if (word == "none") {
+    options.mode = FeatureMode::none;
+    return options;
+  }
+  options.mode = FeatureMode::degrees;
+  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), options.angle);
+  if (error != std::errc{} || stop != word.data() + word.size() || !(options.angle > 0 && options.angle < 180))
+    throw Error("'" + word + "' is none of auto, none, or degrees above 0 and below 180");
+  return options;
+}
+
 Precision parse_precision(const std::string& word) {
   return word == "single" ? Precision::single : word == "double" ? Precision::double_ : Precision::automatic;
 }
@@ -318,8 +423,8 @@ Precision parse_precision(const std::string& word) {
 void run(const RemeshCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{command.output, kMeshFormats}, {command.preview, {".png"}}, {report_path, {}}},
-                {command.input, command.seeds});
+  check_outputs({{command.output, kMeshFormats}, {command.preview, {".png"}}, {command.feature_output, {}}, {report_path, {}}},
+                {command.input, command.seeds, command.feature_file});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
   const Context context = console.context();
@@ -327,18 +432,19 @@ void run(const RemeshCommand& command) {
   console.phase("reading " + command.input);
   const Stopwatch reading;
   const TriangleMesh input = read_mesh(command.input, context);
-  const RemeshOptions options = remesh_options(command);
+  const RemeshOptions options = remesh_options(command, input);
   double io = reading.seconds();
 
   console.phase("preparing");
   const RemeshResult result = remesh(input, options, context);
   require_sound(result);
+  warn_of_features(console, result);
   if (options.topology != TopologyControl::off) warn_of_topology(console, result);
 
   const Stopwatch measuring;
   const QualityReport quality = measure_quality(result.mesh);
   Json report;
-  if (!report_path.empty()) report = remesh_report(console, result, quality, input);
+  if (!report_path.empty()) report = remesh_report(console, result, quality, input, options);
   Json seconds = remesh_seconds(result.seconds);
   seconds["quality"] = measuring.seconds();
 
@@ -346,6 +452,7 @@ void run(const RemeshCommand& command) {
   stop_watching_interrupts();
   const Stopwatch writing;
   write_mesh(command.output, result.mesh);
+  if (!command.feature_output.empty()) write_feature_edges(command.feature_output, result.mesh.feature_edges);
   io += writing.seconds();
   const Stopwatch drawing;
   if (!command.preview.empty()) write_preview(command.preview, result.mesh);

@@ -23,12 +23,23 @@ struct ComputeWords {
   std::string neighbours = "auto";
 };
 
+// "uniform", "lfs[:EXP]", "curvature[:EXP]" or "attribute:NAME": kind and exponent. Throws Error for anything else.
+SizingOptions parse_density(const std::string& word);
+// The NAME of "attribute:NAME", else empty.
+std::string density_attribute(const std::string& word);
+
+// "auto", "none" or an angle in degrees. Throws Error for anything else.
+FeatureOptions parse_features(const std::string& word);
+
 // "auto", "single" or "double".
 Precision parse_precision(const std::string& word);
 
 struct RemeshCommand {
   std::string input, output, seeds, preview;
-  std::string topology = "enforce", energy = "ccvt";
+  std::string topology = "enforce", energy = "auto";
+  std::string density = "uniform", features = "auto", feature_file, feature_output;
+  double edge_length_relative = 0;  // of the input's diagonal; 0: not given
+  double weld = -1;                 // not given
   RemeshOptions options;
   ComputeWords compute;
   CommonOptions common;

@@ -10,12 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "bisector/core/error.h"
 #include "commands.h"
 #include "console.h"
 
 namespace {
 
 using namespace bisector::cli;
+using bisector::SizingOptions;
 
 constexpr std::uint64_t kMostSeeds = 100'000'000;
 
@@ -59,6 +61,32 @@ CLI::Validator number_below(double most) {
         const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
         if (error == std::errc{} && stop == text.data() + text.size() && value >= 0 && value < most) return {};
         return "'" + text + "' is not a number of at least 0 and less than " + CLI::detail::to_string(most);
+      },
+      "");
+}
+
+CLI::Validator number_above_zero() {
+  return CLI::Validator(
+      [](std::string& text) -> std::string {
+        double value = 0;
+        const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error == std::errc{} && stop == text.data() + text.size() && value > 0 && std::isfinite(value)) return {};
+        return "'" + text + "' is not a positive number";
+      },
+      "");
+}
+
+// What a parser that throws bisector::Error takes.
+template <class Parse>
+CLI::Validator parsed_by(const Parse& parse) {
+  return CLI::Validator(
+      [parse](std::string& text) -> std::string {
+        try {
+          parse(text);
+          return {};
+        } catch (const bisector::Error& error) {
+          return error.what();
+        }
       },
       "");
 }
@@ -145,12 +173,62 @@ CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
            "-n is then not needed")
       ->group("Seeds");
   add_random_seed(app, command.options.random_seed);
+  app->add_option("--edge-length", command.options.edge_length,
+                  "mean edge length of the result, in the mesh's unit,\n"
+                  "instead of -n")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-length-relative", command.edge_length_relative,
+                  "the same as a share of the bounding box's diagonal")
+      ->type_name("R")->check(number_above_zero())->group("Size");
+  app->add_option("--density", command.density,
+                  "where triangles are smaller: uniform (default),\n"
+                  "lfs[:EXP] (local feature size to the power -EXP,\n"
+                  "default 2), curvature[:EXP] (the larger principal one,\n"
+                  "default 1) or attribute:NAME (a vertex property of a\n"
+                  "PLY file); edges are as long as density^(-1/4)")
+      ->type_name("WORD")->check(parsed_by(parse_density))->group("Size");
+  app->add_option("--gradation", command.options.sizing.gradation,
+                  "edge lengths change by at most so much per length;\n"
+                  "0: no bound; default 0.2. Not for uniform density")
+      ->type_name("G")->check(number_below(10))->group("Size");
+  app->add_option("--edge-min", command.options.sizing.min_edge, "edges aimed at are no shorter, in the mesh's unit")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-max", command.options.sizing.max_edge, "and no longer")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--features", command.features,
+                  "sharp edges to keep: auto (default), none, or all with a\n"
+                  "dihedral deviation of so many degrees. Borders and\n"
+                  "non-manifold edges are always kept, edges between face\n"
+                  "labels unless none")
+      ->type_name("WORD")->check(parsed_by(parse_features))->group("Features");
+  add_file(app, "--feature-file", command.feature_file, "FILE",
+           "also keep these edges: lines of two vertex numbers,\n"
+           "counted from 0 in the input")
+      ->group("Features");
+  add_file(app, "--feature-output", command.feature_output, "FILE",
+           "write the result's feature edges likewise; .ply and .obj\n"
+           "outputs hold them too")
+      ->group("Features");
+  app->add_option("--weld", command.weld,
+                  "join borders that are no farther apart, in the mesh's\n"
+                  "unit; default: only what lies at the same point")
+      ->type_name("T")->check(number_below(1e100))->group("Features");
   app->add_option("--topology", command.topology,
                   "where the result's topology is not the input's:\n"
                   "enforce (mend it; default), check (warn) or off")
       ->type_name("WORD")->check(one_of({"enforce", "check", "off"}))->group("Optimisation");
-  app->add_option("--energy", command.energy, "ccvt (seeds on the surface; default) or rcvt (free)")
-      ->type_name("WORD")->check(one_of({"rcvt", "ccvt"}))->group("Optimisation");
+  app->add_option("--energy", command.energy,
+                  "ccvt (seeds on the surface), rcvt (free) or auto (ccvt\n"
+                  "unless the input is noise at this edge length; default)")
+      ->type_name("WORD")->check(one_of({"auto", "rcvt", "ccvt"}))->group("Optimisation");
+  app->add_option("--min-angle", command.options.min_angle,
+                  "degrees that the last pass tries to get all angles\n"
+                  "above; 0: no such pass; default 40")
+      ->type_name("A")->check(number_below(60))->group("Optimisation");
+  app->add_flag("--fit", command.options.fit,
+                "move the result's vertices off the surface, to where\n"
+                "its triangles are nearest to the input")
+      ->group("Optimisation");
   app->add_option("--iterations", command.options.iterations, "at most so many per level; default 100")
       ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
   app->add_option("--tolerance", command.options.tolerance,
@@ -232,8 +310,15 @@ CLI::App* add_check(CLI::App& program, CheckCommand& command) {
 
 // What options ask of each other.
 void check_usage(const RemeshCommand& command) {
-  if (command.seeds.empty() && command.options.vertices == 0)
-    throw CLI::ValidationError("how many vertices? give -n N or --seeds FILE.xyz");
+  const int sizes = (command.options.vertices > 0) + (command.options.edge_length > 0) + (command.edge_length_relative > 0);
+  if (command.seeds.empty() && sizes == 0)
+    throw CLI::ValidationError("how many vertices? give -n N, --edge-length L or --seeds FILE.xyz");
+  if (sizes > 1) throw CLI::ValidationError("-n, --edge-length and --edge-length-relative: give one of them");
+  if (!command.seeds.empty() && command.options.vertices == 0 && sizes > 0)
+    throw CLI::ValidationError("--edge-length: seeds from a file have their own number");
+  const SizingOptions& sizing = command.options.sizing;
+  if (sizing.max_edge > 0 && sizing.min_edge > sizing.max_edge)
+    throw CLI::ValidationError("--edge-min is more than --edge-max");
   if (!command.seeds.empty() && command.options.levels > 1)
     throw CLI::ValidationError("--levels: seeds from a file imply one level");
 }

@@ -41,7 +41,10 @@ struct TriangleMesh {
   std::vector<Vec3> vertices;
   std::vector<Triangle> triangles;
   // Input face of each triangle where faces with more than three corners were split; empty: the same index.
-  std::vector<Index> face_of_triangle;
+  std::vector<Index> face_of_triangle = {};
+  std::vector<std::int32_t> labels = {};  // of each triangle, e.g. its CAD patch; or empty
+  // Edges marked as features, by a file or a caller.
+  std::vector<std::array<Index, 2>> feature_edges = {};
 };
 
 // Compressed sparse rows: row i is values[offsets[i] .. offsets[i + 1]).

@@ -17,6 +17,10 @@ constexpr std::size_t kCoarsest = 100;        // seeds on the coarsest level, at
 constexpr int kLevels = 3;
 constexpr double kNearMiddle = 0.25;          // of the distance of two seeds
 
+bool on_surface(const std::vector<SeedPlace>& places, Index i) {
+  return places.empty() || places[i].kind == SeedPlace::Kind::surface;
+}
+
 }  // namespace
 
 std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::uint64_t random_seed) {
@@ -69,17 +73,18 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
   return counts;
 }
 
-std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
-                         std::size_t count) {
-  std::vector<DualEdge> edges = extract_dual_edges(polygons, seeds);
-  const std::size_t room = count > seeds.size() ? count - seeds.size() : 0;
+namespace {
+
+// The midpoints of the dual edges, as many as there is room for; where edges are too few, also points of cells of high energy.
+void append_midpoints(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
+                      const std::vector<SeedPlace>& places, std::vector<DualEdge> edges, std::size_t count, std::vector<Vec3>& finer) {
+  const std::size_t room = count > finer.size() ? count - finer.size() : 0;
   if (edges.size() > room) {
     std::stable_sort(edges.begin(), edges.end(), [&](const DualEdge& e, const DualEdge& f) {
       return norm2(seeds[e.a] - seeds[e.b]) > norm2(seeds[f.a] - seeds[f.b]);
     });
     edges.resize(room);
   }
-  std::vector<Vec3> finer = seeds;
   for (const DualEdge& edge : edges) {
     const Vec3 a = seeds[edge.a], b = seeds[edge.b], middle = 0.5 * (a + b);
     // On a smooth surface the middle is the better start; where the edge crosses elsewhere, it may be off the sheet.
@@ -87,14 +92,64 @@ std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& 
     finer.push_back(near ? middle : edge.crossing);
   }
   if (finer.size() < count) {
-    const std::vector<Vec3> more = insertion_points(polygons, seeds, moments, count - finer.size());
+    const std::vector<Vec3> more = insertion_points(polygons, seeds, places, moments, count - finer.size());
     finer.insert(finer.end(), more.begin(), more.end());
   }
+}
+
+}  // namespace
+
+std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
+                         std::size_t count) {
+  std::vector<Vec3> finer = seeds;
+  append_midpoints(polygons, moments, seeds, {}, extract_dual_edges(polygons, seeds), count, finer);
   return finer;
 }
 
+PlacedSeeds refine(const RestrictedPolygons& polygons, const CellMoments& moments, const PlacedSeeds& coarse,
+                   const FeatureCurves& curves, const PlacedSeeds& features, std::size_t count) {
+  PlacedSeeds finer = features;
+  for (std::size_t i = 0; i < coarse.seeds.size(); ++i)
+    if (coarse.places[i].kind == SeedPlace::Kind::surface) finer.seeds.push_back(coarse.seeds[i]);
+  const std::vector<std::array<Index, 2>> along = curve_neighbours(curves, coarse.places);
+  std::vector<DualEdge> edges = extract_dual_edges(polygons, coarse.seeds);
+  std::erase_if(edges, [&](const DualEdge& e) {
+    return std::binary_search(along.begin(), along.end(), std::array<Index, 2>{e.a, e.b});
+  });
+  append_midpoints(polygons, moments, coarse.seeds, coarse.places, std::move(edges), count, finer.seeds);
+  finer.places.resize(finer.seeds.size());
+  return finer;
+}
+
+std::vector<std::array<Index, 2>> curve_neighbours(const FeatureCurves& curves, const std::vector<SeedPlace>& places) {
+  std::vector<std::vector<std::pair<double, Index>>> on(curves.size());
+  std::vector<Index> at_corner(curves.graph().corners.size(), kNone);
+  for (Index i = 0; i < places.size(); ++i) {
+    if (places[i].curve != kNone) on[places[i].curve].push_back({places[i].position, i});
+    if (places[i].corner != kNone) at_corner[places[i].corner] = i;
+  }
+  std::vector<std::array<Index, 2>> pairs;
+  for (Index c = 0; c < on.size(); ++c) {
+    std::sort(on[c].begin(), on[c].end());
+    std::vector<Index> row;
+    for (const auto& [position, seed] : on[c]) row.push_back(seed);
+    if (curves.closed(c)) {
+      if (!row.empty()) row.push_back(row.front());
+    } else {
+      const auto [first, last] = curves.ends(c);
+      if (at_corner[first] != kNone) row.insert(row.begin(), at_corner[first]);
+      if (at_corner[last] != kNone) row.push_back(at_corner[last]);
+    }
+    for (std::size_t k = 1; k < row.size(); ++k)
+      if (row[k - 1] != row[k]) pairs.push_back({std::min(row[k - 1], row[k]), std::max(row[k - 1], row[k])});
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
 std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds,
-                                   const CellMoments& moments, std::size_t count) {
+                                   const std::vector<SeedPlace>& places, const CellMoments& moments, std::size_t count) {
   std::vector<double> squared(seeds.size(), -1);
   std::vector<Vec3> corner(seeds.size());
   for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
@@ -124,7 +179,7 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
     std::vector<char> blocked(seeds.size(), 0);
     for (Index i : order) {
       if (points.size() == count) return points;
-      if (squared[i] <= 0 || taken[i] || blocked[i]) continue;
+      if (!on_surface(places, i) || squared[i] <= 0 || taken[i] || blocked[i]) continue;
       taken[i] = 1;
       // A corner belongs to several cells.
       if (!distinct.insert({corner[i].x, corner[i].y, corner[i].z}).second) continue;
@@ -137,10 +192,11 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
 }
 
 void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, std::size_t count,
-               std::vector<Vec3>& seeds) {
+               std::vector<Vec3>& seeds, std::vector<SeedPlace>& places) {
   if (seeds.size() < count) {
-    const std::vector<Vec3> more = insertion_points(polygons, seeds, moments, count - seeds.size());
+    const std::vector<Vec3> more = insertion_points(polygons, seeds, places, moments, count - seeds.size());
     seeds.insert(seeds.end(), more.begin(), more.end());
+    if (!places.empty()) places.resize(seeds.size());
   }
   if (seeds.size() <= count) return;
   std::vector<DualEdge> edges = extract_dual_edges(polygons, seeds);
@@ -152,7 +208,7 @@ void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, s
   std::vector<char> removed(seeds.size(), 0);
   std::size_t left = seeds.size();
   const auto remove = [&](Index i) {
-    if (left > count && !removed[i]) {
+    if (left > count && !removed[i] && on_surface(places, i)) {
       removed[i] = 1;
       --left;
     }
@@ -165,14 +221,20 @@ void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, s
       const DualEdge& e = edges[k];
       if (left == count) break;
       if (removed[e.a] || removed[e.b] || (spread && (blocked[e.a] || blocked[e.b]))) continue;
-      remove(e.b);
+      const Index gone = on_surface(places, e.b) ? e.b : e.a;
+      if (!on_surface(places, gone)) continue;
+      remove(gone);
       blocked[e.a] = blocked[e.b] = 1;
     }
   }
   std::size_t n = 0;
   for (Index i = 0; i < seeds.size(); ++i)
-    if (!removed[i]) seeds[n++] = seeds[i];
+    if (!removed[i]) {
+      if (!places.empty()) places[n] = places[i];
+      seeds[n++] = seeds[i];
+    }
   seeds.resize(n);
+  if (!places.empty()) places.resize(n);
 }
 
 }  // namespace bisector

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bisector/cvt/backend.h"
+#include "bisector/cvt/curves.h"
 
 namespace bisector {
 
@@ -22,14 +23,23 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
 std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
                          std::size_t count);
 
+// The same where seeds are held on features: all that are not on the surface are replaced by `features`, and two that follow
+// each other on a curve get no midpoint.
+PlacedSeeds refine(const RestrictedPolygons& polygons, const CellMoments& moments, const PlacedSeeds& coarse,
+                   const FeatureCurves& curves, const PlacedSeeds& features, std::size_t count);
+
 // Removes one end of the shortest dual edges, or adds seeds where the energy is highest, to come as near to `count` as one
-// seed per edge or cell allows. `polygons` and `moments` are those of the seeds given.
+// seed per edge or cell allows. `polygons` and `moments` are those of the seeds given. Only seeds on the surface are removed;
+// `places` is parallel to the seeds, or empty.
 void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, std::size_t count,
-               std::vector<Vec3>& seeds);
+               std::vector<Vec3>& seeds, std::vector<SeedPlace>& places);
+
+// Pairs of seeds that follow each other on a feature curve, corners included, lower first, sorted.
+std::vector<std::array<Index, 2>> curve_neighbours(const FeatureCurves& curves, const std::vector<SeedPlace>& places);
 
 // Up to `count` points to insert: corners of cells farthest from their seeds, cells of highest energy first, no two points
-// from neighbouring cells before every cell had its turn.
+// from neighbouring cells before every cell had its turn. Only cells of seeds on the surface are used.
 std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds,
-                                   const CellMoments& moments, std::size_t count);
+                                   const std::vector<SeedPlace>& places, const CellMoments& moments, std::size_t count);
 
 }  // namespace bisector

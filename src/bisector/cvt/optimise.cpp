@@ -19,7 +19,39 @@ constexpr int kLineSearchTrials = 8;
 constexpr std::size_t kDecreaseWindow = 5;
 constexpr int kReseedTrials = 10;
 
-void evaluate(Backend& backend, bool constrained, CvtState& state, OptimiseTotals& totals) {
+using Kind = SeedPlace::Kind;
+
+Kind kind_of(const CvtState& state, std::size_t i) { return state.places.empty() ? Kind::surface : state.places[i].kind; }
+
+// The part of a seed's gradient along what it is held on (thesis 4.4.2 and 4.4.3, equations 4.7 and 4.8).
+Vec3 held(const Vec3& g, const CvtState& state, std::size_t i, const OptimiseOptions& options) {
+  switch (kind_of(state, i)) {
+    case Kind::fixed: return {};
+    case Kind::curve: {
+      const Vec3 tangent = options.curves->tangent(state.places[i].curve, state.places[i].position);
+      return dot(g, tangent) * tangent;
+    }
+    case Kind::surface: break;
+  }
+  return options.constrained ? g - dot(g, state.normals[i]) * state.normals[i] : g;
+}
+
+// Puts the seeds back to where they are held; `cells` are the triangles of each cell before the seeds moved, `before` the
+// seeds then.
+void hold(const Surface& surface, const Csr<Index>& cells, const std::vector<Vec3>& before, const OptimiseOptions& options,
+          CvtState& state) {
+  if (options.constrained) project_to_cells(surface, cells, state.seeds, state.normals);
+  for (std::size_t i = 0; i < state.places.size(); ++i) {
+    SeedPlace& place = state.places[i];
+    if (place.kind == Kind::fixed) state.seeds[i] = before[i];
+    if (place.kind != Kind::curve) continue;
+    const double reach = 2 * norm(state.seeds[i] - before[i]);
+    place.position = options.curves->nearest(place.curve, state.seeds[i], place.position, reach);
+    state.seeds[i] = options.curves->point(place.curve, place.position);
+  }
+}
+
+void evaluate(Backend& backend, const OptimiseOptions& options, CvtState& state, OptimiseTotals& totals) {
   backend.evaluate(state.seeds, state.moments);
   totals.count(state.moments);
   const double total = backend.surface().mass;
@@ -28,15 +60,19 @@ void evaluate(Backend& backend, bool constrained, CvtState& state, OptimiseTotal
   state.energy = covers ? state.moments.energy : std::numeric_limits<double>::infinity();
   state.gradient.resize(state.seeds.size());
   parallel_each(state.seeds.size(), [&](std::size_t i) {
-    Vec3 g = -2.0 * state.moments.cells[i].first;
-    if (constrained) g -= dot(g, state.normals[i]) * state.normals[i];
-    state.gradient[i] = g;
+    state.gradient[i] = held(-2.0 * state.moments.cells[i].first, state, i, options);
   });
   state.gradient_norm = std::sqrt(inner(state.gradient, state.gradient));
 }
 
+bool is_lost(const CvtState& state, std::size_t i) {
+  return state.moments.cells[i].mass <= 0 && kind_of(state, i) == Kind::surface;
+}
+
 bool has_empty_cell(const CvtState& state) {
-  return std::any_of(state.moments.cells.begin(), state.moments.cells.end(), [](const Moments& m) { return m.mass <= 0; });
+  for (std::size_t i = 0; i < state.seeds.size(); ++i)
+    if (is_lost(state, i)) return true;
+  return false;
 }
 
 // Puts the seeds of empty cells at far corners of the cells of highest energy.
@@ -45,8 +81,8 @@ void reseed(Backend& backend, CvtState& state) {
   backend.evaluate(state.seeds, state.moments, polygons);
   std::vector<Index> empty;
   for (Index i = 0; i < state.seeds.size(); ++i)
-    if (state.moments.cells[i].mass <= 0) empty.push_back(i);
-  const std::vector<Vec3> points = insertion_points(polygons, state.seeds, state.moments, empty.size());
+    if (is_lost(state, i)) empty.push_back(i);
+  const std::vector<Vec3> points = insertion_points(polygons, state.seeds, state.places, state.moments, empty.size());
   for (std::size_t k = 0; k < points.size(); ++k) state.seeds[empty[k]] = points[k];
 }
 
@@ -56,9 +92,9 @@ void start(Backend& backend, CvtState& state, const OptimiseOptions& options, Op
       backend.evaluate(state.seeds, state.moments);
       totals.count(state.moments);
       state.normals.resize(state.seeds.size());
-      project_to_cells(backend.surface(), state.moments.triangles, state.seeds, state.normals);
+      hold(backend.surface(), state.moments.triangles, std::vector<Vec3>(state.seeds), options, state);
     }
-    evaluate(backend, options.constrained, state, totals);
+    evaluate(backend, options, state, totals);
     if (trial == kReseedTrials || !has_empty_cell(state)) break;
     reseed(backend, state);
   }
@@ -85,19 +121,18 @@ bool is_descent(const Backend& backend, const CvtState& state, const CvtState& n
 
 // Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then `next`
 // is not to be used.
-bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3>& direction, bool constrained,
-                 CvtState& next, OptimiseTotals& totals) {
+bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3>& direction,
+                 const OptimiseOptions& options, CvtState& next, OptimiseTotals& totals) {
   const double slope = inner(state.gradient, direction);
   if (!(slope < 0)) return false;
   double step = 1;
   for (int trial = 0; trial < kLineSearchTrials; ++trial) {
     next.seeds = state.seeds;
     parallel_each(next.seeds.size(), [&](std::size_t i) { next.seeds[i] += step * direction[i]; });
-    if (constrained) {
-      next.normals = state.normals;
-      project_to_cells(backend.surface(), state.moments.triangles, next.seeds, next.normals);
-    }
-    evaluate(backend, constrained, next, totals);
+    next.normals = state.normals;
+    next.places = state.places;
+    hold(backend.surface(), state.moments.triangles, state.seeds, options, next);
+    evaluate(backend, options, next, totals);
     if (is_descent(backend, state, next, direction, slope, step)) return true;
     const double excess = next.energy - state.energy - step * slope;
     const double vertex = std::isfinite(excess) ? -0.5 * slope * step * step / excess : 0;
@@ -111,6 +146,16 @@ bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3
 void OptimiseTotals::count(const CellMoments& moments) {
   ++evaluations;
   seconds += moments.seconds;
+}
+
+void complete(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals) {
+  if (options.constrained) {
+    backend.evaluate(state.seeds, state.moments);
+    std::vector<Vec3> feet = state.seeds;
+    state.normals.resize(feet.size());
+    project_to_cells(backend.surface(), state.moments.triangles, feet, state.normals);
+  }
+  evaluate(backend, options, state, totals);
 }
 
 void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
@@ -128,7 +173,7 @@ void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options,
     context.check();
     if (state.gradient_norm <= kFlatGradient * first_norm) break;
     const std::vector<Vec3> direction = history.direction(state.gradient, preconditioner(state.moments));
-    if (!line_search(backend, state, direction, options.constrained, next, totals)) {
+    if (!line_search(backend, state, direction, options, next, totals)) {
       // Once from scratch along the gradient; if that finds nothing either, this is the minimum to rounding.
       if (restarted) break;
       restarted = true;

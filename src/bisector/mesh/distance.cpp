@@ -1,11 +1,7 @@
 #include "bisector/mesh/distance.h"
 
-#include <CGAL/AABB_traits.h>
-#include <CGAL/AABB_tree.h>
-#include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Simple_cartesian.h>
-
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,16 +10,11 @@
 #include "bisector/core/parallel.h"
 #include "bisector/core/random.h"
 #include "bisector/mesh/degenerate.h"
+#include "bisector/mesh/nearest.h"
 
 namespace bisector {
 
 namespace {
-
-using Kernel = CGAL::Simple_cartesian<double>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Kernel::Triangle_3>::const_iterator>;
-using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
-
-Kernel::Point_3 point(const Vec3& p) { return {p.x, p.y, p.z}; }
 
 // The triangles that have an area: their running areas, and a tree over them.
 class Surface {
@@ -38,18 +29,13 @@ class Surface {
       area += a;
       areas_.push_back(area);
       corners_.push_back(p);
-      triangles_.emplace_back(point(p[0]), point(p[1]), point(p[2]));
       for (const Index v : t) used[v] = 1;
     }
-    if (triangles_.empty()) throw Error("distance: the " + name + " has no area; check the mesh");
+    if (corners_.empty()) throw Error("distance: the " + name + " has no area; check the mesh");
     for (std::size_t v = 0; v < used.size(); ++v)
       if (used[v]) vertices_.push_back(mesh.vertices[v]);
-    tree_.insert(triangles_.begin(), triangles_.end());
-    tree_.build();
-    tree_.accelerate_distance_queries();
+    nearest_.emplace(mesh);
   }
-  Surface(const Surface&) = delete;
-  Surface& operator=(const Surface&) = delete;
 
   const std::vector<Vec3>& vertices() const { return vertices_; }
 
@@ -64,14 +50,13 @@ class Surface {
     return u * p[0] + (v - u) * p[1] + (1 - v) * p[2];
   }
 
-  double squared_distance(const Vec3& p) const { return tree_.squared_distance(point(p)); }
+  double squared_distance(const Vec3& p) const { return norm2(p - nearest_->nearest(p).point); }
 
  private:
   std::vector<double> areas_;
   std::vector<std::array<Vec3, 3>> corners_;
-  std::vector<Kernel::Triangle_3> triangles_;
   std::vector<Vec3> vertices_;
-  Tree tree_;
+  std::optional<NearestOnMesh> nearest_;
 };
 
 struct OneSided {

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
@@ -122,6 +123,7 @@ void split_faces(const std::string& path, const Soup& soup, TriangleMesh& mesh, 
   mesh.triangles.reserve(triangles);
   const bool split = triangles > faces;
   if (split) mesh.face_of_triangle.reserve(triangles);
+  if (!soup.labels.empty()) mesh.labels.reserve(triangles);
   PolygonSplitter splitter(mesh.vertices, mesh.triangles);
   std::size_t polygons = 0, fans = 0;
   for (std::size_t i = 0; i < faces; ++i) {
@@ -134,11 +136,46 @@ void split_faces(const std::string& path, const Soup& soup, TriangleMesh& mesh, 
       if (!splitter.split(corners, degree)) ++fans;
     }
     if (split) mesh.face_of_triangle.resize(mesh.triangles.size(), static_cast<Index>(i));
+    if (!soup.labels.empty()) mesh.labels.resize(mesh.triangles.size(), soup.labels[i]);
   }
   if (polygons > 0)
     context.warn(fmt::format("{}: {} split into triangles{}", name_of(path),
                              quantity(polygons, "polygon was", "polygons were"),
                              fans > 0 ? fmt::format(", {} of them degenerate", fans) : ""));
+}
+
+using Edge = std::array<Index, 2>;
+
+void make_ascending(std::vector<Edge>& edges) {
+  for (Edge& e : edges) std::sort(e.begin(), e.end());
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+}
+
+// For each of ascending edges whether a triangle of three corners has it.
+std::vector<char> find_mesh_edges(const std::vector<Edge>& edges, const std::vector<Triangle>& triangles) {
+  std::vector<char> found(edges.size(), 0);
+  if (edges.empty()) return found;
+  for (const Triangle& t : triangles) {
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Edge e{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])};
+      const auto at = std::lower_bound(edges.begin(), edges.end(), e);
+      if (at != edges.end() && *at == e) found[static_cast<std::size_t>(at - edges.begin())] = 1;
+    }
+  }
+  return found;
+}
+
+void keep_mesh_edges(const std::string& path, std::vector<Edge> edges, TriangleMesh& mesh, const Context& context) {
+  make_ascending(edges);
+  const std::vector<char> found = find_mesh_edges(edges, mesh.triangles);
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    if (found[i]) mesh.feature_edges.push_back(edges[i]);
+  const std::size_t strangers = edges.size() - mesh.feature_edges.size();
+  if (strangers > 0)
+    context.warn(fmt::format("{}: {} off the surface ignored", name_of(path),
+                             quantity(strangers, "marked edge", "marked edges")));
 }
 
 void warn_of_leftovers(const std::string& path, const TriangleMesh& mesh, const Context& context) {
@@ -162,6 +199,7 @@ TriangleMesh to_triangles(const std::string& path, Soup soup, const Context& con
   TriangleMesh mesh;
   mesh.vertices = std::move(soup.vertices);
   split_faces(path, soup, mesh, context);
+  keep_mesh_edges(path, std::move(soup.edges), mesh, context);
   warn_of_leftovers(path, mesh, context);
   return mesh;
 }
@@ -207,6 +245,12 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh) {
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
     check_face(path, i, mesh.triangles[i].data(), mesh.triangles[i].data() + 3, mesh.vertices.size());
+  if (!mesh.labels.empty() && mesh.labels.size() != mesh.triangles.size())
+    fail(path, fmt::format("{} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
+  for (const Edge& e : mesh.feature_edges)
+    if (std::max(e[0], e[1]) >= mesh.vertices.size())
+      fail(path, fmt::format("feature edge {} {} is out of range, the mesh has {} vertices; nothing was written", e[0],
+                             e[1], mesh.vertices.size()));
   if (extension == ".off") write_file(path, format_off(mesh));
   else if (extension == ".obj") write_file(path, format_obj(mesh));
   else if (extension == ".ply") write_file(path, format_ply(mesh));
@@ -233,6 +277,52 @@ std::vector<Vec3> read_points(const std::string& path) {
   while (in.next_line()) points.push_back(in.point());
   if (points.empty()) in.fail("there is no point at all; give one \"x y z\" a line");
   return points;
+}
+
+std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name) {
+  const std::string extension = lower_extension(path);
+  if (extension != ".ply")
+    fail(path, fmt::format("there is no vertex property '{}', {} files have none; use a .ply file that has it",
+                           printable(name), extension.empty() ? "such" : printable(extension)));
+  return read_ply_attribute(path, read_bytes(path), name);
+}
+
+std::vector<Edge> read_feature_edges(const std::string& path, const TriangleMesh& mesh) {
+  const std::string bytes = read_bytes(path);
+  TextReader in(path, bytes, '#');
+  std::vector<Edge> edges;
+  std::vector<std::size_t> lines;
+  while (in.next_line()) {
+    Edge e{};
+    for (Index& v : e) {
+      const std::string_view word = in.word();
+      if (word.empty()) in.fail("an edge has one vertex; give two");
+      const std::int64_t i = in.integer(word);
+      if (i < 0 || i >= static_cast<std::int64_t>(mesh.vertices.size()))
+        in.fail(fmt::format("index {} is out of range, the mesh has {} vertices; mend the edge", i,
+                            mesh.vertices.size()));
+      v = static_cast<Index>(i);
+    }
+    edges.push_back(e);
+    lines.push_back(in.line());
+  }
+  std::vector<Edge> ascending = edges;
+  make_ascending(ascending);
+  const std::vector<char> found = find_mesh_edges(ascending, mesh.triangles);
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const Edge e{std::min(edges[i][0], edges[i][1]), std::max(edges[i][0], edges[i][1])};
+    const auto at = std::lower_bound(ascending.begin(), ascending.end(), e) - ascending.begin();
+    if (!found[static_cast<std::size_t>(at)])
+      in.fail_at(lines[i],
+                 fmt::format("{} {} is not an edge of the mesh; mend or remove it", edges[i][0], edges[i][1]));
+  }
+  return ascending;
+}
+
+void write_feature_edges(const std::string& path, const std::vector<Edge>& edges) {
+  std::string out = "# feature edges: two vertices each, counted from 0\n";
+  for (const Edge& e : edges) out += fmt::format("{} {}\n", e[0], e[1]);
+  write_file(path, out);
 }
 
 void write_file(const std::string& path, const std::string& bytes) {

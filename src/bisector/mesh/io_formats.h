@@ -2,8 +2,10 @@
 // they allocate by the file's size, and they let NaN and indices out of range through.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +41,8 @@ inline const char* coordinate_flaw(double x) {
 struct Soup {
   std::vector<Vec3> vertices;
   Csr<Index> faces;
+  std::vector<std::int32_t> labels;         // of each face, or empty
+  std::vector<std::array<Index, 2>> edges;  // whether or not they are edges of a face
   std::string ignored;  // what follows the last face, if anything does
 
   void end_face() { faces.offsets.push_back(faces.values.size()); }
@@ -50,6 +54,7 @@ Soup read_off(const std::string& path, std::string_view bytes);
 Soup read_obj(const std::string& path, std::string_view bytes);
 Soup read_ply(const std::string& path, std::string_view bytes);
 Soup read_stl(const std::string& path, std::string_view bytes);
+std::vector<double> read_ply_attribute(const std::string& path, std::string_view bytes, const std::string& name);
 
 // The bytes of a file. Coordinates must be finite and indices in range; STL throws for what is beyond a float.
 std::string format_off(const TriangleMesh& mesh);

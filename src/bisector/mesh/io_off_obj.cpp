@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,13 +29,62 @@ void check_off_header(TextReader& in, std::string_view header) {
 // The vertex of a corner "v", "v/vt", "v//vn" or "v/vt/vn", counted from 0.
 Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t vertices) {
   const std::int64_t v = in.integer(corner.substr(0, corner.find('/')));
-  if (v == 0) in.fail("index 0 is out of range, OBJ counts from 1; mend the face");
+  if (v == 0) in.fail("index 0 is out of range, OBJ counts from 1; mend the line");
   const std::int64_t index = v > 0 ? v - 1 : static_cast<std::int64_t>(vertices) + v;
   if (index < 0 || index >= kNone)
-    in.fail(fmt::format("index {} is out of range after {}; mend the face", v,
+    in.fail(fmt::format("index {} is out of range after {}; mend the line", v,
                         quantity(vertices, "vertex", "vertices")));
   return static_cast<Index>(index);
 }
+
+constexpr std::string_view kLabelPrefix = "label_";
+
+// The label that a group's name tells, if format_obj may have written it.
+bool parse_label(std::string_view name, std::int32_t& label) {
+  if (!name.starts_with(kLabelPrefix)) return false;
+  const char* end = name.data() + name.size();
+  const auto [stop, error] = std::from_chars(name.data() + kLabelPrefix.size(), end, label);
+  return error == std::errc{} && stop == end;
+}
+
+// The labels of an OBJ file's faces: one for each pair of group and material.
+class ObjGroups {
+ public:
+  void set_group(TextReader& in) { set(group_, in); }
+  void set_material(TextReader& in) { set(material_, in); }
+  void add_face() {
+    if (current_ == numbers_.end())
+      current_ = numbers_.try_emplace({group_, material_}, static_cast<std::int32_t>(numbers_.size())).first;
+    labels_.push_back(current_->second);
+  }
+  // Empty where they tell nothing.
+  std::vector<std::int32_t> take() {
+    std::vector<std::int32_t> named(numbers_.size());
+    const bool all_named = std::all_of(numbers_.begin(), numbers_.end(), [&](const auto& entry) {
+      return entry.first.second.empty() && parse_label(entry.first.first, named[static_cast<Index>(entry.second)]);
+    });
+    if (all_named) {
+      for (std::int32_t& label : labels_) label = named[static_cast<Index>(label)];
+      return std::move(labels_);
+    }
+    return numbers_.size() > 1 ? std::move(labels_) : std::vector<std::int32_t>{};
+  }
+
+ private:
+  void set(std::string& name, TextReader& in) {
+    name.clear();
+    for (std::string_view word = in.word(); !word.empty(); word = in.word()) {
+      if (!name.empty()) name += ' ';
+      name += word;
+    }
+    current_ = numbers_.end();
+  }
+
+  std::string group_, material_;
+  std::map<std::pair<std::string, std::string>, std::int32_t> numbers_;
+  std::map<std::pair<std::string, std::string>, std::int32_t>::const_iterator current_ = numbers_.end();
+  std::vector<std::int32_t> labels_;
+};
 
 void append_number(std::string& out, double x) {
   std::array<char, 32> digits;
@@ -92,7 +142,13 @@ Soup read_off(const std::string& path, std::string_view bytes) {
 Soup read_obj(const std::string& path, std::string_view bytes) {
   TextReader in(path, bytes, '#', true);
   Soup soup;
+  ObjGroups groups;
   std::vector<std::pair<Index, std::size_t>> forward;  // indices beyond all before them and not yet defined; their line
+  const auto read_corner = [&](std::string_view corner, std::size_t line) {
+    const Index v = read_obj_corner(in, corner, soup.vertices.size());
+    if (v >= soup.vertices.size() && (forward.empty() || v > forward.back().first)) forward.emplace_back(v, line);
+    return v;
+  };
   while (in.next_line()) {
     const std::size_t line = in.line();
     const std::string_view keyword = in.word();
@@ -100,20 +156,32 @@ Soup read_obj(const std::string& path, std::string_view bytes) {
       if (soup.vertices.size() == kNone - 1) in.fail("too many vertices; split the model");
       soup.vertices.push_back(in.point());
     } else if (keyword == "f") {
-      for (std::string_view corner = in.word(); !corner.empty(); corner = in.word()) {
-        const Index v = read_obj_corner(in, corner, soup.vertices.size());
-        if (v >= soup.vertices.size() && (forward.empty() || v > forward.back().first)) forward.emplace_back(v, line);
-        soup.faces.values.push_back(v);
-      }
+      for (std::string_view corner = in.word(); !corner.empty(); corner = in.word())
+        soup.faces.values.push_back(read_corner(corner, line));
       if (soup.open_corners() < 3)
         in.fail_at(line, fmt::format("a face has {}; remove it", quantity(soup.open_corners(), "corner", "corners")));
       soup.end_face();
+      groups.add_face();
+    } else if (keyword == "l") {
+      Index last = kNone;
+      std::size_t count = 0;
+      for (std::string_view corner = in.word(); !corner.empty(); corner = in.word(), ++count) {
+        const Index v = read_corner(corner, line);
+        if (count > 0) soup.edges.push_back({last, v});
+        last = v;
+      }
+      if (count < 2) in.fail_at(line, fmt::format("a line has {}; remove it", quantity(count, "vertex", "vertices")));
+    } else if (keyword == "g") {
+      groups.set_group(in);
+    } else if (keyword == "usemtl") {
+      groups.set_material(in);
     }
   }
   for (const auto& [v, line] : forward)
     if (v >= soup.vertices.size())
-      in.fail_at(line, fmt::format("index {} is out of range, the file has {}; mend the face", std::size_t{v} + 1,
+      in.fail_at(line, fmt::format("index {} is out of range, the file has {}; mend the line", std::size_t{v} + 1,
                                    quantity(soup.vertices.size(), "vertex", "vertices")));
+  soup.labels = groups.take();
   return soup;
 }
 
@@ -137,14 +205,18 @@ std::string format_obj(const TriangleMesh& mesh) {
     out += "v ";
     append_point(out, p);
   }
-  for (const Triangle& t : mesh.triangles) {
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1]))
+      out += fmt::format("g {}{}\n", kLabelPrefix, mesh.labels[i]);
     out += 'f';
-    for (const Index v : t) {
+    for (const Index v : mesh.triangles[i]) {
       out += ' ';
       append_index(out, std::size_t{v} + 1);
     }
     out += '\n';
   }
+  for (const std::array<Index, 2>& e : mesh.feature_edges)
+    out += fmt::format("l {} {}\n", std::size_t{e[0]} + 1, std::size_t{e[1]} + 1);
   return out;
 }
 

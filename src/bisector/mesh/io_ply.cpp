@@ -208,6 +208,14 @@ void skip_ply_property(Source& source, const PlyProperty& property) {
 }
 
 template <class Source>
+void skip_ply_items(Source& source, const PlyElement& element) {
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    for (const PlyProperty& property : element.properties) skip_ply_property(source, property);
+  }
+}
+
+template <class Source>
 void read_ply_vertices(Source& source, const PlyElement& element, Soup& soup) {
   std::vector<int> axes;
   for (const PlyProperty& p : element.properties)
@@ -242,6 +250,61 @@ void read_ply_face(Source& source, const PlyProperty& property, std::size_t vert
   soup.end_face();
 }
 
+bool is_label(const PlyProperty& p) { return p.name == "label" && !p.list && p.type < Scalar::float32; }
+
+template <class Source>
+void read_ply_label(Source& source, const PlyProperty& property, Soup& soup) {
+  const double label = source.value(property.type);
+  if (!(label >= -0x1p31 && label < 0x1p32 && label == std::floor(label)))
+    source.fail(fmt::format("{} is not a label; give an integer of 32 bits", label));
+  soup.labels.push_back(static_cast<std::int32_t>(static_cast<std::uint32_t>(static_cast<std::int64_t>(label))));
+}
+
+template <class Source>
+void read_ply_faces(Source& source, const PlyElement& element, std::size_t vertices, Soup& soup) {
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    for (const PlyProperty& property : element.properties) {
+      if (is_index_list(property)) read_ply_face(source, property, vertices, soup);
+      else if (is_label(property)) read_ply_label(source, property, soup);
+      else skip_ply_property(source, property);
+    }
+  }
+}
+
+int edge_end(const PlyProperty& p) {
+  if (p.list || p.type >= Scalar::float32) return -1;
+  return p.name == "vertex1" ? 0 : p.name == "vertex2" ? 1 : -1;
+}
+
+bool has_ends(const PlyElement& element) {
+  for (const int end : {0, 1})
+    if (std::count_if(element.properties.begin(), element.properties.end(),
+                      [&](const PlyProperty& p) { return edge_end(p) == end; }) != 1)
+      return false;
+  return true;
+}
+
+template <class Source>
+void read_ply_edges(Source& source, const PlyElement& element, std::size_t vertices, Soup& soup) {
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    std::array<Index, 2> ends{};
+    for (const PlyProperty& property : element.properties) {
+      const int end = edge_end(property);
+      if (end < 0) {
+        skip_ply_property(source, property);
+        continue;
+      }
+      const double v = source.value(property.type);
+      if (!(v >= 0 && v < static_cast<double>(vertices) && v == std::floor(v)))
+        source.fail(fmt::format("index {} is out of range, the file has {} vertices; mend the edge", v, vertices));
+      ends[static_cast<std::size_t>(end)] = static_cast<Index>(v);
+    }
+    soup.edges.push_back(ends);
+  }
+}
+
 template <class Source>
 void read_ply_body(Source& source, const PlyHeader& header, Soup& soup) {
   const std::size_t vertices = header.find("vertex")->count;
@@ -249,14 +312,12 @@ void read_ply_body(Source& source, const PlyHeader& header, Soup& soup) {
     if (element.properties.empty()) continue;
     if (element.name == "vertex") {
       read_ply_vertices(source, element, soup);
-      continue;
-    }
-    for (std::size_t i = 0; i < element.count; ++i) {
-      source.begin_item(element, i);
-      for (const PlyProperty& property : element.properties) {
-        if (element.name == "face" && is_index_list(property)) read_ply_face(source, property, vertices, soup);
-        else skip_ply_property(source, property);
-      }
+    } else if (element.name == "face") {
+      read_ply_faces(source, element, vertices, soup);
+    } else if (element.name == "edge" && has_ends(element)) {
+      read_ply_edges(source, element, vertices, soup);
+    } else {
+      skip_ply_items(source, element);
     }
   }
   soup.ignored = source.ignored();
@@ -275,6 +336,36 @@ void check_ply_elements(const TextReader& in, const PlyHeader& header) {
       in.fail(fmt::format("element 'vertex' needs one property '{}'; {}", axis, kExportAgain));
   if (std::count_if(face->properties.begin(), face->properties.end(), is_index_list) != 1)
     in.fail("element 'face' needs one list 'vertex_indices'; export as triangles");
+  if (std::count_if(face->properties.begin(), face->properties.end(), is_label) > 1)
+    in.fail(std::string("element 'face' has several properties 'label'; ") + kExportAgain);
+}
+
+template <class Source>
+std::vector<double> read_ply_scalars(Source& source, const PlyHeader& header, const PlyProperty* wanted,
+                                     const std::string& path) {
+  std::vector<double> values;
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty()) continue;
+    if (element.name != "vertex") {
+      skip_ply_items(source, element);
+      continue;
+    }
+    values.reserve(std::min(element.count, source.most_items(element)));
+    for (std::size_t i = 0; i < element.count; ++i) {
+      source.begin_item(element, i);
+      for (const PlyProperty& property : element.properties) {
+        if (&property != wanted) {
+          skip_ply_property(source, property);
+          continue;
+        }
+        values.push_back(source.value(property.type));
+        if (!std::isfinite(values.back()))
+          fail(path, fmt::format("vertex {}: '{}' is not finite; mend the value", i, printable(wanted->name)));
+      }
+    }
+    break;
+  }
+  return values;
 }
 
 std::string ply_header(std::size_t vertices, std::size_t faces, std::size_t largest_degree) {
@@ -306,14 +397,47 @@ Soup read_ply(const std::string& path, std::string_view bytes) {
   return soup;
 }
 
-std::string format_ply(const TriangleMesh& mesh) {
-  std::string out = ply_header(mesh.vertices.size(), mesh.triangles.size(), 3) + "end_header\n";
-  out.reserve(out.size() + 24 * mesh.vertices.size() + 13 * mesh.triangles.size());
-  append_ply_vertices(out, mesh.vertices);
-  for (const Triangle& t : mesh.triangles) {
-    append_bytes(out, static_cast<std::uint8_t>(3));
-    for (const Index v : t) append_bytes(out, v);
+std::vector<double> read_ply_attribute(const std::string& path, std::string_view bytes, const std::string& name) {
+  TextReader in(path, bytes, 0);
+  const PlyHeader header = read_ply_header(in);
+  check_ply_elements(in, header);
+  const PlyProperty* wanted = nullptr;
+  std::string known;
+  for (const PlyProperty& p : header.find("vertex")->properties) {
+    if (p.list) continue;
+    if (p.name == name && wanted)
+      fail(path, fmt::format("element 'vertex' has several properties '{}'; {}", printable(name), kExportAgain));
+    if (p.name == name) wanted = &p;
+    known += (known.empty() ? "" : ", ") + printable(p.name);
   }
+  if (!wanted)
+    fail(path, fmt::format("element 'vertex' has no scalar property '{}'; use one of {}", printable(name), known));
+  if (header.text) {
+    PlyText source(in);
+    return read_ply_scalars(source, header, wanted, path);
+  }
+  PlyBinary source(path, in.after_line(), header.big_endian);
+  return read_ply_scalars(source, header, wanted, path);
+}
+
+std::string format_ply(const TriangleMesh& mesh) {
+  std::string out = ply_header(mesh.vertices.size(), mesh.triangles.size(), 3);
+  if (!mesh.labels.empty()) out += "property int label\n";
+  if (!mesh.feature_edges.empty()) {
+    const char* type = mesh.vertices.size() >> 31 ? "uint" : "int";
+    out += fmt::format("element edge {}\nproperty {} vertex1\nproperty {} vertex2\n", mesh.feature_edges.size(), type,
+                       type);
+  }
+  out += "end_header\n";
+  out.reserve(out.size() + 24 * mesh.vertices.size() + 17 * mesh.triangles.size() + 8 * mesh.feature_edges.size());
+  append_ply_vertices(out, mesh.vertices);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    append_bytes(out, static_cast<std::uint8_t>(3));
+    for (const Index v : mesh.triangles[i]) append_bytes(out, v);
+    if (!mesh.labels.empty()) append_bytes(out, mesh.labels[i]);
+  }
+  for (const std::array<Index, 2>& e : mesh.feature_edges)
+    for (const Index v : e) append_bytes(out, v);
   return out;
 }
 

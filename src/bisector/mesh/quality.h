@@ -1,6 +1,9 @@
 // Triangle quality as the thesis reports it (section 4.5), and self-intersections.
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "bisector/core/types.h"
 #include "bisector/mesh/topology.h"
 
@@ -25,5 +28,8 @@ QualityReport measure_quality(const TriangleMesh& mesh);
 // Pairs of triangles that intersect other than in a shared vertex or edge (exact predicates). Vertices at the same
 // point count as one; triangles without area are ignored; two that fold onto each other at their edge do count.
 std::size_t count_self_intersections(const TriangleMesh& mesh);
+
+// The same pairs, lower index first, ascending.
+std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh);
 
 }  // namespace bisector

@@ -4,7 +4,6 @@
 #include <CGAL/intersections.h>
 
 #include <algorithm>
-#include <atomic>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -22,7 +21,8 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using TriangleBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::size_t>;
 using Pair = std::array<std::size_t, 2>;
 
-// The triangles that have an area, over vertices of which no two lie at the same point.
+// The triangles that have an area, over vertices of which no two lie at the same point; face_of_triangle tells which
+// they are.
 TriangleMesh weld(const TriangleMesh& mesh) {
   std::vector<Index> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), Index{0});
@@ -39,9 +39,12 @@ TriangleMesh weld(const TriangleMesh& mesh) {
       welded.vertices.push_back(mesh.vertices[v]);
     vertex[v] = static_cast<Index>(welded.vertices.size() - 1);
   }
-  for (const Triangle& t : mesh.triangles)
-    if (!collinear(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]))
-      welded.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const Triangle& t = mesh.triangles[i];
+    if (collinear(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]])) continue;
+    welded.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
+    welded.face_of_triangle.push_back(static_cast<Index>(i));
+  }
   return welded;
 }
 
@@ -74,10 +77,9 @@ bool intersect_beyond_shared(const std::vector<Vec3>& vertices, Triangle s, Tria
   }
 }
 
-}  // namespace
-
-std::size_t count_self_intersections(const TriangleMesh& mesh) {
-  const TriangleMesh welded = weld(mesh);
+// Calls visit(pair) for every pair of welded triangles that intersect.
+template <class Visit>
+void visit_intersections(const TriangleMesh& welded, const Visit& visit) {
   std::vector<TriangleBox> boxes;
   boxes.reserve(welded.triangles.size());
   for (std::size_t i = 0; i < welded.triangles.size(); ++i) {
@@ -89,17 +91,16 @@ std::size_t count_self_intersections(const TriangleMesh& mesh) {
     boxes.emplace_back(box, i);
   }
 
-  std::atomic<std::size_t> count = 0;
   std::vector<Pair> candidates;
+  std::vector<char> intersect;
   const auto test_candidates = [&] {
-    parallel_chunks(candidates.size(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
-      std::size_t found = 0;
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto [s, t] = candidates[i];
-        if (intersect_beyond_shared(welded.vertices, welded.triangles[s], welded.triangles[t])) ++found;
-      }
-      count += found;
+    intersect.resize(candidates.size());
+    parallel_each(candidates.size(), [&](std::size_t i) {
+      const auto [s, t] = candidates[i];
+      intersect[i] = intersect_beyond_shared(welded.vertices, welded.triangles[s], welded.triangles[t]);
     });
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      if (intersect[i]) visit(candidates[i]);
     candidates.clear();
   };
   constexpr std::size_t kBatch = std::size_t{1} << 20;  // bounds the memory however many boxes overlap
@@ -108,7 +109,25 @@ std::size_t count_self_intersections(const TriangleMesh& mesh) {
     if (candidates.size() == kBatch) test_candidates();
   });
   test_candidates();
+}
+
+}  // namespace
+
+std::size_t count_self_intersections(const TriangleMesh& mesh) {
+  std::size_t count = 0;
+  visit_intersections(weld(mesh), [&](const Pair&) { ++count; });
   return count;
+}
+
+std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh) {
+  const TriangleMesh welded = weld(mesh);
+  std::vector<std::array<Index, 2>> pairs;
+  visit_intersections(welded, [&](const Pair& pair) {
+    const auto [low, high] = std::minmax(pair[0], pair[1]);
+    pairs.push_back({welded.face_of_triangle[low], welded.face_of_triangle[high]});
+  });
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
 }
 
 }  // namespace bisector

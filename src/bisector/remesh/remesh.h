@@ -1,52 +1,90 @@
 // Isotropic surface remeshing by centroidal Voronoi tessellation (thesis, chapter 4).
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "bisector/core/context.h"
 #include "bisector/core/types.h"
 #include "bisector/cvt/compute.h"
+#include "bisector/mesh/feature_distance.h"
+#include "bisector/mesh/features.h"
 #include "bisector/mesh/topology.h"
+#include "bisector/mesh/weld.h"
+#include "bisector/remesh/fit.h"
+#include "bisector/remesh/improve.h"
+#include "bisector/remesh/sizing.h"
+#include "bisector/remesh/topology_control.h"
 #include "bisector/voronoi/restricted.h"
 
 namespace bisector {
 
 enum class TopologyControl {
-  enforce,  // move seeds to where the dual is not a manifold like the input, or add some, and optimise again
+  enforce,  // move seeds to where the dual is not the surface's topologically, or add some, and optimise again
   check,    // report only
   off,
 };
 
 enum class Energy {
+  automatic,    // constrained, but restricted where the input's normals are noise (mesh/normals.h)
   constrained,  // seeds end on the surface (CCVT)
-  restricted,   // seeds may leave the surface (RCVT)
+  restricted,   // seeds may leave the surface (RCVT), but for those on features
 };
 
 struct RemeshOptions {
-  std::size_t vertices = 0;                // wanted; at least 4
-  std::vector<Vec3> seeds;                 // start from these instead of random ones, in one level; empty: random
+  // One of these three. Counts are at least 4; edge_length is the wanted mean, in the mesh's unit.
+  std::size_t vertices = 0;
+  double edge_length = 0;
+  std::vector<Vec3> seeds;                 // start from these, in one level; topology control may add as many as it takes
+
+  SizingOptions sizing;
+  FeatureOptions features;
   std::uint64_t random_seed = 1;
   int iterations = 100;                    // at most, per level; fewer on the coarsest and the finest of several
   double tolerance = 1e-6;                 // a level ends when the energy falls by less than this share per step
   int levels = 0;                          // of the multilevel start; 0: as many as the count allows, at most 3
-  Energy energy = Energy::constrained;
+  Energy energy = Energy::automatic;
   TopologyControl topology = TopologyControl::enforce;
+  double min_angle = 40;                   // degrees; goal of the final pass (improve.h), 0: none
+  bool fit = false;                        // move the result's vertices off the surface, nearer to it on both sides (fit.h)
+  // Length within which borders are joined (weld.h). Without a value vertices of borders at the same point are joined, if that
+  // closes borders and makes no edge non-manifold.
+  std::optional<double> weld;
   ComputeOptions compute;
   unsigned threads = 0;                    // 0: all cores
 };
 
 struct RemeshSeconds {
-  double total = 0, lbfgs = 0, extract = 0;
+  double total = 0, prepare = 0, lbfgs = 0, features = 0, topology = 0, improve = 0, fit = 0, extract = 0;
   DiagramSeconds diagrams;        // of the optimiser, summed over its evaluations
 };
 
+struct FeatureResult {
+  std::size_t curves = 0, corners = 0;  // of the input
+  std::size_t broken = 0;               // curves that are not chains of edges of the result
+  FeatureDistance distance;             // of the result's feature edges and the input's, before a fit
+};
+
 struct RemeshResult {
-  TriangleMesh mesh;              // the restricted Delaunay triangulation of the seeds that own a cell
+  // The restricted Delaunay triangulation of the seeds that own a cell. Its feature_edges are the edges along the input's
+  // features; labels are those of the input's triangles in which its dual vertices lie.
+  TriangleMesh mesh;
   MeshTopology topology;          // of mesh
-  MeshTopology input_topology;
+  MeshTopology input_topology;    // after welding
   bool topology_matches = false;  // manifold, and closed and of Euler characteristic and components as the input
+  bool ball_property = false;     // of the final diagram
+  std::size_t divided = 0;        // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
+  std::vector<TopologyFault> faults;  // where it fails; indices are those of mesh's vertices, kNone if none
+  FeatureResult features;
+  bool noisy = false;             // the input's normals were taken for noise
+  WeldResult welded;              // without the mesh
+  std::size_t wanted = 0;         // vertices
+  double edge_length = 0;         // aimed at where the density is 1
+  ImproveReport improved;
+  FitReport fitted;
   int iterations = 0;             // accepted steps, all levels
   int evaluations = 0;
   double energy = 0;              // CVT energy of the final seeds
@@ -57,11 +95,13 @@ struct RemeshResult {
   RemeshSeconds seconds;
 };
 
-// Remeshes a surface with `options.vertices` vertices. Throws Error on input without area or fewer than 4 vertices, DeviceError
-// if the device asked for is missing or fails, and Cancelled.
+// Remeshes a surface. Throws Error on input without area, on options that contradict each other or the input, and on
+// fewer than 4 vertices; DeviceError if the device asked for is missing or fails; and Cancelled.
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context = {});
 
-// The same of a backend's surface, with no heed to `options.compute`.
-RemeshResult remesh(Backend& backend, const RemeshOptions& options, const Context& context = {});
+// The same of a backend's surface and density, with the features given and no heed to options.compute, .sizing, .weld and
+// .features; options.edge_length must be 0.
+RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshOptions& options,
+                    const Context& context = {});
 
 }  // namespace bisector

@@ -43,8 +43,19 @@ Dual extract_dual(const RestrictedPolygons& polygons) {
     }
     dual.triangles.push_back(triples[k].flipped ? Triangle{t[0], t[2], t[1]} : t);
     dual.multiplicity.push_back(1);
+    dual.mesh_triangle.push_back(triples[k].mesh_triangle);
   }
   return dual;
+}
+
+std::vector<Index> dual_vertices(const Dual& dual, std::size_t seeds) {
+  std::vector<Index> number(seeds, kNone);
+  for (const Triangle& t : dual.triangles)
+    for (Index v : t) number[v] = 0;
+  Index count = 0;
+  for (Index& n : number)
+    if (n != kNone) n = count++;
+  return number;
 }
 
 std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds) {

@@ -14,9 +14,13 @@ struct Dual {
   std::vector<Triangle> triangles;
   // How many vertices of the diagram each triple has; 1 where the topological ball property holds.
   std::vector<Index> multiplicity;
+  std::vector<Index> mesh_triangle;  // in which its first such vertex lies
 };
 
 Dual extract_dual(const RestrictedPolygons& polygons);
+
+// The number of each seed among those that have a triangle, in the order of the seeds; kNone for the others.
+std::vector<Index> dual_vertices(const Dual& dual, std::size_t seeds);
 
 // A pair of cells that share an edge of positive length of the diagram.
 struct DualEdge {

@@ -1,0 +1,39 @@
+// Making the dual contain every feature curve as a chain of edges (thesis 4.4.3).
+//
+// A curve is in the dual if it runs through the cells of its own seeds alone, once through each, and every two that follow
+// each other on it have an edge in the dual with a triangle on each sheet. A foreign cell on a curve is snapped to it if there
+// is room, moved away if it hardly touches it, and met with one more seed on the curve if it belongs to another curve. At a
+// corner with an acute angle that seed lies as far from the corner as the foreign one: seeds at equal distances do not own
+// parts of each other's curve, however small the angle.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "bisector/cvt/optimise.h"
+#include "bisector/remesh/feature_seeds.h"
+#include "bisector/remesh/feature_trace.h"
+
+namespace bisector {
+
+struct FeatureReport {
+  std::vector<std::array<Index, 2>> edges;  // pairs of seeds along the curves, lower first, sorted
+  std::vector<Index> broken;                // curves that are not in the dual, ascending
+};
+
+FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
+                             const RestrictedPolygons& polygons);
+
+// Puts seeds on the surface whose cells reach a curve elsewhere, where the energy is high, and optimises again, for a bounded
+// number of rounds: curves have as many seeds of their own as they need.
+void clear_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                    const CurveMeasure& measure, OptimiseOptions options, OptimiseTotals& totals, const Context& context);
+
+// Mends the curves that are broken and optimises again, for a bounded number of rounds. The count is kept in the first rounds;
+// seeds inserted in the last ones stay fixed, and nothing else moves. `c` is the scale of CurveMeasure. `polygons` and
+// state.moments end as those of the final seeds.
+FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                               const CurveMeasure& measure, double c, OptimiseOptions options, OptimiseTotals& totals,
+                               const Context& context);
+
+}  // namespace bisector
