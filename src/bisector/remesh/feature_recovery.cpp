@@ -17,13 +17,17 @@ namespace {
 using Kind = SeedPlace::Kind;
 
 constexpr int kRelocatingRounds = 3;  // the first, which keep to the number of seeds that a curve should have
-constexpr int kMovingRounds = 10;     // with an optimisation after each
+constexpr int kMovingRounds = 8;      // with an optimisation after each
 constexpr int kInsertingRounds = 20;  // after these
 constexpr int kClearingRounds = 4, kClearingSteps = 15;
 constexpr std::size_t kMostAdded = 100;  // and a quarter of the seeds
 constexpr int kFirstSteps = 20, kLastSteps = 4;
 constexpr double kRoomToSnap = 0.4;   // length of curve that a cell must hold to be snapped to it, in edges
 constexpr double kSmallest = 0.05;    // length of curve, in edges, that is worth a seed
+constexpr double kTiniest = 0.002;    // the same in the last rounds
+constexpr double kShortLink = 0.5;    // edges along a curve that are shorter are not divided
+constexpr double kAcute = 0.8;        // gap of two curves from the same corner, in edges, that calls for protection
+constexpr int kMostShells = 1000;
 constexpr double kPush = 0.3;         // of its distance, for cells that hold less
 
 struct Fault {
@@ -192,6 +196,76 @@ void space_evenly(const FeatureCurves& curves, const CurveMeasure& measure, Inde
   }
 }
 
+// Where curves leave a corner close to each other, gives them fixed seeds at the same distances from it, as far as they
+// stay close, in place of those that they have there.
+void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& measure, double c, CvtState& state) {
+  struct Arm {
+    Index curve;
+    int end;
+    double reach = 0;                // as far as seeds are protected
+    std::vector<double> positions;  // of those
+  };
+  std::vector<std::vector<Arm>> arms(curves.graph().corners.size());
+  for (Index k = 0; k < curves.size(); ++k)
+    for (int end : {0, 1})
+      if (!curves.closed(k)) arms[curves.ends(k)[end]].push_back({k, end, 0, {}});
+  std::vector<char> removed(state.seeds.size(), 0);
+  std::vector<std::pair<Index, double>> protected_places;
+  std::vector<std::vector<std::array<double, 2>>> zones(curves.size());
+  for (Index corner = 0; corner < arms.size(); ++corner) {
+    std::vector<Arm>& around = arms[corner];
+    if (around.size() < 2) continue;
+    for (int shell = 1; shell < kMostShells; ++shell) {
+      // The edge length near the corner, by the first arm; shells must be the same for all.
+      const Arm& first = around.front();
+      const double edge = measure.edge_length(first.curve, first.end == 0 ? 0 : curves.length(first.curve), c);
+      const double radius = shell * edge;
+      std::vector<double> at(around.size(), -1);
+      for (std::size_t a = 0; a < around.size(); ++a) {
+        const double position = position_at_radius(curves, around[a].curve, around[a].end, radius);
+        const double along = around[a].end == 0 ? position : curves.length(around[a].curve) - position;
+        // The other half of a curve belongs to its other end.
+        if (along < 0.5 * curves.length(around[a].curve)) at[a] = position;
+      }
+      std::vector<char> close(around.size(), 0);
+      bool any = false;
+      for (std::size_t a = 0; a < around.size(); ++a)
+        for (std::size_t b = 0; b < a; ++b) {
+          if (at[a] < 0 || at[b] < 0) continue;
+          const double gap = norm(curves.point(around[a].curve, at[a]) - curves.point(around[b].curve, at[b]));
+          if (gap < kAcute * edge) close[a] = close[b] = any = true;
+        }
+      if (!any) break;
+      for (std::size_t a = 0; a < around.size(); ++a) {
+        // An arm is protected from the corner on, without gaps.
+        if (!close[a] || around[a].positions.size() + 1 < static_cast<std::size_t>(shell)) continue;
+        around[a].positions.push_back(at[a]);
+        around[a].reach = (around[a].end == 0 ? at[a] : curves.length(around[a].curve) - at[a]) + 0.5 * edge;
+      }
+    }
+    for (const Arm& arm : around) {
+      if (arm.positions.empty()) continue;
+      const double length = curves.length(arm.curve);
+      zones[arm.curve].push_back(arm.end == 0 ? std::array<double, 2>{0, arm.reach}
+                                              : std::array<double, 2>{length - arm.reach, length});
+      for (double position : arm.positions) protected_places.push_back({arm.curve, position});
+    }
+  }
+  for (std::size_t i = 0; i < state.seeds.size(); ++i) {
+    const SeedPlace& place = state.places[i];
+    if (place.kind != Kind::curve) continue;
+    for (const auto& [from, to] : zones[place.curve])
+      if (place.position >= from && place.position <= to) removed[i] = 1;
+  }
+  remove(state, removed);
+  for (const auto& [curve, position] : protected_places) {
+    state.seeds.push_back(curves.point(curve, position));
+    state.places.push_back({Kind::fixed, curve, kNone, position});
+  }
+  for (Index k = 0; k < curves.size(); ++k)
+    if (!zones[k].empty()) space_evenly(curves, measure, k, state);
+}
+
 // True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: what goes to a curve stays.
 bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<Fault>& faults, bool crowd,
           bool last, CvtState& state) {
@@ -201,6 +275,8 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
     if (place.curve != kNone && wanted[place.curve] > 0) --wanted[place.curve];
   std::vector<char> used(state.seeds.size(), 0), removed(state.seeds.size(), 0);
   std::set<Index> loosened;
+  // Missing links wait until no foreign seed is left to meet: that may be all they need.
+  const bool meeting = std::any_of(faults.begin(), faults.end(), [](const Fault& f) { return f.cell != kNone; });
   bool changed = false;
   const auto put = [&](Index seed, Index curve, double position, Kind kind) {
     state.seeds[seed] = curves.point(curve, position);
@@ -224,8 +300,10 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
       }
       continue;
     }
+    if (fault.cell == kNone && meeting && last) continue;
     // Where curves cross another sheet no seed helps.
-    if (length < kSmallest * measure.edge_length(fault.curve, position, c)) continue;
+    const double least = last ? kTiniest : fault.cell == kNone ? kShortLink : kSmallest;
+    if (length < least * measure.edge_length(fault.curve, position, c)) continue;
     changed = true;
     const bool meets = fault.cell != kNone;
     if (meets) state.places[fault.cell].kind = Kind::fixed;
@@ -272,6 +350,7 @@ FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPoly
   const FeatureCurves& curves = *options.curves;
   options.constrained = true;
   const std::size_t count = state.seeds.size(), most = count + count / 4 + kMostAdded;
+  protect_acute_corners(curves, measure, c, state);
   PlacedSeeds best;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (int round = 0;; ++round) {
