@@ -27,7 +27,8 @@ constexpr double kSmallest = 0.05;    // length of curve, in edges, that is wort
 constexpr double kTiniest = 0.002;    // the same in the last rounds
 constexpr double kShortLink = 0.5;    // edges along a curve that are shorter are not divided
 constexpr double kAcute = 0.8;        // gap of two curves from the same corner, in edges, that calls for protection
-constexpr int kMostShells = 1000;
+constexpr double kLeastStep = 0.3;    // between shells, in edges
+constexpr std::size_t kMostShells = 1000;
 constexpr double kPush = 0.3;         // of its distance, for cells that hold less
 
 struct Fault {
@@ -215,11 +216,10 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
   for (Index corner = 0; corner < arms.size(); ++corner) {
     std::vector<Arm>& around = arms[corner];
     if (around.size() < 2) continue;
-    for (int shell = 1; shell < kMostShells; ++shell) {
-      // The edge length near the corner, by the first arm; shells must be the same for all.
-      const Arm& first = around.front();
-      const double edge = measure.edge_length(first.curve, first.end == 0 ? 0 : curves.length(first.curve), c);
-      const double radius = shell * edge;
+    // The edge length near the corner, by the first arm; shells must be the same for all.
+    const double edge = measure.edge_length(around[0].curve, around[0].end == 0 ? 0 : curves.length(around[0].curve), c);
+    double radius = edge;
+    for (std::size_t shell = 0; shell < kMostShells; ++shell) {
       std::vector<double> at(around.size(), -1);
       for (std::size_t a = 0; a < around.size(); ++a) {
         const double position = position_at_radius(curves, around[a].curve, around[a].end, radius);
@@ -228,20 +228,24 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
         if (along < 0.5 * curves.length(around[a].curve)) at[a] = position;
       }
       std::vector<char> close(around.size(), 0);
-      bool any = false;
+      double narrowest = std::numeric_limits<double>::infinity();
       for (std::size_t a = 0; a < around.size(); ++a)
         for (std::size_t b = 0; b < a; ++b) {
           if (at[a] < 0 || at[b] < 0) continue;
           const double gap = norm(curves.point(around[a].curve, at[a]) - curves.point(around[b].curve, at[b]));
-          if (gap < kAcute * edge) close[a] = close[b] = any = true;
+          if (gap >= kAcute * edge) continue;
+          close[a] = close[b] = true;
+          narrowest = std::min(narrowest, gap);
         }
-      if (!any) break;
+      if (std::isinf(narrowest)) break;
       for (std::size_t a = 0; a < around.size(); ++a) {
         // An arm is protected from the corner on, without gaps.
-        if (!close[a] || around[a].positions.size() + 1 < static_cast<std::size_t>(shell)) continue;
+        if (!close[a] || around[a].positions.size() < shell) continue;
         around[a].positions.push_back(at[a]);
         around[a].reach = (around[a].end == 0 ? at[a] : curves.length(around[a].curve) - at[a]) + 0.5 * edge;
       }
+      // Between close curves triangles are as large as the gap, if that is not too small.
+      radius += std::clamp(narrowest, kLeastStep * edge, edge);
     }
     for (const Arm& arm : around) {
       if (arm.positions.empty()) continue;
@@ -266,7 +270,7 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
     if (!zones[k].empty()) space_evenly(curves, measure, k, state);
 }
 
-// True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: what goes to a curve stays.
+// True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved away.
 bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<Fault>& faults, bool crowd,
           bool last, CvtState& state) {
   std::vector<std::size_t> wanted(curves.size());
@@ -289,7 +293,7 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
       if (std::exchange(used[fault.cell], 1)) continue;
       changed = true;
       if (last || ((crowd || wanted[fault.curve] > 0) && length >= kRoomToSnap * measure.edge_length(fault.curve, position, c))) {
-        put(fault.cell, fault.curve, position, last ? Kind::fixed : Kind::curve);
+        put(fault.cell, fault.curve, position, Kind::curve);
         if (wanted[fault.curve] > 0) --wanted[fault.curve];
       } else if (length >= kRoomToSnap * measure.edge_length(fault.curve, position, c)) {
         removed[fault.cell] = 1;
@@ -310,7 +314,7 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
     state.seeds.emplace_back();
     state.places.emplace_back();
     removed.push_back(0);
-    put(static_cast<Index>(state.seeds.size() - 1), fault.curve, position, last || meets ? Kind::fixed : Kind::curve);
+    put(static_cast<Index>(state.seeds.size() - 1), fault.curve, position, meets ? Kind::fixed : Kind::curve);
   }
   remove(state, removed);
   if (!last)

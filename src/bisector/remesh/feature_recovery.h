@@ -4,7 +4,7 @@
 // each other on it have an edge in the dual with a triangle on each sheet. A foreign cell on a curve is snapped to it if there
 // is room, moved away if it hardly touches it, and met with one more seed on the curve if it belongs to another curve. At a
 // corner with an acute angle that seed lies as far from the corner as the foreign one: seeds at equal distances do not own
-// parts of each other's curve, however small the angle.
+// parts of each other's curve, however small the angle. Such pairs are fixed.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ void clear_features(Backend& backend, CvtState& state, RestrictedPolygons& polyg
                     const CurveMeasure& measure, OptimiseOptions options, OptimiseTotals& totals, const Context& context);
 
 // Mends the curves that are broken and optimises again, for a bounded number of rounds. The count is kept in the first rounds;
-// seeds inserted in the last ones stay fixed, and nothing else moves. `c` is the scale of CurveMeasure. `polygons` and
+// in the last ones seeds are inserted and nothing moves. `c` is the scale of CurveMeasure. `polygons` and
 // state.moments end as those of the final seeds.
 FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
                                const CurveMeasure& measure, double c, OptimiseOptions options, OptimiseTotals& totals,

@@ -20,13 +20,14 @@ using Kind = SeedPlace::Kind;
 constexpr int kBatches = 10;
 constexpr int kSweeps = 3, kMoreSweeps = 6;  // of a patch: of all trials, and of the best
 constexpr int kSmoothingSweeps = 6;          // of the whole
-constexpr double kHold = 10;                 // of seeds, where all are relaxed: what keeps cells of equal size
+constexpr double kHold = 20;                 // of seeds, where all are relaxed: what keeps cells of equal size
 constexpr std::size_t kRings = 2;            // of free seeds around the middle of a patch
-constexpr double kPoor = 1.5;                // cost of a seed's triangles beside the average, from which on it is looked at
+constexpr double kPoor = 1.5;                // cost of a seed's triangles beside the average that makes it poor
 constexpr std::size_t kPoorTried = 30;       // such seeds are tried: this many, and one in kPoorShare
 constexpr std::size_t kPoorShare = 30;
 constexpr double kIrregular = 10;            // average costs, for each triangle at a seed beyond or short of six
 constexpr double kHope = 4;                  // average costs that a trial may be worse by after the first sweeps
+constexpr double kPrice = 20;                // average costs that the right count may take, per seed
 constexpr std::size_t kFlips = 2;            // tried per patch
 constexpr std::size_t kTriesToRestore = 8;   // patches per seed that is missing or too many
 constexpr double kDrift = 0.005;             // of the count, that it may be off on the way
@@ -39,15 +40,17 @@ struct Snapshot {
   std::vector<Vec3> seeds;
   std::vector<SeedPlace> places;  // as many
   CellMoments moments;
-  RestrictedPolygons polygons;
+  bool covers = false;            // the diagram is one of the whole surface
   Dual dual;
-  std::vector<double> costs, excess;  // of the dual's triangles
+  std::vector<double> costs;      // of the dual's triangles
+  std::vector<ShapeExcess> excess;
   Csr<Index> stars;               // triangles at each seed
   Csr<Index> rings;               // neighbours of each seed
   std::vector<Star> kinds;
   FeatureReport features;
   long long euler = 0;            // of the dual
   double average = 0;             // cost
+  ShapeExcess worst;
 };
 
 Csr<Index> stars_of(const Dual& dual, std::size_t seeds) {
@@ -94,14 +97,12 @@ Star look_around(const Dual& dual, const Csr<Index>& stars, Index v, std::vector
   }
   std::size_t reached = 0;
   Index at = start;
-  for (bool on = true; on && reached < links.size();) {
+  do {
     const auto link = std::find_if(links.begin(), links.end(), [&](const auto& l) { return l[0] == at; });
-    on = link != links.end();
-    if (!on) break;
+    if (link == links.end()) break;
     ++reached;
     at = (*link)[1];
-    if (at == start) break;
-  }
+  } while (at != start);
   if (reached != links.size()) return Star::other;
   return single == 0 ? Star::disk : Star::fan;
 }
@@ -137,7 +138,8 @@ class Improver {
   double irregular_price() const { return kIrregular * now_.average; }
   std::size_t wanted() const { return options_.vertices ? options_.vertices : state_.seeds.size(); }
   void measure(Snapshot& s);
-  double worst_excess(const Snapshot& s, Index seed) const;
+  ShapeExcess worst_excess(const Snapshot& s, Index seed) const;
+  bool as_good(const Snapshot& next) const;
   bool newly_broken(const Snapshot& next, Index curve) const;
   // The seeds up to kRings edges away, nearest first.
   std::vector<Index> seeds_around(Index middle) const;
@@ -151,9 +153,11 @@ class Improver {
   // The seeds after some changes; the new index of each, and the seeds there of each change.
   Snapshot assemble(const std::vector<Change>& changes, const std::vector<char>& on, std::vector<Index>& index,
                     std::vector<std::vector<Index>>& seeds_of) const;
-  bool holds(const Snapshot& next, const Change& change, const std::vector<Index>& index, const std::vector<Index>& seeds) const;
+  bool holds(const Snapshot& next, const Change& change, const std::vector<Index>& index,
+             const std::vector<Index>& seeds) const;
   // Makes those of the changes that hold; `on` tells which.
   void make(const std::vector<Change>& changes, std::vector<char>& on);
+  void drop_idle();
   void smooth();
   std::vector<std::vector<Index>> colours(const std::vector<PatchVertex>& vertices) const;
 
@@ -166,7 +170,7 @@ class Improver {
   OptimiseTotals& totals_;
   const Context& context_;
   ShapeGoal goal_;
-  Csr<Index> corner_curves_;      // that end at each corner
+  std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
   std::size_t poor_left_ = 0;     // poor seeds that may still be tried
   std::vector<char> done_;        // by seed: tried in vain, and nothing near it has changed since
   Snapshot now_;
@@ -178,20 +182,20 @@ Improver::Improver(Backend& backend, CvtState& state, RestrictedPolygons& polygo
     : backend_(backend), state_(state), polygons_(polygons), trace_(trace), options_(options), step_(std::move(step)),
       totals_(totals), context_(context), goal_(shape_goal(options.min_angle, options.max_angle)) {
   if (!featured()) return;
-  for (Index corner = 0; corner < step_.curves->graph().corners.size(); ++corner) {
-    for (Index curve = 0; curve < step_.curves->size(); ++curve)
-      if (step_.curves->ends(curve)[0] == corner || step_.curves->ends(curve)[1] == corner)
-        corner_curves_.values.push_back(curve);
-    corner_curves_.offsets.push_back(corner_curves_.values.size());
-  }
+  corner_curves_.resize(step_.curves->graph().corners.size());
+  for (Index curve = 0; curve < step_.curves->size(); ++curve)
+    for (const Index corner : step_.curves->ends(curve))
+      if (corner != kNone) corner_curves_[corner].push_back(curve);
 }
 
 void Improver::measure(Snapshot& s) {
   context_.check();
-  backend_.evaluate(s.seeds, s.moments, s.polygons);
+  backend_.evaluate(s.seeds, s.moments, polygons_);
   totals_.count(s.moments);
+  const double total = backend_.surface().mass;
+  s.covers = std::abs(s.moments.mass - total) <= backend_.mass_tolerance() * total;
   const std::size_t n = s.seeds.size();
-  s.dual = extract_dual(s.polygons);
+  s.dual = extract_dual(polygons_);
   s.costs.resize(s.dual.triangles.size());
   s.excess.resize(s.costs.size());
   parallel_each(s.costs.size(), [&](std::size_t k) {
@@ -199,7 +203,9 @@ void Improver::measure(Snapshot& s) {
     s.costs[k] = shape_cost(s.seeds[t[0]], s.seeds[t[1]], s.seeds[t[2]], goal_);
     s.excess[k] = shape_excess(s.seeds[t[0]], s.seeds[t[1]], s.seeds[t[2]], goal_);
   });
-  s.average = fixed_sum(s.costs.size(), [&](std::size_t k) { return s.costs[k]; }) / static_cast<double>(s.costs.size());
+  s.average = fixed_sum(s.costs.size(), [&](std::size_t k) { return s.costs[k]; });
+  s.average /= static_cast<double>(s.costs.size());
+  for (const ShapeExcess& excess : s.excess) s.worst.take(excess);
   s.stars = stars_of(s.dual, n);
   s.kinds.resize(n);
   std::vector<std::vector<Index>> rings(n);
@@ -210,14 +216,20 @@ void Improver::measure(Snapshot& s) {
     s.rings.offsets.push_back(s.rings.values.size());
   }
   const auto vertices = std::count_if(rings.begin(), rings.end(), [](const auto& ring) { return !ring.empty(); });
-  s.euler = vertices - static_cast<long long>(s.rings.values.size() / 2) + static_cast<long long>(s.dual.triangles.size());
-  if (featured()) s.features = check_features(trace_, *step_.curves, s.places, s.polygons);
+  const auto edges = static_cast<long long>(s.rings.values.size() / 2);
+  s.euler = vertices - edges + static_cast<long long>(s.dual.triangles.size());
+  if (featured()) s.features = check_features(trace_, *step_.curves, s.places, polygons_);
 }
 
-double Improver::worst_excess(const Snapshot& s, Index seed) const {
-  double worst = 0;
-  for (const Index* t = s.stars.begin(seed); t != s.stars.end(seed); ++t) worst = std::max(worst, s.excess[*t]);
+ShapeExcess Improver::worst_excess(const Snapshot& s, Index seed) const {
+  ShapeExcess worst;
+  for (const Index* t = s.stars.begin(seed); t != s.stars.end(seed); ++t) worst.take(s.excess[*t]);
   return worst;
+}
+
+bool Improver::as_good(const Snapshot& next) const {
+  return next.covers && next.euler == now_.euler && next.worst.within(now_.worst) &&
+         next.features.broken.size() <= now_.features.broken.size();
 }
 
 bool Improver::newly_broken(const Snapshot& next, Index curve) const {
@@ -307,8 +319,7 @@ Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::siz
   };
   const Index v = 0;
   if (aim == Aim::better) {
-    double worst = 0; for (const Index t : change.footprint) worst = std::max(worst, worst_excess(now_, t));
-    if (worst > 0 || !getenv("NONONE")) attempt([](ImprovePatch&) { return true; });
+    attempt([](ImprovePatch&) { return true; });
     const std::vector<std::array<Index, 2>> flips = start.wanted_flips(v);
     for (std::size_t k = 0; k < std::min(kFlips, flips.size()); ++k)
       attempt([&](ImprovePatch& patch) { return patch.flip(flips[k][0], flips[k][1]); });
@@ -321,13 +332,13 @@ Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::siz
   if (!best) return change;
   best->relax_all(kMoreSweeps);
   change.gain = before - best->cost(now_.average, irregular_price());
-  if (aim == Aim::better && !(change.gain > 0)) return change;
+  if (!(change.gain > (aim == Aim::better ? 0 : -kPrice * now_.average))) return change;
   for (Index k = 0; k < best->vertices().size(); ++k) {
     const PatchVertex& vertex = best->vertices()[k];
     if (vertex.place.curve != kNone) change.curves.push_back(vertex.place.curve);
     if (const Index corner = vertex.place.corner; corner != kNone && featured())
-      change.curves.insert(change.curves.end(), corner_curves_.begin(corner), corner_curves_.end(corner));
-    if (!best->alive(k)) {
+      change.curves.insert(change.curves.end(), corner_curves_[corner].begin(), corner_curves_[corner].end());
+    if (vertex.removed) {
       change.removed.push_back(vertex.seed);
     } else if (vertex.seed == kNone || !(vertex.x == now_.seeds[vertex.seed])) {
       change.moved.push_back({vertex.seed, vertex.x, vertex.place});
@@ -351,7 +362,7 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
       sum += now_.costs[*t];
       worst = std::max(worst, now_.costs[*t]);
     }
-    const Candidate candidate{v, aim == Aim::better ? worst_excess(now_, v) : 0,
+    const Candidate candidate{v, aim == Aim::better ? worst_excess(now_, v).most() : 0,
                               sum / static_cast<double>(now_.stars.size(v)) + worst};
     if (aim != Aim::better || candidate.excess > 0 || candidate.cost > 2 * kPoor * now_.average)
       candidates.push_back(candidate);
@@ -360,7 +371,8 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
     return a.excess != b.excess ? a.excess > b.excess : a.cost != b.cost ? a.cost > b.cost : a.seed < b.seed;
   });
   const auto missing = static_cast<long long>(wanted()) - static_cast<long long>(now_.seeds.size());
-  std::size_t most = aim == Aim::better ? now_.seeds.size() : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
+  const std::size_t most = aim == Aim::better ? now_.seeds.size()
+                                              : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
   std::vector<char> taken(now_.dual.triangles.size(), 0);
   std::vector<Index> middles;
   for (const Candidate& candidate : candidates) {
@@ -385,7 +397,8 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
 std::vector<char> Improver::choose_changes(const std::vector<Change>& changes, Aim aim) const {
   std::vector<std::size_t> order(changes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return changes[a].gain > changes[b].gain; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return changes[a].gain > changes[b].gain; });
   const auto count = static_cast<long long>(wanted());
   const auto drift = aim == Aim::better ? static_cast<long long>(kDrift * static_cast<double>(count)) : 0;
   long long off = static_cast<long long>(now_.seeds.size()) - count;
@@ -494,13 +507,13 @@ bool Improver::holds(const Snapshot& next, const Change& change, const std::vect
   const double after = cost_at(next, seeds, now_.average, irregular_price());
   const double price = change.gain < 0 ? -2 * change.gain : 0;  // of the right count
   if (!(after < before + price)) return false;
-  double worst_before = 0, worst_after = 0;
-  for (const Index v : change.footprint) worst_before = std::max(worst_before, worst_excess(now_, v));
+  ShapeExcess worst_before, worst_after;
+  for (const Index v : change.footprint) worst_before.take(worst_excess(now_, v));
   for (const Index v : seeds) {
-    worst_after = std::max(worst_after, worst_excess(next, v));
+    worst_after.take(worst_excess(next, v));
     if (next.kinds[v] == Star::other) return false;
   }
-  if (worst_after > worst_before) return false;
+  if (!worst_after.within(worst_before)) return false;
   for (const Index v : change.footprint)
     for (const Index* j = now_.rings.begin(v); j != now_.rings.end(v); ++j)
       if (index[*j] != kNone && now_.kinds[*j] != next.kinds[index[*j]]) return false;
@@ -520,7 +533,7 @@ void Improver::make(const std::vector<Change>& changes, std::vector<char>& on) {
       on = std::move(held);
       continue;
     }
-    if (next.euler != now_.euler || next.features.broken.size() > now_.features.broken.size()) break;
+    if (!as_good(next)) break;
     now_ = std::move(next);
     return;
   }
@@ -574,11 +587,10 @@ void Improver::smooth() {
     std::vector<char> worse(n, 0);
     parallel_each(n, [&](std::size_t k) {
       const Index v = static_cast<Index>(k), curve = now_.places[v].curve;
-      worse[v] = next.kinds[v] != now_.kinds[v] || worst_excess(next, v) > worst_excess(now_, v) ||
+      worse[v] = next.kinds[v] != now_.kinds[v] || !worst_excess(next, v).within(worst_excess(now_, v)) ||
                  (curve != kNone && newly_broken(next, curve));
       if (const Index corner = now_.places[v].corner; corner != kNone && featured())
-        for (const Index* c = corner_curves_.begin(corner); c != corner_curves_.end(corner); ++c)
-          worse[v] |= newly_broken(next, *c);
+        for (const Index c : corner_curves_[corner]) worse[v] |= newly_broken(next, c);
     });
     bool changed = false;
     for (Index v = 0; v < n; ++v) {
@@ -592,10 +604,22 @@ void Improver::smooth() {
         std::for_each(s->rings.begin(v), s->rings.end(v), put_back);
     }
     if (changed) continue;
-    if (next.euler == now_.euler && next.features.broken.size() <= now_.features.broken.size() && next.average < now_.average)
-      now_ = std::move(next);
+    if (as_good(next) && next.average < now_.average) now_ = std::move(next);
     return;
   }
+}
+
+// Seeds on the surface without a triangle are no vertices of the mesh.
+void Improver::drop_idle() {
+  Snapshot next;
+  for (Index v = 0; v < now_.seeds.size(); ++v) {
+    if (now_.places[v].kind == Kind::surface && now_.stars.size(v) == 0) continue;
+    next.seeds.push_back(now_.seeds[v]);
+    next.places.push_back(now_.places[v]);
+  }
+  if (next.seeds.size() == now_.seeds.size()) return;
+  measure(next);
+  if (as_good(next)) now_ = std::move(next);
 }
 
 ImproveReport Improver::run() {
@@ -604,6 +628,8 @@ ImproveReport Improver::run() {
   now_.places.resize(now_.seeds.size());
   measure(now_);
   if (now_.dual.triangles.empty()) return report_;
+  drop_idle();
+  const double average = now_.average;
   poor_left_ = kPoorTried + now_.seeds.size() / kPoorShare;
   done_.assign(now_.seeds.size(), 0);
   smooth();
@@ -615,13 +641,21 @@ ImproveReport Improver::run() {
   for (int round = 0; round < kBatches && now_.seeds.size() != wanted(); ++round)
     batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
   if (report_.made > 0) smooth();
+  if (now_.average > average) {
+    now_.seeds = state_.seeds;
+    now_.places = state_.places;
+    now_.places.resize(now_.seeds.size());
+    measure(now_);
+    report_ = {report_.trials, 0, 0, 0, 0};
+  }
 
-  report_.missed = static_cast<std::size_t>(std::count_if(now_.excess.begin(), now_.excess.end(), [](double e) { return e > 0; }));
+  for (const ShapeExcess& excess : now_.excess) report_.missed += excess.most() > 0;
   if (!state_.places.empty()) state_.places = now_.places;
   state_.seeds = std::move(now_.seeds);
   step_.constrained = true;
   complete(backend_, state_, step_, totals_);
-  polygons_ = std::move(now_.polygons);
+  // What was measured last need not be what is left.
+  backend_.evaluate(state_.seeds, state_.moments, polygons_);
   return report_;
 }
 

@@ -7,25 +7,27 @@
 #pragma once
 
 #include "bisector/cvt/optimise.h"
-#include "bisector/mesh/topology.h"
 #include "bisector/remesh/feature_trace.h"
 
 namespace bisector {
 
 struct ImproveOptions {
-  double min_angle = 40, max_angle = 95;  // degrees; the goal. It is not reached everywhere
-  std::size_t vertices = 0;               // wanted
+  // Degrees. The goal, which is not reached everywhere. The largest angle leaves room for right-angled corners of features.
+  double min_angle = 40, max_angle = 91;
+  std::size_t vertices = 0;  // wanted; 0: as many as there are
 };
 
 struct ImproveReport {
-  std::size_t trials = 0;    // changes looked at
-  std::size_t made = 0;      // that stayed
+  std::size_t trials = 0;                 // changes that were tried on a patch
+  std::size_t made = 0;                   // that stayed, of a patch each
   std::size_t inserted = 0, removed = 0;  // seeds, by those
-  std::size_t missed = 0;    // triangles of the result beyond the goal
+  std::size_t missed = 0;                 // triangles of the result with an angle beyond the goal
 };
 
-// `polygons` must be those of state.seeds, whose cells must not be empty, and `trace` of options.curves; both are that again in
-// the end, and the state is complete. Seeds must be on the surface. The count of seeds moves towards the one wanted.
+// `polygons` must be those of state.seeds, which must lie on the surface, and `trace` that of step.curves; in the end polygons
+// and the complete state belong to the new seeds. Corners and other fixed seeds do not move, nor do seeds at a border that is no
+// feature. No angle beyond the goal gets worse than the worst before, and neither does the mean cost of a triangle (shape_cost in
+// improve_patch.h). The count moves to the one wanted where that costs little. Throws Cancelled.
 ImproveReport improve(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
                       const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context);
 

@@ -12,9 +12,11 @@ namespace {
 
 using Kind = SeedPlace::Kind;
 
+constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kAngleWeight = 0.5;                // of the smallest angle's cosine beside Q
 constexpr double kLinear = 10, kQuadratic = 200;  // of what is beyond the goal
 constexpr double kMargin = 2;                       // degrees within the goal, from where on it is felt
+constexpr double kHold = 6;                         // in a patch, for cells of about equal size
 constexpr double kFolded = 20;                      // cost of a triangle that turned over
 constexpr double kFacing = 0.2;                     // least cosine between a triangle and what it replaces
 constexpr double kFirstStep = 0.1, kLastStep = 0.003;  // of the mean edge length
@@ -73,8 +75,8 @@ Shape shape_of(const Vec3& a, const Vec3& b, const Vec3& c) {
 }  // namespace
 
 ShapeGoal shape_goal(double min_angle, double max_angle) {
-  const auto cosine = [](double degrees) { return std::cos(degrees * std::numbers::pi / 180); };
-  return {cosine(min_angle), cosine(max_angle), cosine(min_angle + kMargin), cosine(max_angle - kMargin)};
+  const auto cosine = [](double degrees) { return std::cos(degrees / kDegrees); };
+  return {min_angle, max_angle, cosine(min_angle + kMargin), cosine(max_angle - kMargin)};
 }
 
 double shape_cost(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal) {
@@ -83,9 +85,10 @@ double shape_cost(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& 
          beyond(goal.near_max - shape.largest);
 }
 
-double shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal) {
+ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal) {
   const Shape shape = shape_of(a, b, c);
-  return std::max({0.0, shape.smallest - goal.cos_min, goal.cos_max - shape.largest});
+  const auto angle = [](double cosine) { return std::acos(std::clamp(cosine, -1.0, 1.0)) * kDegrees; };
+  return {std::max(0.0, goal.min_angle - angle(shape.smallest)), std::max(0.0, angle(shape.largest) - goal.max_angle)};
 }
 
 Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
@@ -134,12 +137,20 @@ void ImprovePatch::lock(std::vector<std::array<Index, 2>> edges) {
   std::sort(locked_.begin(), locked_.end());
 }
 
+std::vector<Triangle> ImprovePatch::triangles() const {
+  std::vector<Triangle> alive;
+  for (const PatchTriangle& t : triangles_)
+    if (t.alive) alive.push_back(t.v);
+  return alive;
+}
+
 double ImprovePatch::cost(double average, double irregular) const {
   double sum = 0;
   for (const PatchTriangle& t : triangles_)
     if (t.alive) sum += t.cost - average;
   for (Index v = 0; v < vertices_.size(); ++v)
-    if (vertices_[v].place.kind == Kind::surface && alive(v)) sum += irregular * std::abs(excess_degree(v));
+    if (vertices_[v].place.kind == Kind::surface && !vertices_[v].removed)
+      sum += irregular * std::abs(excess_degree(v));
   return sum;
 }
 
@@ -201,7 +212,7 @@ bool ImprovePatch::flip(Index a, Index b) {
   std::size_t left, right;
   if (is_locked(a, b) || !triangles_at(a, b, left, right)) return false;
   const Index c = opposite(triangles_[left].v, a, b), d = opposite(triangles_[right].v, a, b);
-  if (c == d || stars_[a].size() <= 3 || stars_[b].size() <= 3) return false;
+  if (c == d) return false;
   for (const Index t : stars_[c])
     if (has(triangles_[t].v, d)) return false;
   const Vec3 facing = unit(triangles_[left].facing + triangles_[right].facing);
@@ -277,7 +288,7 @@ bool ImprovePatch::collapse(Index v, Index to) {
 }
 
 bool ImprovePatch::remove(Index v) {
-  if (!vertices_[v].free || vertices_[v].place.corner != kNone) return false;
+  if (vertices_[v].removed || !vertices_[v].free || vertices_[v].place.corner != kNone) return false;
   const bool surface = vertices_[v].place.kind == Kind::surface;
   std::vector<std::pair<double, Index>> ends;
   std::vector<Index> along;  // its neighbours on the curve
@@ -292,6 +303,7 @@ bool ImprovePatch::remove(Index v) {
   std::sort(ends.begin(), ends.end());
   for (const auto& [squared, to] : ends) {
     if (!collapse(v, to)) continue;
+    vertices_[v].removed = true;
     for (const Index w : along) set_locked(v, w, false);
     if (!surface) set_locked(along[0], along[1], true);
     return true;
@@ -363,7 +375,8 @@ bool ImprovePatch::insert(std::size_t triangle) {
   PatchVertex centre;
   centre.free = true;
   centre.owner = vertices_[t[0]].owner;
-  centre.x = map_->project((1.0 / 3) * (vertices_[t[0]].x + vertices_[t[1]].x + vertices_[t[2]].x), centre.owner, centre.normal);
+  const Vec3 middle = (1.0 / 3) * (vertices_[t[0]].x + vertices_[t[1]].x + vertices_[t[2]].x);
+  centre.x = map_->project(middle, centre.owner, centre.normal);
   const Index m = add_vertex(centre);
   replace(triangle, {t[0], t[1], m}, facing);
   for (const Triangle& other : {Triangle{t[1], t[2], m}, Triangle{t[2], t[0], m}}) {
@@ -424,6 +437,7 @@ std::size_t ImprovePatch::largest_triangle(Index v) const {
 }
 
 bool ImprovePatch::relax(Index v, double hold) {
+  if (stars_[v].empty()) return false;
   PatchVertex& vertex = vertices_[v];
   double before = 0, length = 0;
   for (const Index t : stars_[v]) {
@@ -488,11 +502,10 @@ bool ImprovePatch::relax(Index v, double hold) {
 }
 
 void ImprovePatch::relax_all(int sweeps) {
-  static const double H = getenv("H") ? atof(getenv("H")) : 0;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     if (sweep % kFlipEvery == 0) make_delaunay();
     for (Index v = 0; v < vertices_.size(); ++v)
-      if (vertices_[v].free && alive(v) && vertices_[v].place.kind != Kind::fixed) relax(v, H);
+      if (vertices_[v].free && !vertices_[v].removed && vertices_[v].place.kind != Kind::fixed) relax(v, kHold);
   }
   make_delaunay();
 }

@@ -11,18 +11,28 @@
 
 namespace bisector {
 
-// Cosines of the angles that triangles should stay between, and of those from which on they cost more.
+// The angles that triangles should stay between, in degrees, and the cosines from which on they cost more.
 struct ShapeGoal {
-  double cos_min, cos_max, near_min, near_max;
+  double min_angle, max_angle, near_min, near_max;
 };
 
-// In degrees.
 ShapeGoal shape_goal(double min_angle, double max_angle);
 
 // 0 for an equilateral triangle. Grows with 1 - Q (mesh/quality.h), with the smallest angle's cosine, and fast beyond the goal.
 double shape_cost(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
-// How far the cosine of an angle is beyond the goal; 0 if none is.
-double shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
+// By how many degrees the smallest angle is less than it should be and the largest one more.
+struct ShapeExcess {
+  double under = 0, over = 0;
+
+  double most() const { return under > over ? under : over; }
+  bool within(const ShapeExcess& b) const { return under <= b.under && over <= b.over; }
+  // The worse of both in either respect.
+  void take(const ShapeExcess& b) {
+    if (b.under > under) under = b.under;
+    if (b.over > over) over = b.over;
+  }
+};
+ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
 
 // The surface by the cells of a diagram: the nearest seed of a point owns the piece of the surface that the point goes to,
 // which keeps points on their sheet.
@@ -48,6 +58,7 @@ struct PatchVertex {
   Index owner = kNone;  // cell of the map that it is in
   Index seed = kNone;   // its index outside, if it has one
   bool free = false;
+  bool removed = false;
   Index outside = 0;    // triangles at it that are not in the patch
   double step = 0;      // length that the next moves are tried with; 0 before the first
   Vec3 start;           // where it was before that
@@ -67,15 +78,15 @@ class ImprovePatch {
   void lock(std::vector<std::array<Index, 2>> edges);
 
   const std::vector<PatchVertex>& vertices() const { return vertices_; }
-  bool alive(Index v) const { return !stars_[v].empty(); }
+  std::vector<Triangle> triangles() const;
   // Sum of the triangles' costs, each less `average`, and so much for each triangle that a vertex on the surface has more or
   // fewer than six.
   double cost(double average, double irregular) const;
 
   // Each is false, and nothing is changed, if the triangulation has no room for it.
-  bool remove(Index v);            // not a corner; one on a curve goes to the next one there
-  bool split(Index a, Index b);    // inserts a vertex on the edge, on the curve if it is locked
-  bool insert(std::size_t triangle);  // inserts a vertex in it
+  bool remove(Index v);               // corners and what is not free stay
+  bool split(Index a, Index b);       // inserts a vertex on the edge, on the curve if it is locked
+  bool insert(std::size_t triangle);  // inserts a vertex in the triangle
   bool flip(Index a, Index b);
 
   // The edges at v and opposite to it whose flip brings the degrees nearest to six, best first.

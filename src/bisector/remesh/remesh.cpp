@@ -31,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0.05;
 constexpr int kSettlingRounds = 3;
 constexpr double kFitQuality = 0.7;  // what fitting may bring better triangles down to
-constexpr double kMaxAngle = 95;  // degrees; goal of the final pass
+constexpr double kMaxAngle = 91;  // degrees; goal of the final pass
 
 double steps_share(std::size_t level, std::size_t levels) {
   if (levels == 1) return 1;
