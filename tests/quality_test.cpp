@@ -310,5 +310,44 @@ TEST(Quality, OfRealModels) {
   }
 }
 
+// Turning any triangles of an orientable mesh over is undone, up to the side that most of them were on; a Moebius strip cannot be.
+TEST(Orient, UndoesFlips) {
+  for (const TriangleMesh& mesh : {icosphere(2), torus(20, 12), wavy_patch(6), two_spheres(), pages()}) {
+    SplitMix64 random(3);
+    std::vector<Triangle> flipped = mesh.triangles;
+    for (Triangle& t : flipped)
+      if (random.unit() < 0.3) std::swap(t[1], t[2]);
+    orient(flipped, mesh.vertices.size());
+    const auto cyclic = [](Triangle t) {
+      std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+      return t;
+    };
+    const MeshTopology want = analyse_topology(mesh.triangles, mesh.vertices.size());
+    const MeshTopology got = analyse_topology(flipped, mesh.vertices.size());
+    EXPECT_EQ(got.oriented, want.oriented);
+    if (want.components > 1 || want.non_manifold_edges > 0) continue;
+    for (std::size_t t = 0; t < flipped.size(); ++t) EXPECT_EQ(cyclic(flipped[t]), cyclic(mesh.triangles[t]));
+  }
+}
+
+// A square whose diagonal triangle at a corner has two marked edges.
+TEST(Quality, FreeFiguresLeaveOutWhatFeaturesImpose) {
+  TriangleMesh mesh{{{0, 0, 0}, {4, 0, 0}, {4, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}};
+  const QualityReport plain = measure_quality(mesh);
+  EXPECT_EQ(plain.q_min_free, plain.q_min);
+  EXPECT_EQ(plain.theta_min_free, plain.theta_min);
+  EXPECT_EQ(plain.theta_max_free, plain.theta_max);
+  mesh.feature_edges = {{0, 1}, {1, 2}, {2, 3}, {0, 3}};
+  const QualityReport marked = measure_quality(mesh);
+  EXPECT_EQ(marked.theta_max, plain.theta_max);
+  EXPECT_NEAR(marked.theta_max_free, std::atan2(4, 1) * 180 / std::numbers::pi, 1e-9);  // the right angles are imposed
+  EXPECT_EQ(marked.theta_min_free, plain.theta_min);
+  mesh.feature_edges = {{0, 1}, {0, 2}};  // the angle of atan(1/4) at vertex 0 of the first triangle
+  const QualityReport acute = measure_quality(mesh);
+  EXPECT_NEAR(acute.theta_min_free, plain.theta_min, 1e-12);  // the second has the same angle, free, at vertex 2
+  mesh.triangles.pop_back();
+  EXPECT_NEAR(measure_quality(mesh).theta_min_free, std::atan2(4, 1) * 180 / std::numbers::pi, 1e-9);
+}
+
 }  // namespace
 }  // namespace bisector::test

@@ -141,4 +141,35 @@ std::vector<Index> label_components(const std::vector<Triangle>& triangles, std:
   return label;
 }
 
+void orient(std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  const EdgeTable table = edge_table(triangles, vertex_count);
+  std::vector<std::size_t> edge_of(3 * triangles.size());
+  for (std::size_t e = 0; e < table.edges.size(); ++e)
+    for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of[*h] = e;
+  enum : char { unseen, kept, turned };
+  std::vector<char> state(triangles.size(), unseen);
+  for (std::size_t start = 0; start < triangles.size(); ++start) {
+    if (state[start] != unseen) continue;
+    std::vector<std::size_t> part{start};
+    state[start] = kept;
+    std::size_t turns = 0;
+    for (std::size_t head = 0; head < part.size(); ++head)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t h = 3 * part[head] + k, e = edge_of[h];
+        if (table.half_edges.size(e) != 2) continue;
+        const std::size_t* sides = table.half_edges.begin(e);
+        const std::size_t other = sides[0] == h ? sides[1] : sides[0], t = other / 3;
+        if (state[t] != unseen) continue;
+        const bool agree = origin(triangles, h) != origin(triangles, other);
+        state[t] = agree == (state[part[head]] == kept) ? kept : turned;
+        turns += state[t] == turned;
+        part.push_back(t);
+      }
+    if (2 * turns > part.size())
+      for (std::size_t t : part) state[t] = state[t] == kept ? turned : kept;
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (state[t] == turned) std::swap(triangles[t][1], triangles[t][2]);
+}
+
 }  // namespace bisector

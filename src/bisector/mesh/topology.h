@@ -22,6 +22,10 @@ struct MeshTopology {
 // All false and 0 if there are no triangles. Every index must be below `vertex_count`.
 MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
+// Turns triangles over so that neighbours across edges of two triangles run in opposite directions there, wherever that can
+// be had; each part that hangs together in this way keeps the orientation of most of its triangles.
+void orient(std::vector<Triangle>& triangles, std::size_t vertex_count);
+
 // The undirected edges in lexicographic order. Half-edge 3 t + k runs from corner k of triangle t to the next corner.
 struct EdgeTable {
   std::vector<std::array<Index, 2>> edges;  // lower vertex first

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "bisector/core/error.h"
+#include "bisector/mesh/normals.h"
 #include "bisector/mesh/topology.h"
 
 namespace bisector {
@@ -14,6 +15,7 @@ namespace {
 // With few seeds to start from the count says nothing about the result's, which topology control finds. The density then is
 // one that a mesh of so many vertices could follow.
 constexpr std::size_t kLeastForDensity = 3000;
+constexpr std::size_t kMostVertices = 100'000'000;
 
 std::size_t non_manifold_edges(const TriangleMesh& mesh) {
   return analyse_topology(mesh.triangles, mesh.vertices.size()).non_manifold_edges;
@@ -99,6 +101,13 @@ PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, c
     b = vertex_of[b];
   }
   std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+  const SizingTarget target = target_of(options);
+  if (options.energy == Energy::automatic) {
+    const std::size_t count = target.vertices ? target.vertices : compute_sizing(welded, {}, target).vertices;
+    prepared.noisy = has_noisy_normals(welded, std::max<std::size_t>(count, 4));
+    // What noise folds is no feature.
+    if (prepared.noisy && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
+  }
   const FeatureGraph graph = detect_features(welded, features);
 
   SizingOptions sizing = options.sizing;
@@ -111,7 +120,10 @@ PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, c
     sizing.attribute = std::move(values);
   }
   sizing.sharp = graph.edges;
-  SizedMesh sized = refine_for_density(welded, sizing, target_of(options));
+  SizedMesh sized = refine_for_density(welded, sizing, target);
+  if (sized.sizing.vertices > kMostVertices && options.seeds.empty())
+    throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones", options.edge_length,
+                            static_cast<double>(sized.sizing.vertices), kMostVertices));
   prepared.features = on_refined(graph, sized);
   prepared.mesh = std::move(sized.mesh);
   prepared.mesh.feature_edges.clear();

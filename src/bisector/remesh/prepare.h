@@ -14,6 +14,7 @@ struct PreparedInput {
   double unit_edge = 0;     // edge length where the density is 1
   std::size_t vertices = 0; // wanted of the result
   WeldResult welded;        // without its mesh
+  bool noisy = false;       // normals are noise, and Energy::automatic means restricted
 };
 
 // Throws Error as remesh does.

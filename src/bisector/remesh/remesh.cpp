@@ -13,7 +13,6 @@
 #include "bisector/core/parallel.h"
 #include "bisector/cvt/multilevel.h"
 #include "bisector/cvt/optimise.h"
-#include "bisector/mesh/normals.h"
 #include "bisector/mesh/quality.h"
 #include "bisector/remesh/feature_recovery.h"
 #include "bisector/remesh/prepare.h"
@@ -82,6 +81,7 @@ class Pipeline {
   void to_next_level(std::size_t count);
   void meet_count(std::size_t count);
   void optimise_levels();
+  bool dual_suffices() const;
   void settle();
   Final finish() const;
   void improve_quality();
@@ -178,6 +178,14 @@ void Pipeline::optimise_levels() {
   step_.share = 0;
 }
 
+// Folds of a rough surface give cells pieces that leave no trace in the dual.
+bool Pipeline::dual_suffices() const {
+  if (constrained_) return false;
+  std::vector<Triangle> dual = extract_dual(polygons_).triangles;
+  orient(dual, state_.seeds.size());
+  return same_topology(analyse_topology(dual, state_.seeds.size()), result_.input_topology);
+}
+
 // Features and topology: mending one may break the other.
 void Pipeline::settle() {
   backend_.evaluate(state_.seeds, state_.moments, polygons_);
@@ -188,7 +196,7 @@ void Pipeline::settle() {
                                    context_);
       result_.seconds.features += seconds_since(begin);
     }
-    if (options_.topology != TopologyControl::enforce) return;
+    if (options_.topology != TopologyControl::enforce || dual_suffices()) return;
     const auto begin = Clock::now();
     topology_ = enforce_topology(backend_, state_, polygons_, result_.input_topology, step_, totals_, context_);
     if (!topology_.sheets.empty()) backend_.evaluate(state_.seeds, state_.moments, polygons_);
@@ -232,6 +240,7 @@ void Pipeline::extract() {
   const Final final = finish();
   const Dual dual = extract_dual(final.polygons);
   result_.mesh = dual_mesh(final.vertices, final.polygons);
+  if (result_.input_topology.oriented) orient(result_.mesh.triangles, result_.mesh.vertices.size());
   const std::vector<Index> vertex_of = dual_vertices(dual, final.vertices.size());
   if (!surface_.mesh.labels.empty())
     for (Index t : dual.mesh_triangle) result_.mesh.labels.push_back(surface_.mesh.labels[t]);
@@ -259,8 +268,7 @@ RemeshResult Pipeline::run() {
   const auto begin = Clock::now();
   result_.wanted = wanted_;
   result_.input_topology = analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size());
-  result_.noisy = options_.energy == Energy::automatic && has_noisy_normals(surface_.mesh, wanted_);
-  constrained_ = options_.energy == Energy::constrained || (options_.energy == Energy::automatic && !result_.noisy);
+  constrained_ = options_.energy != Energy::restricted;
   optimise_levels();
   settle();
   if (options_.min_angle > 0 && constrained_) improve_quality();
@@ -300,12 +308,14 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   RemeshOptions counted = options;
   counted.vertices = prepared.vertices;
   counted.edge_length = 0;
+  if (prepared.noisy) counted.energy = Energy::restricted;
   const Surface surface(std::move(prepared.mesh), std::move(prepared.density));
   const double preparing = seconds_since(begin);
   const std::unique_ptr<Backend> backend = make_backend(surface, options.compute, context);
   RemeshResult result = remesh(*backend, prepared.features, counted, context);
   result.welded = std::move(prepared.welded);
   result.edge_length = prepared.unit_edge;
+  result.noisy = prepared.noisy;
   result.seconds.prepare = preparing;
   result.seconds.total = seconds_since(begin);
   return result;

@@ -29,7 +29,8 @@ enum class TopologyControl {
 };
 
 enum class Energy {
-  automatic,    // constrained, but restricted where the input's normals are noise (mesh/normals.h)
+  automatic,    // constrained, but restricted where the input's normals are noise (mesh/normals.h); creases are then not
+                // looked for, and a dual that is a manifold like the input is not asked for the ball property
   constrained,  // seeds end on the surface (CCVT)
   restricted,   // seeds may leave the surface (RCVT), but for those on features
 };
@@ -100,7 +101,7 @@ struct RemeshResult {
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context = {});
 
 // The same of a backend's surface and density, with the features given and no heed to options.compute, .sizing, .weld and
-// .features; options.edge_length must be 0.
+// .features; options.edge_length must be 0, and Energy::automatic means constrained.
 RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshOptions& options,
                     const Context& context = {});
 
