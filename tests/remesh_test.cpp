@@ -151,8 +151,9 @@ TEST(RemeshHard, NonManifoldInputRunsAndReports) {
       EXPECT_EQ(result.topology.manifold, topology.manifold);
       EXPECT_EQ(result.topology.euler, topology.euler);
       const MeshTopology input = analyse_topology(mesh.triangles, mesh.vertices.size());
-      EXPECT_EQ(result.topology_matches, topology.manifold && topology.oriented && topology.closed == input.closed &&
-                                             topology.euler == input.euler && topology.components == input.components);
+      EXPECT_EQ(result.topology_matches, topology.manifold == input.manifold && topology.oriented == input.oriented &&
+                                             topology.closed == input.closed && topology.euler == input.euler &&
+                                             topology.components == input.components);
     }
 }
 

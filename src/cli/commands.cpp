@@ -115,6 +115,10 @@ void warn_of_features(Console& console, const RemeshResult& result) {
   if (result.features.broken > 0)
     console.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices",
                              result.features.broken, counted(result.features.curves, "feature curve", "feature curves")));
+  if (2 * result.features.seeds > result.mesh.vertices.size())
+    console.warn(fmt::format("features take {} of {}; for better triangles ask for more vertices, or for fewer features "
+                             "(--features)", result.features.seeds,
+                             counted(result.mesh.vertices.size(), "vertex", "vertices")));
 }
 
 void warn_of_topology(Console& console, const RemeshResult& result) {
@@ -141,7 +145,7 @@ Json faults_json(const RemeshResult& result) {
 Json features_json(const FeatureResult& features, std::size_t edges) {
   const FeatureDistance& d = features.distance;
   return {{"curves", features.curves}, {"corners", features.corners}, {"broken", features.broken}, {"edges", edges},
-          {"distance_vertices", d.vertices}, {"distance_max", std::max(d.to_reference, d.from_reference)}};
+          {"vertices", features.seeds}, {"distance_vertices", d.vertices}, {"distance_max", std::max(d.to_reference, d.from_reference)}};
 }
 
 Json weld_json(const WeldResult& welded) {

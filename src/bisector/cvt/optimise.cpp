@@ -86,8 +86,10 @@ void reseed(Backend& backend, CvtState& state) {
   for (std::size_t k = 0; k < points.size(); ++k) state.seeds[empty[k]] = points[k];
 }
 
-void start(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals) {
+void start(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
+           const Context& context) {
   for (int trial = 0;; ++trial) {
+    context.check();
     if (options.constrained) {
       backend.evaluate(state.seeds, state.moments);
       totals.count(state.moments);
@@ -162,7 +164,7 @@ void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options,
               const Context& context) {
   const auto begin = std::chrono::steady_clock::now();
   const DiagramSeconds before = totals.seconds;
-  start(backend, state, options, totals);
+  start(backend, state, options, totals, context);
 
   Lbfgs history;
   CvtState next;
@@ -184,7 +186,7 @@ void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options,
     ++totals.iterations;
     if (has_empty_cell(next)) {
       std::swap(state, next);
-      start(backend, state, options, totals);
+      start(backend, state, options, totals, context);
       history.clear();
     } else {
       std::vector<Vec3> s = next.seeds, y = next.gradient;

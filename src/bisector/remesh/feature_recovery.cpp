@@ -160,11 +160,19 @@ void remove(CvtState& state, const std::vector<char>& removed) {
   state.places.resize(kept);
 }
 
-// Puts the sliding seeds of a curve at equal distances between those that are fixed.
-void space_evenly(const FeatureCurves& curves, const CurveMeasure& measure, Index curve, CvtState& state) {
-  std::vector<std::pair<double, Index>> row;
+// The seeds of each curve.
+std::vector<std::vector<Index>> seeds_by_curve(const FeatureCurves& curves, const CvtState& state) {
+  std::vector<std::vector<Index>> on(curves.size());
   for (Index i = 0; i < state.seeds.size(); ++i)
-    if (state.places[i].curve == curve) row.push_back({measure.at(curve, state.places[i].position), i});
+    if (state.places[i].curve != kNone) on[state.places[i].curve].push_back(i);
+  return on;
+}
+
+// Puts the sliding ones of a curve's seeds at equal distances between those that are fixed.
+void space_evenly(const FeatureCurves& curves, const CurveMeasure& measure, Index curve, const std::vector<Index>& seeds,
+                  CvtState& state) {
+  std::vector<std::pair<double, Index>> row;
+  for (Index i : seeds) row.push_back({measure.at(curve, state.places[i].position), i});
   if (row.empty()) return;
   std::sort(row.begin(), row.end());
   const bool closed = curves.closed(curve);
@@ -266,8 +274,9 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
     state.seeds.push_back(curves.point(curve, position));
     state.places.push_back({Kind::fixed, curve, kNone, position});
   }
+  const std::vector<std::vector<Index>> on = seeds_by_curve(curves, state);
   for (Index k = 0; k < curves.size(); ++k)
-    if (!zones[k].empty()) space_evenly(curves, measure, k, state);
+    if (!zones[k].empty()) space_evenly(curves, measure, k, on[k], state);
 }
 
 // True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved away.
@@ -317,8 +326,10 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
     put(static_cast<Index>(state.seeds.size() - 1), fault.curve, position, meets ? Kind::fixed : Kind::curve);
   }
   remove(state, removed);
-  if (!last)
-    for (Index k : loosened) space_evenly(curves, measure, k, state);
+  if (!last && !loosened.empty()) {
+    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, state);
+    for (Index k : loosened) space_evenly(curves, measure, k, on[k], state);
+  }
   return changed;
 }
 
@@ -340,7 +351,8 @@ void clear_features(Backend& backend, CvtState& state, RestrictedPolygons& polyg
       for (const CurveInterval& i : intervals)
         if (state.places[i.cell].kind == Kind::surface) removed[i.cell] = 1;
     remove(state, removed);
-    for (Index c = 0; c < options.curves->size(); ++c) space_evenly(*options.curves, measure, c, state);
+    const std::vector<std::vector<Index>> on = seeds_by_curve(*options.curves, state);
+    for (Index c = 0; c < on.size(); ++c) space_evenly(*options.curves, measure, c, on[c], state);
     if (state.seeds.size() == count) return;
     backend.evaluate(state.seeds, state.moments, polygons);
     set_count(polygons, state.moments, count, state.seeds, state.places);

@@ -57,6 +57,17 @@ void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const 
   context.warn(line);
 }
 
+void orient_with_warning(TriangleMesh& mesh, const Context& context) {
+  if (analyse_topology(mesh.triangles, mesh.vertices.size()).oriented) return;
+  std::vector<Triangle> turned = mesh.triangles;
+  orient(turned, mesh.vertices.size());
+  if (!analyse_topology(turned, mesh.vertices.size()).oriented) return;
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < turned.size(); ++t) count += turned[t] != mesh.triangles[t];
+  mesh.triangles = std::move(turned);
+  context.warn(fmt::format("turned {} over, to run the same way round as most", plural(count, "triangle")));
+}
+
 SizingTarget target_of(const RemeshOptions& options) {
   if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
   return {options.vertices, options.edge_length};
@@ -89,9 +100,10 @@ FeatureGraph on_refined(const FeatureGraph& graph, const SizedMesh& sized) {
 PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
   PreparedInput prepared;
   prepared.welded = join(input, options);
-  const TriangleMesh welded = std::exchange(prepared.welded.mesh, {});
+  TriangleMesh welded = std::exchange(prepared.welded.mesh, {});
   const std::vector<Index>& vertex_of = prepared.welded.vertex_of;
   warn_of_weld(prepared.welded, options, context);
+  orient_with_warning(welded, context);
 
   FeatureOptions features = options.features;
   for (auto& [a, b] : features.given) {

@@ -119,6 +119,7 @@ std::vector<std::size_t> Pipeline::choose_levels() const {
 
 void Pipeline::meet_count(std::size_t count) {
   for (std::size_t size = 0; state_.seeds.size() != count && state_.seeds.size() != size;) {
+    context_.check();
     size = state_.seeds.size();
     backend_.evaluate(state_.seeds, state_.moments, polygons_);
     set_count(polygons_, state_.moments, count, state_.seeds, state_.places);
@@ -249,6 +250,9 @@ void Pipeline::extract() {
     result_.mesh.feature_edges.push_back({std::min(vertex_of[a], vertex_of[b]), std::max(vertex_of[a], vertex_of[b])});
   }
   std::sort(result_.mesh.feature_edges.begin(), result_.mesh.feature_edges.end());
+  result_.features.seeds = static_cast<std::size_t>(
+      std::count_if(state_.places.begin(), state_.places.end(),
+                    [](const SeedPlace& place) { return place.kind != SeedPlace::Kind::surface; }));
   result_.features.curves = curves_.size();
   result_.features.corners = curves_.graph().corners.size();
   result_.features.broken = features_.broken.size();

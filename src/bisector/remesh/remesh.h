@@ -66,6 +66,7 @@ struct RemeshSeconds {
 struct FeatureResult {
   std::size_t curves = 0, corners = 0;  // of the input
   std::size_t broken = 0;               // curves that are not chains of edges of the result
+  std::size_t seeds = 0;                // of the result, on features
   FeatureDistance distance;             // of the result's feature edges and the input's, before a fit
 };
 
@@ -74,8 +75,8 @@ struct RemeshResult {
   // features; labels are those of the input's triangles in which its dual vertices lie.
   TriangleMesh mesh;
   MeshTopology topology;          // of mesh
-  MeshTopology input_topology;    // after welding
-  bool topology_matches = false;  // manifold, and closed and of Euler characteristic and components as the input
+  MeshTopology input_topology;    // after welding and orienting
+  bool topology_matches = false;  // manifold, oriented, closed and of Euler characteristic and components as the input
   bool ball_property = false;     // of the final diagram
   std::size_t divided = 0;        // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
   std::vector<TopologyFault> faults;  // where it fails; indices are those of mesh's vertices, kNone if none

@@ -484,7 +484,7 @@ TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons&
 }
 
 bool same_topology(const MeshTopology& dual, const MeshTopology& input) {
-  return dual.manifold && dual.oriented && dual.closed == input.closed && dual.euler == input.euler &&
+  return dual.manifold == input.manifold && dual.oriented == input.oriented && dual.closed == input.closed && dual.euler == input.euler &&
          dual.components == input.components;
 }
 

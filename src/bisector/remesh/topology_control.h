@@ -14,7 +14,7 @@ namespace bisector {
 // The restricted Delaunay triangulation with the seeds that have triangles as vertices, in their order.
 TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons& polygons);
 
-// Whether `dual` is manifold and oriented, and closed and of Euler characteristic and components as the input.
+// Whether `dual` is manifold, oriented, closed and of Euler characteristic and components as the input.
 bool same_topology(const MeshTopology& dual, const MeshTopology& input);
 
 // A cell, edge or vertex of the diagram that breaks the topological ball property.
