@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -233,8 +236,9 @@ TEST_F(Cli, RemeshWritesWhatItSays) {
     EXPECT_GE(report["seconds"].value(key, -1.0), 0) << key;
   for (const char* key : {"pairs", "uncertain", "wider", "double", "cpu"})
     EXPECT_TRUE(report["certification"].contains(key)) << key;
-  for (const char* key : {"q_min", "q_ave", "theta_min", "theta_min_ave", "theta_below_30", "theta_max", "valence6",
-                          "distance_mean", "distance_rms", "distance_max", "self_intersections"})
+  for (const char* key : {"q_min", "q_ave", "theta_min", "theta_min_ave", "theta_below_30", "theta_max", "q_min_free",
+                          "theta_min_free", "theta_max_free", "valence6", "distance_mean", "distance_rms", "distance_max",
+                          "self_intersections"})
     EXPECT_TRUE(report["quality"].contains(key)) << key;
   EXPECT_EQ(report["topology"]["manifold"], true);
   EXPECT_EQ(report["topology"]["closed"], true);
@@ -416,6 +420,420 @@ TEST_F(Cli, AutomaticDeviceIsTheCpuWithoutAGpu) {
   EXPECT_EQ(report["device"]["kind"], "cpu");
   EXPECT_FALSE(report["device"].contains("fallback"));
   expect_failure(1, {"rvd", in("sphere.off"), "-n", "50", "--precision", "single"}, "--precision");
+}
+
+// --- options of remesh ---
+
+class CliRemesh : public Cli {
+ protected:
+  // A unit square with a value rho(x) at each vertex.
+  void write_square(const std::string& name, const std::function<double(double)>& rho) const {
+    constexpr int n = 16;
+    std::ostringstream text;
+    text.precision(17);
+    text << "ply\nformat ascii 1.0\nelement vertex " << (n + 1) * (n + 1)
+         << "\nproperty double x\nproperty double y\nproperty double z\nproperty double rho\nelement face " << 2 * n * n
+         << "\nproperty list uchar int vertex_indices\nend_header\n";
+    const TriangleMesh patch = test::grid_patch(n, n);
+    for (const Vec3& p : patch.vertices) text << p.x / n << ' ' << p.y / n << " 0 " << rho(p.x / n) << '\n';
+    for (const Triangle& t : patch.triangles) text << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+    write_text(name, text.str());
+  }
+
+  // Report of a run on `input` with more options; the result is in `output`.
+  Json remesh(const std::string& input, std::vector<std::string> more, const std::string& output = "out.ply") const {
+    more.insert(more.begin(), {"remesh", in(input), "-o", in(output), "--quiet", "--report", "-"});
+    return report_of(more);
+  }
+
+  TriangleMesh output(const std::string& name = "out.ply") const { return read_mesh(in(name)); }
+};
+
+double length(const TriangleMesh& mesh, const std::array<Index, 2>& e) {
+  return norm(mesh.vertices[e[1]] - mesh.vertices[e[0]]);
+}
+
+std::set<std::array<Index, 2>> edges_of(const TriangleMesh& mesh) {
+  std::set<std::array<Index, 2>> edges;
+  for (const Triangle& t : mesh.triangles)
+    for (int k = 0; k < 3; ++k) edges.insert({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+  return edges;
+}
+
+// Mean length of the edges whose middle has an x of that range.
+double mean_edge(const TriangleMesh& mesh, double from, double to) {
+  double sum = 0;
+  int count = 0;
+  for (const auto& e : edges_of(mesh)) {
+    const double x = 0.5 * (mesh.vertices[e[0]].x + mesh.vertices[e[1]].x);
+    if (x < from || x > to) continue;
+    sum += length(mesh, e);
+    ++count;
+  }
+  return sum / count;
+}
+
+std::map<int, double> area_of_labels(const TriangleMesh& mesh) {
+  std::map<int, double> area;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto [a, b, c] = mesh.triangles[t];
+    area[mesh.labels[t]] += 0.5 * norm(cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a]));
+  }
+  return area;
+}
+
+TEST_F(CliRemesh, OptionsThatContradictEachOther) {
+  write_text("points.xyz", "1 0 0\n-1 0 0\n0 1 0\n0 -1 0\n0 0 1\n0 0 -1\n");
+  const auto refused = [&](std::vector<std::string> more, const std::string& part) {
+    more.insert(more.begin(), {"remesh", in("sphere.off"), "-o", in("out.obj")});
+    expect_failure(2, more, part);
+  };
+  for (const char* option : {"--edge-length", "--edge-length-relative"}) {
+    refused({"-n", "100", option, "0.1"}, option);
+    refused({"--seeds", in("points.xyz"), option, "0.1"}, option);
+  }
+  refused({"--edge-length", "0.1", "--edge-length-relative", "0.1"}, "--edge-length-relative");
+  for (const char* option : {"--gradation", "--edge-min", "--edge-max"}) {
+    refused({"-n", "100", option, "0.1"}, option);
+    refused({"-n", "100", "--density", "uniform", option, "0.1"}, option);
+  }
+  for (const char* option : {"--edge-min", "--edge-max"})
+    refused({"--seeds", in("points.xyz"), "--density", "lfs", option, "0.1"}, option);
+  refused({"--seeds", in("points.xyz"), "--random-seed", "2"}, "--random-seed");
+  expect_failure(2, {"rvd", in("sphere.off"), "--seeds", in("points.xyz"), "--random-seed", "2"}, "--random-seed");
+  refused({"-n", "100", "--density", "lfs", "--edge-min", "0.2", "--edge-max", "0.1"}, "--edge-min");
+  refused({"--edge-length", "0.1", "--density", "lfs", "--edge-min", "0.2"}, "--edge-min");
+  refused({"--edge-length", "0.3", "--density", "lfs", "--edge-max", "0.2"}, "--edge-max");
+  refused({"-n", "100", "--energy", "rcvt", "--min-angle", "30"}, "--min-angle");
+}
+
+TEST_F(CliRemesh, ValuesOutOfRange) {
+  const auto refused = [&](const char* option, const std::vector<const char*>& values) {
+    for (const char* value : values) {
+      std::vector<std::string> words{"remesh", in("sphere.off"), "-o", in("out.obj"), option, value};
+      if (!std::string(option).starts_with("--edge-length")) words.insert(words.end(), {"-n", "100"});
+      expect_failure(2, words, option);
+    }
+  };
+  for (const char* option : {"--edge-length", "--edge-length-relative", "--edge-min", "--edge-max"})
+    refused(option, {"0", "-1", "inf", "nan", "1mm", ""});
+  refused("--gradation", {"-0.1", "10", "inf", "nan", "x", ""});
+  refused("--min-angle", {"-1", "60", "nan", "x", ""});
+  refused("--weld", {"-1", "inf", "nan", "x", ""});
+  refused("--features", {"0", "180", "-30", "nan", "all", "30deg", ""});
+  refused("--density", {"size", "lfs:", "lfs:0", "lfs:9", "lfs:nan", "curvature:x", "uniform:2", "attribute",
+                        "attribute:", ""});
+  for (const char* option : {"--feature-file", "--feature-output"}) refused(option, {""});
+}
+
+TEST_F(CliRemesh, WhatTheInputDoesNotAllow) {
+  write_square("square.ply", [](double) { return 1.0; });
+  write_square("zero.ply", [](double x) { return x; });
+  write_text("far.txt", "# two corners\n0 1\n0 1000000\n");
+  write_text("chord.txt", "\n0 1\n  0 288\n");
+  write_text("half.txt", "0\n");
+  const auto refused = [&](const char* input, std::vector<std::string> more, const std::string& part) {
+    more.insert(more.begin(), {"remesh", in(input), "-o", in("out.obj")});
+    expect_failure(1, more, part);
+  };
+  refused("square.ply", {"-n", "100", "--density", "attribute:size"}, "one of x, y, z, rho");
+  refused("sphere.off", {"-n", "100", "--density", "attribute:rho"}, ".ply");
+  refused("zero.ply", {"-n", "100", "--density", "attribute:rho"}, "vertex 0");
+  refused("square.ply", {"-n", "100", "--feature-file", in("missing.txt")}, "missing.txt");
+  refused("square.ply", {"-n", "100", "--feature-file", in("far.txt")}, "far.txt:3");
+  refused("square.ply", {"-n", "100", "--feature-file", in("chord.txt")}, "chord.txt:3");
+  refused("square.ply", {"-n", "100", "--feature-file", in("half.txt")}, "half.txt:1");
+  // Bounds that no mesh of so many vertices meets, and lengths that no mesh has.
+  refused("square.ply", {"-n", "100", "--density", "curvature", "--edge-min", "0.5"}, "100 vertices");
+  refused("square.ply", {"-n", "100", "--density", "curvature", "--edge-max", "0.01"}, "100 vertices");
+  refused("square.ply", {"--edge-length-relative", "3"}, "fewer than 4");
+  for (const char* tiny : {"1e-5", "1e-12", "1e-300"}) {
+    refused("square.ply", {"--edge-length", tiny}, "longer");
+    refused("square.ply", {"--edge-length", tiny, "--density", "attribute:rho"}, "longer");
+  }
+
+  // Outputs, found before a run that would take far longer than the test may.
+  const std::vector<std::string> forever{"-n", "100000", "--iterations", "1000000", "--tolerance", "0"};
+  const auto late = [&](std::vector<std::string> more, const std::string& part) {
+    more.insert(more.begin(), forever.begin(), forever.end());
+    more.insert(more.begin(), {"remesh", in("square.ply")});
+    expect_failure(1, more, part);
+  };
+  late({"-o", "-"}, "stdout");
+  late({"-o", in("out.ply"), "--preview", "-"}, "stdout");
+  late({"-o", in("out.ply"), "--feature-output", "-"}, "stdout");
+  late({"-o", in("out.ply"), "--feature-output", in("out.ply")}, "two outputs");
+  late({"-o", in("out.ply"), "--feature-output", in("missing/f.txt")}, "missing");
+  write_text("given.txt", "0 1\n");
+  late({"-o", in("out.ply"), "--feature-file", in("given.txt"), "--feature-output", in("given.txt")}, "input");
+}
+
+TEST_F(CliRemesh, FeaturesOfABoxGoThroughAFile) {
+  write_mesh(in("box.off"), test::box(2));
+  const Json first = remesh("box.off", {"-n", "150", "--features", "30", "--feature-output", in("edges.txt")}, "out.off");
+  EXPECT_EQ(first["features"]["curves"], 12);
+  EXPECT_EQ(first["features"]["corners"], 8);
+  EXPECT_EQ(first["features"]["broken"], 0);
+  EXPECT_LT(first["features"]["distance_max"].get<double>(), 1e-9);
+  const TriangleMesh mesh = output("out.off");
+  const auto edges = read_feature_edges(in("edges.txt"), mesh);
+  EXPECT_EQ(edges.size(), first["features"]["edges"]);
+  double total = 0;
+  for (const auto& e : edges) total += length(mesh, e);
+  EXPECT_NEAR(total, 12, 1e-9);
+
+  // An OFF file holds no feature edges: without the file there are none, with it they are those of the box.
+  const Json none = remesh("out.off", {"-n", "150", "--features", "none"});
+  EXPECT_EQ(none["features"]["curves"], 0);
+  const Json again = remesh("out.off", {"-n", "200", "--features", "none", "--feature-file", in("edges.txt")});
+  for (const char* key : {"curves", "corners", "broken"})
+    EXPECT_EQ(again["features"][key], first["features"][key]) << key;
+  double length_again = 0;
+  const TriangleMesh mesh_again = output();
+  for (const auto& e : mesh_again.feature_edges) length_again += length(mesh_again, e);
+  EXPECT_NEAR(length_again, 12, 1e-9);
+  EXPECT_NEAR(again["quality"]["area"].get<double>(), 6, 1e-9);
+}
+
+TEST_F(CliRemesh, FeaturesByAngle) {
+  write_mesh(in("box.off"), test::box(2));
+  const auto curves = [&](const char* features) {
+    return remesh("box.off", {"-n", "100", "--iterations", "10", "--features", features})["features"]["curves"];
+  };
+  EXPECT_EQ(curves("89"), 12);
+  EXPECT_EQ(curves("91"), 0);
+  EXPECT_EQ(curves("auto"), 12);
+  EXPECT_EQ(curves("none"), 0);
+}
+
+TEST_F(CliRemesh, EdgesFollowAnAttribute) {
+  // Edges as long as rho^(-1/4), here (1 + x)^2.
+  write_square("square.ply", [](double x) { return std::pow(1 + x, -8); });
+  const auto lengths = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"-n", "400", "--density", "attribute:rho"});
+    EXPECT_NEAR(remesh("square.ply", more)["output"]["vertices"].get<double>(), 400, 4);
+    const TriangleMesh mesh = output();
+    return std::array{mean_edge(mesh, 0, 0.25), mean_edge(mesh, 0.25, 0.75), mean_edge(mesh, 0.75, 1)};
+  };
+  const auto [fine, middle, coarse] = lengths({"--gradation", "0"});
+  // Means over the ranges, edges being as dense as 1 / h^2.
+  const auto mean = [](double a, double b) {
+    return 3 * (1 / (1 + a) - 1 / (1 + b)) / (std::pow(1 + a, -3) - std::pow(1 + b, -3));
+  };
+  EXPECT_NEAR(coarse / fine, mean(0.75, 1) / mean(0, 0.25), 0.1 * coarse / fine);
+  EXPECT_NEAR(middle / fine, mean(0.25, 0.75) / mean(0, 0.25), 0.1 * middle / fine);
+
+  // |h(x) - h(y)| <= 0.03 |x - y|, the middles of the ranges being 0.75 apart.
+  const auto slow = lengths({"--gradation", "0.03"});
+  EXPECT_LT(slow[2] - slow[0], 0.03 * 0.75 + 0.05 * slow[2]);
+  EXPECT_GT(slow[2] - slow[0], 0);
+
+  ASSERT_LT(fine, 0.042);
+  const auto no_shorter = lengths({"--gradation", "0", "--edge-min", "0.045"});
+  EXPECT_NEAR(no_shorter[0], 0.045, 0.05 * 0.045);
+  ASSERT_GT(coarse, 0.08);
+  const auto no_longer = lengths({"--gradation", "0", "--edge-max", "0.07"});
+  EXPECT_NEAR(no_longer[2], 0.07, 0.05 * 0.07);
+}
+
+TEST_F(CliRemesh, DensityFollowsTheShape) {
+  // An ellipsoid of radii 3, 1 and 1: at its tips the curvature is 3 and the local feature size 1/3, about its waist both
+  // are 1.
+  TriangleMesh ellipsoid = test::icosphere(4);
+  for (Vec3& v : ellipsoid.vertices) v.x *= 3;
+  write_mesh(in("ellipsoid.off"), ellipsoid);
+  const auto tip_by_waist = [&](const char* density) {
+    std::vector<std::string> words{"-n", "500", "--iterations", "50", "--density", density};
+    if (words.back() != "uniform") words.insert(words.end(), {"--gradation", "0"});
+    remesh("ellipsoid.off", words);
+    const TriangleMesh mesh = output();
+    return mean_edge(mesh, 2.5, 3) / mean_edge(mesh, -1, 1);
+  };
+  EXPECT_NEAR(tip_by_waist("uniform"), 1, 0.1);
+  const double lfs = tip_by_waist("lfs"), lfs4 = tip_by_waist("lfs:4"), curvature = tip_by_waist("curvature"),
+               curvature3 = tip_by_waist("curvature:3");
+  EXPECT_LT(lfs, 0.85);
+  EXPECT_LT(lfs4, 0.9 * lfs);
+  EXPECT_LT(curvature, 0.92);
+  EXPECT_LT(curvature3, 0.9 * curvature);
+}
+
+TEST_F(CliRemesh, EdgeLengthInsteadOfACount) {
+  const Json report = remesh("sphere.off", {"--edge-length", "0.2"});
+  EXPECT_EQ(report["sizing"]["edge_length"], 0.2);
+  EXPECT_EQ(report["sizing"]["wanted"], report["output"]["vertices"]);
+  EXPECT_NEAR(report["quality"]["edge_ave"].get<double>(), 0.2, 0.05 * 0.2);
+  const double share = 0.2 / bounding_box(read_mesh(in("sphere.off")).vertices).diagonal();
+  const Json relative = remesh("sphere.off", {"--edge-length-relative", std::to_string(share)});
+  EXPECT_NEAR(relative["sizing"]["edge_length"].get<double>(), 0.2, 1e-4);
+  EXPECT_NEAR(relative["output"]["vertices"].get<double>(), report["output"]["vertices"].get<double>(), 2);
+}
+
+TEST_F(CliRemesh, LabelsStay) {
+  TriangleMesh plane = test::grid_patch(8, 8);
+  for (const Triangle& t : plane.triangles)
+    plane.labels.push_back((plane.vertices[t[0]].x + plane.vertices[t[1]].x + plane.vertices[t[2]].x) / 3 < 3 ? 7 : -2);
+  const std::map<int, double> areas{{7, 24}, {-2, 40}};
+  ASSERT_EQ(area_of_labels(plane), areas);
+  for (const char* name : {"plane.ply", "plane.obj"}) {
+    write_mesh(in(name), plane);
+    for (const char* out : {"out.ply", "out.obj"}) {
+      EXPECT_EQ(remesh(name, {"-n", "120"}, out)["features"]["broken"], 0);
+      const TriangleMesh mesh = output(out);
+      ASSERT_EQ(mesh.labels.size(), mesh.triangles.size()) << out;
+      const auto found = area_of_labels(mesh);
+      ASSERT_EQ(found.size(), 2u);
+      for (const auto& [label, area] : areas) EXPECT_NEAR(found.at(label), area, 1e-9) << name << ' ' << out;
+      // The square's four sides, and the line between the labels.
+      double between = 0, total = 0;
+      for (const auto& e : mesh.feature_edges) {
+        total += length(mesh, e);
+        if (std::abs(mesh.vertices[e[0]].x - 3) < 1e-9 && std::abs(mesh.vertices[e[1]].x - 3) < 1e-9)
+          between += length(mesh, e);
+      }
+      EXPECT_NEAR(total, 40, 1e-9);
+      EXPECT_NEAR(between, 8, 1e-9);
+    }
+  }
+  const TriangleMesh ply = output("out.ply"), obj = output("out.obj");
+  EXPECT_EQ(ply.triangles, obj.triangles);
+  EXPECT_EQ(ply.labels, obj.labels);
+  EXPECT_EQ(ply.feature_edges, obj.feature_edges);
+
+  // Formats without labels say so, and borders between labels are no features where none are wanted.
+  const std::vector<std::string> words{"remesh", in("plane.ply"), "-o", in("out.off"), "-n", "120", "--iterations", "5"};
+  const Result lost = run(words);
+  EXPECT_EQ(lost.code, 0);
+  EXPECT_TRUE(lost.err.starts_with("bisector: warning: ")) << lost.err;
+  EXPECT_NE(lost.err.find("labels"), std::string::npos) << lost.err;
+  EXPECT_EQ(remesh("plane.ply", {"-n", "120", "--iterations", "5", "--features", "none"})["features"]["curves"], 4);
+}
+
+TEST_F(CliRemesh, CutsAreWelded) {
+  // The halves of a cube, with vertices of their own along the cut and `gap` apart.
+  const auto write_halves = [&](const char* name, double gap) {
+    const TriangleMesh cube = test::box(4);
+    TriangleMesh halves;
+    for (const bool upper : {false, true}) {
+      std::map<Index, Index> copy;
+      for (const Triangle& t : cube.triangles) {
+        if ((cube.vertices[t[0]].z + cube.vertices[t[1]].z + cube.vertices[t[2]].z > 1.5) != upper) continue;
+        Triangle& added = halves.triangles.emplace_back();
+        for (int k = 0; k < 3; ++k) {
+          const auto [at, fresh] = copy.try_emplace(t[k], static_cast<Index>(halves.vertices.size()));
+          if (fresh) halves.vertices.push_back(cube.vertices[t[k]] + (upper ? Vec3{0, 0, gap} : Vec3{0, 0, 0}));
+          added[k] = at->second;
+        }
+      }
+    }
+    write_mesh(in(name), halves);
+  };
+  write_halves("touching.off", 0);
+  write_halves("apart.off", 0.2);
+  const std::vector<std::string> few{"-n", "200", "--iterations", "20"};
+  const auto joined = [&](const char* name, std::vector<std::string> more) {
+    more.insert(more.begin(), few.begin(), few.end());
+    const Json report = remesh(name, more);
+    const Json& weld = report["weld"];
+    const bool closed = report["topology"]["closed"];
+    EXPECT_EQ(weld["border_edges_before"], 32);
+    EXPECT_EQ(weld["border_edges_after"], closed ? 0 : 32);
+    EXPECT_EQ(weld["merged_vertices"], closed ? 16 : 0);
+    EXPECT_EQ(weld["removed_triangles"], 0);
+    EXPECT_EQ(report["topology"]["components"], closed ? 1 : 2);
+    EXPECT_EQ(report["topology"]["matches_input"], true);
+    return closed;
+  };
+  EXPECT_TRUE(joined("touching.off", {}));
+  EXPECT_FALSE(joined("apart.off", {}));
+  EXPECT_FALSE(joined("apart.off", {"--weld", "0.1"}));
+  EXPECT_TRUE(joined("apart.off", {"--weld", "0.21"}));
+  const Result said =
+      run({"remesh", in("apart.off"), "-o", in("out.off"), "-n", "200", "--iterations", "5", "--weld", "0.21"});
+  EXPECT_NE(said.err.find("welded 16 vertices"), std::string::npos) << said.err;
+}
+
+TEST_F(CliRemesh, EnergyFitAndQualityPass) {
+  const auto radius = [&] {
+    double sum = 0;
+    const TriangleMesh mesh = output();
+    for (const Vec3& v : mesh.vertices) sum += norm(v);
+    return sum / static_cast<double>(mesh.vertices.size());
+  };
+  const Json on = remesh("sphere.off", {"-n", "100"});
+  const double on_surface = radius();
+  EXPECT_EQ(on["noisy"], false);
+  EXPECT_FALSE(on.contains("fit"));
+  EXPECT_EQ(remesh("sphere.off", {"-n", "100", "--energy", "ccvt"})["energy"], on["energy"]);
+  const Json off = remesh("sphere.off", {"-n", "100", "--energy", "rcvt"});
+  EXPECT_LT(radius(), 0.999 * on_surface);  // centroids of cells of a convex surface
+  EXPECT_FALSE(off.contains("improved"));
+
+  // Triangles that cut off less on either side.
+  for (const char* energy : {"ccvt", "rcvt"}) {
+    const double before = (energy == std::string("ccvt") ? on : off)["quality"]["distance_rms"];
+    const Json fitted = remesh("sphere.off", {"-n", "100", "--energy", energy, "--fit"});
+    EXPECT_LT(fitted["quality"]["distance_rms"].get<double>(), 0.8 * before) << energy;
+    EXPECT_GT(fitted["fit"]["iterations"], 0);
+  }
+
+  const Json unimproved = remesh("sphere.off", {"-n", "100", "--iterations", "3", "--min-angle", "0"});
+  EXPECT_FALSE(unimproved.contains("improved"));
+  const Json improved = remesh("sphere.off", {"-n", "100", "--iterations", "3"});
+  EXPECT_GT(improved["quality"]["theta_min"], unimproved["quality"]["theta_min"]);
+}
+
+TEST_F(CliRemesh, NoiseKeepsSeedsOffTheSurface) {
+  TriangleMesh rough = test::icosphere(4);
+  test::SplitMix64 numbers(1);
+  for (Vec3& v : rough.vertices) v = numbers.range(0.96, 1.04) * v;
+  write_mesh(in("rough.off"), rough);
+  const std::vector<std::string> words{"-n", "300", "--iterations", "10", "--topology", "off"};
+  const Json report = remesh("rough.off", words);
+  EXPECT_EQ(report["noisy"], true);
+  EXPECT_FALSE(report.contains("improved"));
+  std::vector<std::string> constrained = words;
+  constrained.insert(constrained.end(), {"--energy", "ccvt"});
+  EXPECT_EQ(remesh("rough.off", constrained)["noisy"], false);
+}
+
+TEST_F(CliRemesh, ReportHasWhatIsDocumented) {
+  write_mesh(in("box.off"), test::box(2));
+  const Json report = remesh("box.off", {"-n", "100", "--fit"});
+  const auto at = [&](const char* key) {
+    const Json::json_pointer pointer(key);
+    return report.contains(pointer) ? report.at(pointer) : Json();
+  };
+  for (const char* key :
+       {"/output/vertices", "/sizing/wanted", "/topology/divided", "/features/curves", "/features/corners",
+        "/features/broken", "/features/edges", "/weld/merged_vertices", "/weld/split_edges", "/weld/removed_triangles",
+        "/weld/border_edges_before", "/weld/border_edges_after", "/improved/made", "/improved/inserted",
+        "/improved/removed", "/improved/missed", "/fit/iterations", "/fit/damped", "/fit/restored"}) {
+    ASSERT_TRUE(at(key).is_number_integer()) << key;
+    EXPECT_GE(at(key).get<long>(), 0) << key;
+  }
+  for (const char* key : {"/sizing/edge_length", "/features/distance_vertices", "/features/distance_max",
+                          "/seconds/prepare", "/seconds/features", "/seconds/topology", "/seconds/improve",
+                          "/seconds/fit", "/seconds/remesh", "/seconds/quality", "/seconds/preview"}) {
+    ASSERT_TRUE(at(key).is_number()) << key;
+    EXPECT_GE(at(key).get<double>(), 0) << key;
+  }
+  for (const char* key : {"/noisy", "/topology/ball_property", "/topology/matches_input"})
+    EXPECT_TRUE(at(key).is_boolean()) << key;
+  EXPECT_TRUE(at("/topology/faults").is_array());
+
+  // With two or three cells around the tube, some meet twice: faults name them.
+  write_mesh(in("torus.off"), test::torus(24, 12));
+  const Json few = remesh("torus.off", {"-n", "20", "--topology", "off"});
+  EXPECT_EQ(few["topology"]["ball_property"], false);
+  ASSERT_FALSE(few["topology"]["faults"].empty());
+  for (const Json& fault : few["topology"]["faults"]) {
+    EXPECT_FALSE(fault["what"].get<std::string>().empty());
+    EXPECT_EQ(fault["position"].size(), 3u);
+    ASSERT_FALSE(fault["vertices"].empty());
+    for (const Json& v : fault["vertices"])
+      EXPECT_TRUE(v.is_null() || v.get<std::size_t>() < few["output"]["vertices"].get<std::size_t>()) << v;
+  }
 }
 
 // An environment variable for as long as it lives.

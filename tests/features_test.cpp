@@ -519,5 +519,11 @@ TEST(Noise, TellsNoisyFromDetailed) {
   }
 }
 
+// A scan of a smooth surface with needles that are folded up to half a turn.
+TEST(Features, FoldedNeedlesAreNoCreases) {
+  const FeatureGraph graph = detect_features(read_mesh(BISECTOR_SOURCE_DIR "/examples/smooth.off"));
+  EXPECT_TRUE(graph.edges.empty());
+}
+
 }  // namespace
 }  // namespace bisector::test

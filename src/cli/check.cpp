@@ -93,7 +93,7 @@ Json check_report(const std::vector<DeviceCheckRow>& rows, std::size_t failed, d
 void run(const CheckCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{}, {report_path, {}}}, {});
+  check_outputs({{}, report_output(report_path)}, {});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
   const std::string device = choose_device(command.device);

@@ -111,6 +111,12 @@ void require_sound(const RemeshResult& result) {
     throw Error("the seeds are too few to span a triangle of this surface; ask for more vertices");
 }
 
+void warn_of_labels(Console& console, const TriangleMesh& input, const std::string& output) {
+  const std::string extension = extension_of(output);
+  if (input.labels.empty() || extension == ".ply" || extension == ".obj") return;
+  console.warn(fmt::format("{}: {} files hold no face labels, the input's are lost; write .ply or .obj", output, extension));
+}
+
 void warn_of_features(Console& console, const RemeshResult& result) {
   if (result.features.broken > 0)
     console.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices",
@@ -181,7 +187,7 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length}};
   report["noisy"] = result.noisy;
   report["weld"] = weld_json(result.welded);
-  if (options.min_angle > 0)
+  if (options.min_angle > 0 && options.energy != Energy::restricted && !result.noisy)
     report["improved"] = {{"made", result.improved.made}, {"inserted", result.improved.inserted},
                           {"removed", result.improved.removed}, {"missed", result.improved.missed}};
   if (options.fit)
@@ -430,7 +436,10 @@ Precision parse_precision(const std::string& word) {
 void run(const RemeshCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{command.output, kMeshFormats}, {command.preview, {".png"}}, {command.feature_output, {}}, {report_path, {}}},
+  check_outputs({{command.output, kMeshFormats},
+                 {command.preview, {".png"}},
+                 {command.feature_output, {}},
+                 report_output(report_path)},
                 {command.input, command.seeds, command.feature_file});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
@@ -440,6 +449,7 @@ void run(const RemeshCommand& command) {
   const Stopwatch reading;
   const TriangleMesh input = read_mesh(command.input, context);
   const RemeshOptions options = remesh_options(command, input);
+  warn_of_labels(console, input, command.output);
   double io = reading.seconds();
 
   console.phase("preparing");
@@ -476,7 +486,7 @@ void run(const RemeshCommand& command) {
 void run(const RvdCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{command.output, {".ply"}}, {command.preview, {".png"}}, {command.pairs, {}}, {report_path, {}}},
+  check_outputs({{command.output, {".ply"}}, {command.preview, {".png"}}, {command.pairs, {}}, report_output(report_path)},
                 {command.input, command.seeds});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
@@ -515,7 +525,7 @@ void run(const RvdCommand& command) {
 void run(const QualityCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{}, {report_path, {}}}, {command.mesh, command.reference});
+  check_outputs({{}, report_output(report_path)}, {command.mesh, command.reference});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
   const Context context = console.context();

@@ -58,7 +58,7 @@ std::string describe(const DeviceDescription& device) {
 }  // namespace
 
 void run(const DevicesCommand& command) {
-  check_outputs({{}, {command.report, {}}}, {});
+  check_outputs({report_output(command.report)}, {});
   const DeviceList list = list_devices();
   Console console(false, command.report == "-");
   console.print(fmt::format("cpu       {}: {}, {} of memory, double precision", processor_name(),

@@ -158,10 +158,11 @@ CLI::App* add_command(CLI::App& program, const char* name, const char* about, co
 CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
   CLI::App* app = add_command(
       program, "remesh", "Make a high-quality triangle mesh of a surface.",
-      "bisector remesh IN -o OUT -n N [options]",
+      "bisector remesh IN -o OUT -n N|--edge-length L [options]",
       "Examples:\n"
       "  bisector remesh bunny.off -o out.obj -n 10000\n"
-      "  bisector remesh part.stl -o out.ply -n 5000 --report out.json --preview out.png\n\n"
+      "  bisector remesh part.stl -o out.ply -n 5000 --report out.json --preview out.png\n"
+      "  bisector remesh part.stl -o out.ply --edge-length 0.5 --features 30\n\n"
       "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written.");
   add_file(app, "IN", command.input, "FILE", "surface to remesh")->required();
   add_file(app, "-o", command.output, "FILE", "mesh to write")->required()->group("Output");
@@ -308,24 +309,40 @@ CLI::App* add_check(CLI::App& program, CheckCommand& command) {
   return app;
 }
 
-// What options ask of each other.
-void check_usage(const RemeshCommand& command) {
-  const int sizes = (command.options.vertices > 0) + (command.options.edge_length > 0) + (command.edge_length_relative > 0);
-  if (command.seeds.empty() && sizes == 0)
+// What options ask of each other: an option that would change nothing is an error.
+void check_usage(const RemeshCommand& command, const CLI::App& app) {
+  const auto given = [&](const char* option) { return app.count(option) > 0; };
+  const auto refuse = [&](const char* option, const char* why) {
+    if (given(option)) throw CLI::ValidationError(std::string(option) + ": " + why);
+  };
+  const int sizes = given("-n") + given("--edge-length") + given("--edge-length-relative");
+  if (!given("--seeds") && sizes == 0)
     throw CLI::ValidationError("how many vertices? give -n N, --edge-length L or --seeds FILE.xyz");
   if (sizes > 1) throw CLI::ValidationError("-n, --edge-length and --edge-length-relative: give one of them");
-  if (!command.seeds.empty() && command.options.vertices == 0 && sizes > 0)
-    throw CLI::ValidationError("--edge-length: seeds from a file have their own number");
+  if (given("--seeds")) {
+    for (const char* option : {"--edge-length", "--edge-length-relative", "--edge-min", "--edge-max"})
+      refuse(option, "seeds from a file have their own number; leave one of the two out");
+    refuse("--random-seed", "seeds from a file are not random; leave one of the two out");
+    if (command.options.levels > 1) throw CLI::ValidationError("--levels: seeds from a file imply one level");
+  }
   const SizingOptions& sizing = command.options.sizing;
   if (sizing.max_edge > 0 && sizing.min_edge > sizing.max_edge)
     throw CLI::ValidationError("--edge-min is more than --edge-max");
-  if (!command.seeds.empty() && command.options.levels > 1)
-    throw CLI::ValidationError("--levels: seeds from a file imply one level");
+  const double length = command.options.edge_length;
+  if (length > 0 && (length < sizing.min_edge || (sizing.max_edge > 0 && length > sizing.max_edge)))
+    throw CLI::ValidationError("--edge-length is not between --edge-min and --edge-max");
+  if (command.density == "uniform")
+    for (const char* option : {"--gradation", "--edge-min", "--edge-max"})
+      refuse(option, "a uniform density has edges of one length; choose another --density");
+  if (command.energy == "rcvt" && command.options.min_angle > 0)
+    refuse("--min-angle", "seeds have to be on the surface for that; leave out --energy rcvt");
 }
 
-void check_usage(const RvdCommand& command) {
+void check_usage(const RvdCommand& command, const CLI::App& app) {
   if (command.seeds.empty() && command.count == 0)
     throw CLI::ValidationError("which seeds? give --seeds FILE.xyz or -n N");
+  if (!command.seeds.empty() && app.count("--random-seed"))
+    throw CLI::ValidationError("--random-seed: seeds from a file are not random; leave one of the two out");
 }
 
 int fail_usage(const std::string& message, const CLI::App* command) {
@@ -383,8 +400,8 @@ int main(int argc, char** argv) {
 
   try {
     program.parse(argc, argv);
-    if (remesh_app->parsed()) check_usage(remesh);
-    if (rvd_app->parsed()) check_usage(rvd);
+    if (remesh_app->parsed()) check_usage(remesh, *remesh_app);
+    if (rvd_app->parsed()) check_usage(rvd, *rvd_app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);
     return fail_usage(error.what(), chosen());

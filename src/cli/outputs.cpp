@@ -32,9 +32,7 @@ bool is_special(const fs::path& path) {
 
 void check_extension(const Output& output) {
   if (output.extensions.empty()) return;
-  std::string extension = fs::path(output.path).extension();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const std::string extension = extension_of(output.path);
   if (std::find(output.extensions.begin(), output.extensions.end(), extension) == output.extensions.end())
     throw Error(fmt::format("{}: '{}' is not a format that can be written here; use {}", output.path, extension,
                             fmt::join(output.extensions, ", ")));
@@ -66,11 +64,19 @@ void check_writable(const std::string& path) {
 
 }  // namespace
 
+std::string extension_of(const std::string& path) {
+  std::string extension = fs::path(path).extension();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs) {
   std::vector<fs::path> taken;
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     const std::string& path = outputs[k].path;
-    if (path.empty() || path == "-") continue;
+    if (path.empty()) continue;
+    if (path == "-") throw Error("-: only a report can be written to stdout; name a file");
     check_extension(outputs[k]);
     check_writable(path);
     const fs::path target = target_of(path);

@@ -11,8 +11,13 @@ struct Output {
   std::vector<std::string> extensions;  // the formats that can be written; empty: any name
 };
 
-// Throws Error if a format is unknown, a folder is missing or not writable, two outputs share a name, or an output
-// other than the first would replace an input.
+std::string extension_of(const std::string& path);  // in lower case, with the dot
+
+// A report that goes to stdout needs no check.
+inline Output report_output(const std::string& path) { return {path == "-" ? "" : path, {}}; }
+
+// Throws Error if a format is unknown, a path is "-", a folder is missing or not writable, two outputs share a name, or
+// an output other than the first would replace an input.
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
 inline const std::vector<std::string> kMeshFormats{".off", ".obj", ".ply", ".stl"};

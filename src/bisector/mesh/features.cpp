@@ -71,6 +71,10 @@ class Folds {
   std::vector<double> bend;   // of the surface beside the edge, about the edge: the greater of both sides, radians
 
   const Vec3& point(Index v) const { return points_[v]; }
+  double area(std::size_t t) const {
+    const Triangle& v = triangles_[t];
+    return 0.5 * norm(cross(point(v[1]) - point(v[0]), point(v[2]) - point(v[0])));
+  }
   double length(std::size_t e) const { return norm(point(table.edges[e][1]) - point(table.edges[e][0])); }
   std::size_t edge_of(std::size_t half_edge) const { return edge_of_[half_edge]; }
 
@@ -201,6 +205,9 @@ constexpr double kDisorderWeight = 5;        // ... by this times its disorder
 constexpr std::size_t kEnough = 12;          // inner vertices that tell whether a chain is folded evenly
 constexpr double kLeastDisorder = 0.4;       // of a chain that is folded evenly, of that around it
 constexpr double kShortest = 5;              // least length of what is joined to nothing, in edges around it ...
+constexpr double kRoom = 0.02;                   // area beside what is joined to nothing, of its extent squared ...
+constexpr std::size_t kFewEdges = 60;            // ... if it has fewer edges than this
+constexpr std::size_t kManyTriangles = 500;      // beside it, are room enough
 constexpr std::size_t kManyEdges = 12;       // ... unless it has as many edges as this
 
 class CreaseFinder {
@@ -266,6 +273,43 @@ class CreaseFinder {
     }
   }
 
+  // Whether most of the chain has room on both sides: a part of the surface that is not cut off by the chain itself, as slivers
+  // are that noise has folded.
+  bool has_room(const std::vector<std::size_t>& component, const std::vector<Index>& vertices, double length) const {
+    const auto farthest = [&](Index from) {
+      return *std::max_element(vertices.begin(), vertices.end(), [&](Index a, Index b) {
+        return norm2(folds_.point(a) - folds_.point(from)) < norm2(folds_.point(b) - folds_.point(from));
+      });
+    };
+    const Index a = farthest(vertices.front()), b = farthest(a);
+    const double needed = kRoom * norm2(folds_.point(b) - folds_.point(a));
+    double narrow = 0;
+    for (const std::size_t e : component)
+      for (const std::size_t* h = folds_.table.half_edges.begin(e); h != folds_.table.half_edges.end(e); ++h)
+        if (!reaches(*h / 3, needed)) {
+          narrow += folds_.length(e);
+          break;
+        }
+    return narrow < 0.5 * length;
+  }
+
+  // Whether the triangles that are reached from one without crossing creases have so much area.
+  bool reaches(std::size_t triangle, double needed) const {
+    std::vector<std::size_t> part{triangle};
+    double area = 0;
+    for (std::size_t i = 0; i < part.size() && area < needed; ++i) {
+      area += folds_.area(part[i]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t e = folds_.edge_of(3 * part[i] + k);
+        if (crease_[e]) continue;
+        for (const std::size_t* h = folds_.table.half_edges.begin(e); h != folds_.table.half_edges.end(e); ++h)
+          if (std::find(part.begin(), part.end(), *h / 3) == part.end()) part.push_back(*h / 3);
+      }
+      if (part.size() > kManyTriangles) return true;
+    }
+    return area >= needed;
+  }
+
   // Creases of a part are folded evenly along their way, or between faces that are hardly folded; ridges of a scan are
   // neither, and the disorder is the smaller of the two.
   bool is_sound(const std::vector<std::size_t>& component) const {
@@ -299,6 +343,7 @@ class CreaseFinder {
     if (!attached && component.size() < kManyEdges &&
         length * static_cast<double>(around_count) < kShortest * around_length)
       return false;
+    if (!attached && component.size() < kFewEdges && !has_room(component, vertices, length)) return false;
     double disorder = 0;
     if (!around.empty()) {
       const auto middle = around.begin() + static_cast<std::ptrdiff_t>((around.size() - 1) / 2);

@@ -27,6 +27,7 @@ constexpr double kLongest = 2;                // edge length by h above which an
 constexpr double kSteepest = 2;               // ratio of densities above which it is
 constexpr double kShortest = 0.5;             // edge length by h below which it is not for the sake of that ratio
 constexpr std::size_t kTriangles = 400'000;   // refinement stops there
+constexpr double kMostVertices = 1e8;         // that an edge length may ask for
 constexpr int kRounds = 8;                    // of refinement and calibration
 constexpr double kSettled = 1e-3;             // relative error of the calibration
 
@@ -126,6 +127,9 @@ void check(const TriangleMesh& mesh, const SizingOptions& options, const SizingT
 void check_bounds(const Domain& domain, const SizingOptions& options, const SizingTarget& target) {
   const double least = options.min_edge, largest = options.max_edge;
   if (target.vertices == 0) {
+    if (uniform_count(domain, target.edge_length) > kMostVertices)
+      throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones",
+                              target.edge_length, kMostVertices));
     if (target.edge_length < least || (largest > 0 && target.edge_length > largest))
       throw Error(fmt::format("sizing: the edge length {:g} is not within the bounds asked for; change it or "
                               "the least or largest edge length", target.edge_length));
