@@ -4,113 +4,20 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <set>
 
 #include "bisector/cvt/cpu_backend.h"
 #include "bisector/cvt/curves.h"
 #include "bisector/cvt/multilevel.h"
 #include "bisector/cvt/optimise.h"
-#include "bisector/mesh/topology.h"
 #include "bisector/remesh/feature_recovery.h"
 #include "bisector/voronoi/dual.h"
 #include "diagram.h"
+#include "featured.h"
 #include "models.h"
 
 namespace bisector::test {
 namespace {
-
-// Sharp edges and borders of a generated mesh, as a graph whose corners are the vertices with other than two of them and sharp
-// turns: written here so that nothing of what is tested is used.
-FeatureGraph sharp_graph(const TriangleMesh& mesh) {
-  FeatureGraph graph;
-  const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
-  const auto normal = [&](std::size_t half_edge) {
-    const Triangle& t = mesh.triangles[half_edge / 3];
-    const Vec3 n = cross(mesh.vertices[t[1]] - mesh.vertices[t[0]], mesh.vertices[t[2]] - mesh.vertices[t[0]]);
-    return (1 / norm(n)) * n;
-  };
-  for (std::size_t e = 0; e < table.edges.size(); ++e) {
-    const std::size_t* h = table.half_edges.begin(e);
-    if (table.half_edges.size(e) != 2 || dot(normal(h[0]), normal(h[1])) < 0.8) graph.edges.push_back(table.edges[e]);
-  }
-  std::vector<std::vector<Index>> around(mesh.vertices.size());
-  for (const auto& [a, b] : graph.edges) {
-    around[a].push_back(b);
-    around[b].push_back(a);
-  }
-  const auto is_corner = [&](Index v) {
-    if (around[v].size() != 2) return true;
-    const Vec3 p = mesh.vertices[around[v][0]] - mesh.vertices[v], q = mesh.vertices[around[v][1]] - mesh.vertices[v];
-    return dot(p, q) > -0.7 * norm(p) * norm(q);
-  };
-  for (Index v = 0; v < around.size(); ++v)
-    if (!around[v].empty() && is_corner(v)) graph.corners.push_back(v);
-  std::set<std::array<Index, 2>> used;
-  const auto walk = [&](Index a, Index b) {
-    FeatureCurve curve{{a}, false};
-    while (true) {
-      if (!used.insert({std::min(a, b), std::max(a, b)}).second) break;
-      if (b == curve.vertices.front() && !is_corner(b)) {
-        curve.closed = true;
-        break;
-      }
-      curve.vertices.push_back(b);
-      if (is_corner(b)) break;
-      const Index next = around[b][0] == a ? around[b][1] : around[b][0];
-      a = b;
-      b = next;
-    }
-    if (curve.vertices.size() > 1) graph.curves.push_back(curve);
-  };
-  for (Index v : graph.corners)
-    for (Index w : around[v]) walk(v, w);
-  for (const auto& [a, b] : graph.edges)
-    if (!used.contains({a, b})) walk(a, b);
-  return graph;
-}
-
-// Walls of height 1 over a closed polygon in the plane, with a bottom and a top fanned out from their middle.
-TriangleMesh prism(const std::vector<std::array<double, 2>>& polygon) {
-  TriangleMesh mesh;
-  const Index n = static_cast<Index>(polygon.size());
-  Vec3 middle;
-  for (double z : {0.0, 1.0})
-    for (const auto& [x, y] : polygon) {
-      mesh.vertices.push_back({x, y, z});
-      middle += (0.5 / n) * Vec3{x, y, 0};
-    }
-  mesh.vertices.push_back(middle);
-  mesh.vertices.push_back(middle + Vec3{0, 0, 1});
-  for (Index i = 0; i < n; ++i) {
-    const Index j = (i + 1) % n;
-    mesh.triangles.push_back({i, j, n + j});
-    mesh.triangles.push_back({i, n + j, n + i});
-    mesh.triangles.push_back({2 * n, j, i});
-    mesh.triangles.push_back({2 * n + 1, n + i, n + j});
-  }
-  return mesh;
-}
-
-TriangleMesh cylinder(int sides) {
-  std::vector<std::array<double, 2>> polygon;
-  for (int k = 0; k < sides; ++k)
-    polygon.push_back({std::cos(2 * std::numbers::pi * k / sides), std::sin(2 * std::numbers::pi * k / sides)});
-  return prism(polygon);
-}
-
-// A wedge with an edge of the given angle, in radians.
-TriangleMesh wedge(double angle) { return prism({{0, 0}, {1, 0}, {std::cos(angle), std::sin(angle)}}); }
-
-struct Model {
-  const char* name;
-  TriangleMesh mesh;
-};
-
-std::vector<Model> models() {
-  return {{"box", box(4)},           {"cylinder", cylinder(48)},   {"wedge30", wedge(0.5)}, {"wedge3", wedge(0.05)},
-          {"patch", wavy_patch(12)}, {"pages", pages()},           {"slab", prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}})}};
-}
 
 // --- Geometry of curves ---
 
@@ -158,67 +65,19 @@ TEST(Curves, NearestIsTheNearestWithinReach) {
 
 // --- Gradients and steps along curves ---
 
-TEST(Curves, GradientIsTheSlopeOfTheEnergyAlongTheCurve) {
-  for (const Model& model : models()) {
+TEST(Curves, GradientIsTheSlopeOfTheEnergyAlongPlaces) {
+  for (const FeaturedModel& model : featured_models()) {
     SCOPED_TRACE(model.name);
-    std::vector<double> density;
-    for (const Vec3& v : model.mesh.vertices) density.push_back(1 + v.x * v.x + 0.5 * v.y + v.z);
-    const Surface surface(model.mesh, density);
-    const FeatureCurves curves(sharp_graph(model.mesh), model.mesh.vertices);
-    const CurveMeasure measure(surface, curves);
-    CpuBackend backend(surface, NeighbourSource::nearest);
-    PlacedSeeds placed = seeds_on_features(curves, measure, measure.scale(150));
-    SplitMix64 random(3);
-    for (std::size_t i = 0; i < placed.seeds.size(); ++i) {
-      SeedPlace& place = placed.places[i];
-      if (place.kind != SeedPlace::Kind::curve) continue;
-      place.position = curves.wrap(place.curve, place.position + random.range(-0.01, 0.01));
-      placed.seeds[i] = curves.point(place.curve, place.position);
-    }
-    for (const Vec3& x : random_seeds(model.mesh, 100, 7)) placed.seeds.push_back(x);
-    placed.places.resize(placed.seeds.size());
-    CvtState state;
-    state.seeds = placed.seeds;
-    state.places = placed.places;
-    OptimiseOptions options;
-    options.constrained = true;
-    options.curves = &curves;
-    OptimiseTotals totals;
-    complete(backend, state, options, totals);
-    EXPECT_EQ(state.seeds, placed.seeds);
-    int tried = 0;
-    for (std::size_t i = 0; i < state.seeds.size(); ++i) {
-      const SeedPlace& place = state.places[i];
-      if (place.kind == SeedPlace::Kind::fixed) {
-        EXPECT_EQ(state.gradient[i], Vec3{});
-      }
-      if (place.kind != SeedPlace::Kind::curve) continue;
-      const double h = 1e-5;
-      // Not where the step would leave the segment: the slope jumps there.
-      const std::size_t k = curves.segment_at(place.curve, place.position);
-      if (place.position - h < curves.position_of(place.curve, k) ||
-          place.position + h > curves.position_of(place.curve, k + 1))
-        continue;
-      double energies[2];
-      for (int side : {0, 1}) {
-        std::vector<Vec3> moved = state.seeds;
-        moved[i] = curves.point(place.curve, place.position + (side ? h : -h));
-        CellMoments moments;
-        backend.evaluate(moved, moments);
-        energies[side] = moments.energy;
-      }
-      const Vec3 tangent = curves.tangent(place.curve, place.position);
-      const double scale = 2 * state.moments.cells[i].mass * std::sqrt(state.moments.cells[i].second / state.moments.cells[i].mass);
-      EXPECT_NEAR(dot(state.gradient[i], tangent), (energies[1] - energies[0]) / (2 * h), 1e-4 * scale);
-      EXPECT_NEAR(norm(state.gradient[i]), std::abs(dot(state.gradient[i], tangent)), 1e-14 * scale);
-      ++tried;
-    }
-    EXPECT_GT(tried, 5);
+    const PlacedProblem problem(model.mesh, 150);
+    CpuBackend backend(problem.surface, NeighbourSource::nearest);
+    const CvtState state = problem.completed_on(backend);
+    EXPECT_EQ(state.seeds, problem.placed.seeds);
+    expect_slopes(backend, problem, state, {1e-4, 1e-4, 1});
   }
 }
 
 TEST(Curves, OptimisingKeepsSeedsOnTheirPlaces) {
-  for (const Model& model : models()) {
+  for (const FeaturedModel& model : featured_models()) {
     SCOPED_TRACE(model.name);
     const Surface surface(model.mesh);
     const FeatureCurves curves(sharp_graph(model.mesh), model.mesh.vertices);
@@ -306,7 +165,7 @@ TEST(CurveMeasure, PositionsInvertMeasuresAndFollowTheDensity) {
 // --- Cells along a curve ---
 
 TEST(FeatureTrace, IntervalsCoverEachCurveAndBelongToTheNearestSeed) {
-  for (const Model& model : models()) {
+  for (const FeaturedModel& model : featured_models()) {
     SCOPED_TRACE(model.name);
     const Surface surface(model.mesh);
     const FeatureCurves curves(sharp_graph(model.mesh), model.mesh.vertices);
@@ -341,7 +200,7 @@ TEST(FeatureTrace, IntervalsCoverEachCurveAndBelongToTheNearestSeed) {
 class Recovery : public testing::TestWithParam<int> {};
 
 TEST_P(Recovery, EveryCurveIsAChainOfDualEdges) {
-  const Model model = models()[static_cast<std::size_t>(GetParam())];
+  const FeaturedModel model = featured_models()[static_cast<std::size_t>(GetParam())];
   const Surface surface(model.mesh);
   const FeatureCurves curves(sharp_graph(model.mesh), model.mesh.vertices);
   const CurveMeasure measure(surface, curves);
@@ -392,8 +251,8 @@ TEST_P(Recovery, EveryCurveIsAChainOfDualEdges) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, Recovery, testing::Range(0, static_cast<int>(models().size())),
-                         [](const auto& test) { return std::string(models()[static_cast<std::size_t>(test.param)].name); });
+INSTANTIATE_TEST_SUITE_P(Models, Recovery, testing::Range(0, static_cast<int>(featured_models().size())),
+                         [](const auto& test) { return std::string(featured_models()[static_cast<std::size_t>(test.param)].name); });
 
 TEST(RecoveryReport, AMissingCurveIsReported) {
   const TriangleMesh mesh = box(4);

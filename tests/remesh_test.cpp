@@ -229,6 +229,25 @@ TEST(RemeshOptionsTest, ProgressRunsForwardAndCancelStops) {
   EXPECT_EQ(reports, 5);
 }
 
+// A needle-like cone: the tip is a corner, but its cell must not be wrapped by two others.
+TEST(RemeshHard, AThinTipKeepsTheTopology) {
+  TriangleMesh cone;
+  const Index sides = 32;
+  for (Index k = 0; k < sides; ++k) {
+    const double t = 2 * 3.141592653589793 * k / sides;
+    cone.vertices.push_back({std::cos(t), std::sin(t), 0});
+    cone.triangles.push_back({k, (k + 1) % sides, sides});
+    cone.triangles.push_back({(k + 1) % sides, k, sides + 1});
+  }
+  cone.vertices.push_back({0, 0, 20});
+  cone.vertices.push_back({0, 0, 0});
+  const RemeshResult result = remesh(cone, options_for(1000));
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_TRUE(result.ball_property);
+  EXPECT_EQ(result.features.broken, 0u);
+  EXPECT_EQ(result.features.curves, 1u);
+}
+
 TEST(RemeshErrors, AreOneLineThatSaysWhatToDo) {
   const auto message = [](const TriangleMesh& mesh, const RemeshOptions& options) {
     try {

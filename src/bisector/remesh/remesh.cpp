@@ -29,6 +29,7 @@ using Clock = std::chrono::steady_clock;
 // are put on the surface move little.
 constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0.05;
 constexpr int kSettlingRounds = 3;
+constexpr int kFreedSteps = 20;
 constexpr double kFitQuality = 0.7;  // what fitting may bring better triangles down to
 constexpr double kMaxAngle = 91;  // degrees; goal of the final pass
 
@@ -82,6 +83,8 @@ class Pipeline {
   void meet_count(std::size_t count);
   void optimise_levels();
   bool dual_suffices() const;
+  bool free_tips();
+  std::vector<Vec3> all_vertices() const;
   void settle();
   Final finish() const;
   void improve_quality();
@@ -187,6 +190,29 @@ bool Pipeline::dual_suffices() const {
   return same_topology(analyse_topology(dual, state_.seeds.size()), result_.input_topology);
 }
 
+// Seeds at tips where topology fails are no longer held there: two cells may wrap around a tip that is thin. True if there are any.
+bool Pipeline::free_tips() {
+  std::vector<char> on_curve(curves_.graph().corners.size(), 0);
+  for (Index c = 0; c < curves_.size(); ++c)
+    for (Index end : curves_.ends(c))
+      if (end != kNone) on_curve[end] = 1;
+  bool freed = false;
+  for (const TopologyFault& fault : topology_faults(topology_.ball, all_vertices()))
+    for (Index seed : fault.seeds) {
+      if (seed >= state_.places.size() || state_.places[seed].corner == kNone || on_curve[state_.places[seed].corner]) continue;
+      state_.places[seed] = {};
+      freed = true;
+    }
+  return freed;
+}
+
+// The seeds, then the sheets of divided cells.
+std::vector<Vec3> Pipeline::all_vertices() const {
+  std::vector<Vec3> vertices = state_.seeds;
+  vertices.insert(vertices.end(), topology_.sheets.begin(), topology_.sheets.end());
+  return vertices;
+}
+
 // Features and topology: mending one may break the other.
 void Pipeline::settle() {
   backend_.evaluate(state_.seeds, state_.moments, polygons_);
@@ -200,6 +226,11 @@ void Pipeline::settle() {
     if (options_.topology != TopologyControl::enforce || dual_suffices()) return;
     const auto begin = Clock::now();
     topology_ = enforce_topology(backend_, state_, polygons_, result_.input_topology, step_, totals_, context_);
+    if (!topology_.ball.holds && round + 1 < kSettlingRounds && free_tips()) {
+      step_.iterations = kFreedSteps;
+      optimise(backend_, state_, step_, totals_, context_);
+      continue;
+    }
     if (!topology_.sheets.empty()) backend_.evaluate(state_.seeds, state_.moments, polygons_);
     result_.seconds.topology += seconds_since(begin);
     // What could not be kept once will not be the next time.
