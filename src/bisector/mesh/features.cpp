@@ -71,9 +71,10 @@ class Folds {
   std::vector<double> bend;   // of the surface beside the edge, about the edge: the greater of both sides, radians
 
   const Vec3& point(Index v) const { return points_[v]; }
-  double area(std::size_t t) const {
+  // Of a triangle, with lengths multiplied by `scale`.
+  double area(std::size_t t, double scale) const {
     const Triangle& v = triangles_[t];
-    return 0.5 * norm(cross(point(v[1]) - point(v[0]), point(v[2]) - point(v[0])));
+    return 0.5 * norm(cross(scale * (point(v[1]) - point(v[0])), scale * (point(v[2]) - point(v[0]))));
   }
   double length(std::size_t e) const { return norm(point(table.edges[e][1]) - point(table.edges[e][0])); }
   std::size_t edge_of(std::size_t half_edge) const { return edge_of_[half_edge]; }
@@ -282,23 +283,23 @@ class CreaseFinder {
       });
     };
     const Index a = farthest(vertices.front()), b = farthest(a);
-    const double needed = kRoom * norm2(folds_.point(b) - folds_.point(a));
+    const double extent = norm(folds_.point(b) - folds_.point(a));
     double narrow = 0;
     for (const std::size_t e : component)
       for (const std::size_t* h = folds_.table.half_edges.begin(e); h != folds_.table.half_edges.end(e); ++h)
-        if (!reaches(*h / 3, needed)) {
+        if (!reaches(*h / 3, 1 / extent)) {
           narrow += folds_.length(e);
           break;
         }
     return narrow < 0.5 * length;
   }
 
-  // Whether the triangles that are reached from one without crossing creases have so much area.
-  bool reaches(std::size_t triangle, double needed) const {
+  // Whether the triangles that are reached from one without crossing creases have the area, with lengths multiplied by `scale`.
+  bool reaches(std::size_t triangle, double scale) const {
     std::vector<std::size_t> part{triangle};
     double area = 0;
-    for (std::size_t i = 0; i < part.size() && area < needed; ++i) {
-      area += folds_.area(part[i]);
+    for (std::size_t i = 0; i < part.size() && area < kRoom; ++i) {
+      area += folds_.area(part[i], scale);
       for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t e = folds_.edge_of(3 * part[i] + k);
         if (crease_[e]) continue;
@@ -307,7 +308,7 @@ class CreaseFinder {
       }
       if (part.size() > kManyTriangles) return true;
     }
-    return area >= needed;
+    return area >= kRoom;
   }
 
   // Creases of a part are folded evenly along their way, or between faces that are hardly folded; ridges of a scan are

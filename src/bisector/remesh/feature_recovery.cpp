@@ -42,13 +42,16 @@ struct Found {
   FeatureReport report;
 };
 
-// Triangles of the dual at each edge, as often as the diagram has them.
-std::map<std::array<Index, 2>, Index> dual_edge_counts(const Dual& dual) {
+// Triangles of the dual at each edge between seeds on features, as often as the diagram has them.
+std::map<std::array<Index, 2>, Index> dual_edge_counts(const Dual& dual, const std::vector<SeedPlace>& places) {
+  const auto placed = [&](Index seed) { return places[seed].kind != Kind::surface; };
   std::map<std::array<Index, 2>, Index> counts;
   for (std::size_t k = 0; k < dual.triangles.size(); ++k) {
     const Triangle& t = dual.triangles[k];
-    for (int m = 0; m < 3; ++m)
-      counts[{std::min(t[m], t[(m + 1) % 3]), std::max(t[m], t[(m + 1) % 3])}] += dual.multiplicity[k];
+    for (int m = 0; m < 3; ++m) {
+      const Index a = t[m], b = t[(m + 1) % 3];
+      if (placed(a) && placed(b)) counts[{std::min(a, b), std::max(a, b)}] += dual.multiplicity[k];
+    }
   }
   return counts;
 }
@@ -56,7 +59,7 @@ std::map<std::array<Index, 2>, Index> dual_edge_counts(const Dual& dual) {
 Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
                   const RestrictedPolygons& polygons) {
   const std::vector<std::vector<CurveInterval>> traces = trace.trace(polygons);
-  const std::map<std::array<Index, 2>, Index> dual_edges = dual_edge_counts(extract_dual(polygons));
+  const std::map<std::array<Index, 2>, Index> dual_edges = dual_edge_counts(extract_dual(polygons), places);
   Found found;
   std::map<std::array<Index, 2>, Index> taken;  // the curve that has an edge of the dual
   std::vector<Index> visits(places.size(), 0);

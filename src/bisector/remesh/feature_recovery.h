@@ -1,10 +1,10 @@
 // Making the dual contain every feature curve as a chain of edges (thesis 4.4.3).
 //
 // A curve is in the dual if it runs through the cells of its own seeds alone, once through each, and every two that follow
-// each other on it have an edge in the dual with a triangle on each sheet. A foreign cell on a curve is snapped to it if there
-// is room, moved away if it hardly touches it, and met with one more seed on the curve if it belongs to another curve. At a
-// corner with an acute angle that seed lies as far from the corner as the foreign one: seeds at equal distances do not own
-// parts of each other's curve, however small the angle. Such pairs are fixed.
+// each other on it have an edge in the dual with a triangle on each sheet. A foreign cell on a curve is moved away if it
+// hardly touches it, put elsewhere if the curve has its seeds, snapped to the curve if it lacks some, and met with one more
+// seed on the curve if it belongs to another curve: across from the foreign one, or, where the two curves meet at a corner, as
+// far from it: seeds at equal distances do not own parts of each other's curve, however small the angle. Such pairs are fixed.
 #pragma once
 
 #include <array>
