@@ -221,6 +221,7 @@ TEST_P(Recovery, EveryCurveIsAChainOfDualEdges) {
     RestrictedPolygons polygons;
     optimise(backend, state, options, totals, {});
     clear_features(backend, state, polygons, trace, measure, options, totals, {});
+    options.constrained = true;
     const FeatureReport report =
         recover_features(backend, state, polygons, trace, measure, measure.scale(count), options, totals, {});
     EXPECT_TRUE(report.broken.empty());

@@ -268,7 +268,7 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
   }
   for (std::size_t i = 0; i < state.seeds.size(); ++i) {
     const SeedPlace& place = state.places[i];
-    if (place.kind != Kind::curve) continue;
+    if (place.curve == kNone) continue;
     for (const auto& [from, to] : zones[place.curve])
       if (place.position >= from && place.position <= to) removed[i] = 1;
   }
@@ -367,7 +367,6 @@ FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPoly
                                const CurveMeasure& measure, double c, OptimiseOptions options, OptimiseTotals& totals,
                                const Context& context) {
   const FeatureCurves& curves = *options.curves;
-  options.constrained = true;
   const std::size_t count = state.seeds.size(), most = count + count / 4 + kMostAdded;
   protect_acute_corners(curves, measure, c, state);
   PlacedSeeds best;

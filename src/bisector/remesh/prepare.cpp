@@ -40,15 +40,13 @@ WeldResult join(const TriangleMesh& input, const RemeshOptions& options) {
   return useful ? welded : keep_apart(input, topology.boundary_edges);
 }
 
-template <class T>
-std::string plural(std::size_t count, const T& word) {
+std::string plural(std::size_t count, const char* word) {
   return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
 }
 
 void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const Context& context) {
   if (welded.merged_vertices + welded.split_edges + welded.degenerate_triangles + welded.duplicate_triangles == 0) return;
-  std::string line = fmt::format("welded {}", plural(welded.merged_vertices, "vertice"));
-  if (welded.merged_vertices == 1) line = "welded 1 vertex";
+  std::string line = fmt::format("welded {} {}", welded.merged_vertices, welded.merged_vertices == 1 ? "vertex" : "vertices");
   if (welded.split_edges) line += fmt::format(", split {} at cracks", plural(welded.split_edges, "edge"));
   if (welded.degenerate_triangles + welded.duplicate_triangles)
     line += fmt::format(", removed {}", plural(welded.degenerate_triangles + welded.duplicate_triangles, "triangle"));

@@ -306,6 +306,7 @@ RemeshResult Pipeline::run() {
   constrained_ = options_.energy != Energy::restricted;
   optimise_levels();
   settle();
+  if (featured()) complete(backend_, state_, step_, totals_);
   if (options_.min_angle > 0 && constrained_) improve_quality();
   extract();
   if (options_.fit) {
