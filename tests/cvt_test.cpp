@@ -453,7 +453,7 @@ TEST(Constrain, ProjectsToTheOwnCellAndNotThroughAThinPart) {
   cells.values = {0, 1};
   std::vector<Vec3> seeds{{0.25, 0.25, 0.09}, {0.25, 0.25, 0.01}, {5, 5, 5}};
   std::vector<Vec3> normals(3, Vec3{1, 0, 0});
-  project_to_cells(surface, cells, seeds, normals);
+  project_to_cells(surface, cells, {}, seeds, normals);
   EXPECT_LE(norm(seeds[0] - Vec3{0.25, 0.25, 0}), 1e-15);
   EXPECT_LE(norm(seeds[1] - Vec3{0.25, 0.25, 0.1}), 1e-15);
   EXPECT_EQ(seeds[2], (Vec3{5, 5, 5}));

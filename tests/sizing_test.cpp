@@ -14,6 +14,7 @@
 #include "bisector/mesh/quality.h"
 #include "bisector/mesh/topology.h"
 #include "bisector/remesh/remesh.h"
+#include "bisector/mesh/size_field.h"
 #include "bisector/remesh/sizing.h"
 #include "models.h"
 
@@ -314,7 +315,7 @@ void check_refinement(const TriangleMesh& mesh, const SizedMesh& sized) {
   std::map<std::array<Index, 2>, int> edges;
   for (const auto& e : edge_table(fine.triangles, fine.vertices.size()).edges) edges[e] = 1;
   for (const auto& [a, b] : edge_table(mesh.triangles, mesh.vertices.size()).edges) {
-    const std::vector<Index> chain = edge_chain(sized, a, b);
+    const std::vector<Index> chain = edge_chain(sized.splits, a, b);
     ASSERT_GE(chain.size(), 2u);
     EXPECT_EQ(chain.front(), a);
     EXPECT_EQ(chain.back(), b);
@@ -324,7 +325,7 @@ void check_refinement(const TriangleMesh& mesh, const SizedMesh& sized) {
       length += norm(fine.vertices[chain[i]] - fine.vertices[chain[i - 1]]);
     }
     EXPECT_NEAR(length, norm(mesh.vertices[b] - mesh.vertices[a]), 1e-12 * length);
-    std::vector<Index> back = edge_chain(sized, b, a);
+    std::vector<Index> back = edge_chain(sized.splits, b, a);
     std::reverse(back.begin(), back.end());
     EXPECT_EQ(back, chain);
   }

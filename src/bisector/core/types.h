@@ -47,6 +47,18 @@ struct TriangleMesh {
   std::vector<std::array<Index, 2>> feature_edges = {};
 };
 
+using Tetrahedron = std::array<Index, 4>;
+
+// Tetrahedra over shared vertices. Facet k of a tetrahedron is the one opposite its corner k.
+struct TetMesh {
+  std::vector<Vec3> vertices;
+  std::vector<Tetrahedron> tets;  // det(b - a, c - a, d - a) > 0 unless said otherwise
+  std::vector<std::int32_t> regions = {};  // of each tetrahedron, e.g. its material; or empty
+  std::vector<Triangle> boundary = {};     // marked triangles, on the boundary counter-clockwise seen from outside; or empty
+  std::vector<std::int32_t> boundary_labels = {};       // of each marked triangle, or empty
+  std::vector<std::array<Index, 2>> feature_edges = {}; // edges marked as features
+};
+
 // Compressed sparse rows: row i is values[offsets[i] .. offsets[i + 1]).
 template <class T>
 struct Csr {

@@ -27,10 +27,11 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
   return a + (vb * scale) * ab + (vc * scale) * ac;
 }
 
-void project_to_cells(const Surface& surface, const Csr<Index>& cells, std::vector<Vec3>& seeds,
-                      std::vector<Vec3>& normals) {
+void project_to_cells(const Surface& surface, const Csr<Index>& cells, const std::vector<SeedPlace>& places,
+                      std::vector<Vec3>& seeds, std::vector<Vec3>& normals) {
   normals.resize(seeds.size());
   parallel_each(seeds.size(), [&](std::size_t i) {
+    if (!places.empty() && places[i].kind == SeedPlace::Kind::interior) return;
     const Vec3 p = seeds[i];
     double best = std::numeric_limits<double>::infinity();
     for (const Index* t = cells.begin(i); t != cells.end(i); ++t) {

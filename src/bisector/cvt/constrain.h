@@ -5,15 +5,16 @@
 #include <vector>
 
 #include "bisector/core/types.h"
+#include "bisector/cvt/curves.h"
 #include "bisector/voronoi/surface.h"
 
 namespace bisector {
 
 // Moves every seed to the nearest point of the triangles of its cell, and not to the globally nearest triangle, which may
 // lie on another sheet of a thin part. `normals` receives the unit normal there. A seed without triangles stays, and has
-// the normal it had.
-void project_to_cells(const Surface& surface, const Csr<Index>& cells, std::vector<Vec3>& seeds,
-                      std::vector<Vec3>& normals);
+// the normal it had; and so do the seeds inside a solid. `places`: of each seed, or empty.
+void project_to_cells(const Surface& surface, const Csr<Index>& cells, const std::vector<SeedPlace>& places,
+                      std::vector<Vec3>& seeds, std::vector<Vec3>& normals);
 
 // Nearest point to p of the triangle (a, b, c).
 Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);

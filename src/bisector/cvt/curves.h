@@ -11,9 +11,10 @@ namespace bisector {
 // Where a seed may be.
 struct SeedPlace {
   enum class Kind : unsigned char {
-    surface,  // anywhere on the surface
-    curve,    // on one feature curve
-    fixed,    // where it is
+    surface,   // anywhere on the surface
+    curve,     // on one feature curve
+    fixed,     // where it is
+    interior,  // anywhere: the inside of a solid
   };
   Kind kind = Kind::surface;
   Index curve = kNone;   // the feature curve it lies on, if one alone

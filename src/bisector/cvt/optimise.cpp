@@ -31,6 +31,7 @@ Vec3 held(const Vec3& g, const CvtState& state, std::size_t i, const OptimiseOpt
       const Vec3 tangent = options.curves->tangent(state.places[i].curve, state.places[i].position);
       return dot(g, tangent) * tangent;
     }
+    case Kind::interior: return g;
     case Kind::surface: break;
   }
   return options.constrained ? g - dot(g, state.normals[i]) * state.normals[i] : g;
@@ -40,7 +41,7 @@ Vec3 held(const Vec3& g, const CvtState& state, std::size_t i, const OptimiseOpt
 // seeds then.
 void hold(const Surface& surface, const Csr<Index>& cells, const std::vector<Vec3>& before, const OptimiseOptions& options,
           CvtState& state) {
-  if (options.constrained) project_to_cells(surface, cells, state.seeds, state.normals);
+  if (options.constrained) project_to_cells(surface, cells, state.places, state.seeds, state.normals);
   for (std::size_t i = 0; i < state.places.size(); ++i) {
     SeedPlace& place = state.places[i];
     if (place.kind == Kind::fixed) state.seeds[i] = before[i];
@@ -54,7 +55,7 @@ void hold(const Surface& surface, const Csr<Index>& cells, const std::vector<Vec
 void evaluate(Backend& backend, const OptimiseOptions& options, CvtState& state, OptimiseTotals& totals) {
   backend.evaluate(state.seeds, state.moments);
   totals.count(state.moments);
-  const double total = backend.surface().mass;
+  const double total = backend.mass();
   // A diagram whose cells do not add up is never used.
   const bool covers = std::abs(state.moments.mass - total) <= backend.mass_tolerance() * total;
   state.energy = covers ? state.moments.energy : std::numeric_limits<double>::infinity();
@@ -66,7 +67,8 @@ void evaluate(Backend& backend, const OptimiseOptions& options, CvtState& state,
 }
 
 bool is_lost(const CvtState& state, std::size_t i) {
-  return state.moments.cells[i].mass <= 0 && kind_of(state, i) == Kind::surface;
+  const Kind kind = kind_of(state, i);
+  return state.moments.cells[i].mass <= 0 && (kind == Kind::surface || kind == Kind::interior);
 }
 
 bool has_empty_cell(const CvtState& state) {
@@ -75,13 +77,34 @@ bool has_empty_cell(const CvtState& state) {
   return false;
 }
 
+// Puts seeds inside a solid that own nothing into the cells of highest energy, half the root mean square distance of their
+// points from the seed.
+void reseed_interior(CvtState& state, const std::vector<Index>& empty) {
+  const std::vector<Moments>& cells = state.moments.cells;
+  std::vector<Index> order;
+  for (Index i = 0; i < cells.size(); ++i)
+    if (cells[i].mass > 0) order.push_back(i);
+  const std::size_t count = std::min(empty.size(), order.size());
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(), [&](Index a, Index b) {
+    return cells[a].second != cells[b].second ? cells[a].second > cells[b].second : a < b;
+  });
+  for (std::size_t k = 0; k < count; ++k) {
+    const Moments& cell = cells[order[k]];
+    const Vec3 towards = (1 / cell.mass) * cell.first;
+    const double length = norm(towards), spread = 0.5 * std::sqrt(cell.second / cell.mass);
+    const Vec3 step = length > 0.1 * spread ? (spread / length) * towards : Vec3{spread, 0, 0};
+    state.seeds[empty[k]] = state.seeds[order[k]] + step;
+  }
+}
+
 // Puts the seeds of empty cells at far corners of the cells of highest energy.
 void reseed(Backend& backend, CvtState& state) {
   RestrictedPolygons polygons;
   backend.evaluate(state.seeds, state.moments, polygons);
-  std::vector<Index> empty;
+  std::vector<Index> empty, inside;
   for (Index i = 0; i < state.seeds.size(); ++i)
-    if (is_lost(state, i)) empty.push_back(i);
+    if (is_lost(state, i)) (kind_of(state, i) == Kind::interior ? inside : empty).push_back(i);
+  reseed_interior(state, inside);
   const std::vector<Vec3> points = insertion_points(polygons, state.seeds, state.places, state.moments, empty.size());
   for (std::size_t k = 0; k < points.size(); ++k) state.seeds[empty[k]] = points[k];
 }
@@ -101,7 +124,7 @@ void start(Backend& backend, CvtState& state, const OptimiseOptions& options, Op
     reseed(backend, state);
   }
   if (!std::isfinite(state.energy))
-    throw Error("the diagram does not cover the surface; its coordinates may span too many magnitudes");
+    throw Error("the diagram does not cover the domain; its coordinates may span too many magnitudes");
 }
 
 std::vector<double> preconditioner(const CellMoments& moments) {
@@ -155,7 +178,7 @@ void complete(Backend& backend, CvtState& state, const OptimiseOptions& options,
     backend.evaluate(state.seeds, state.moments);
     std::vector<Vec3> feet = state.seeds;
     state.normals.resize(feet.size());
-    project_to_cells(backend.surface(), state.moments.triangles, feet, state.normals);
+    project_to_cells(backend.surface(), state.moments.triangles, state.places, feet, state.normals);
   }
   evaluate(backend, options, state, totals);
 }

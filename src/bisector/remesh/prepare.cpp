@@ -71,28 +71,6 @@ SizingTarget target_of(const RemeshOptions& options) {
   return {options.vertices, options.edge_length};
 }
 
-// The graph on a mesh whose edges were bisected.
-FeatureGraph on_refined(const FeatureGraph& graph, const SizedMesh& sized) {
-  if (sized.splits.empty()) return graph;
-  FeatureGraph refined;
-  refined.corners = graph.corners;
-  for (const FeatureCurve& curve : graph.curves) {
-    FeatureCurve finer = curve;
-    finer.vertices.clear();
-    const std::size_t count = curve.vertices.size();
-    for (std::size_t k = 0; k + (curve.closed ? 0 : 1) < count; ++k) {
-      const std::vector<Index> chain = edge_chain(sized, curve.vertices[k], curve.vertices[(k + 1) % count]);
-      finer.vertices.insert(finer.vertices.end(), chain.begin(), chain.end() - 1);
-      for (std::size_t e = 1; e < chain.size(); ++e)
-        refined.edges.push_back({std::min(chain[e - 1], chain[e]), std::max(chain[e - 1], chain[e])});
-    }
-    if (!curve.closed) finer.vertices.push_back(curve.vertices.back());
-    refined.curves.push_back(std::move(finer));
-  }
-  std::sort(refined.edges.begin(), refined.edges.end());
-  return refined;
-}
-
 }  // namespace
 
 PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
@@ -134,7 +112,7 @@ PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, c
   if (sized.sizing.vertices > kMostVertices && options.seeds.empty())
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones", options.edge_length,
                             static_cast<double>(sized.sizing.vertices), kMostVertices));
-  prepared.features = on_refined(graph, sized);
+  prepared.features = split_features(graph, sized.splits);
   prepared.mesh = std::move(sized.mesh);
   prepared.mesh.feature_edges.clear();
   prepared.mesh.labels.clear();

@@ -43,6 +43,8 @@ int share_of(int iterations, double share) { return static_cast<int>(std::ceil(i
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 void check_options(const RemeshOptions& options) {
+  if (!options.places.empty() && options.places.size() != options.seeds.size())
+    throw Error(fmt::format("there are {} places for {} seeds; give one for each", options.places.size(), options.seeds.size()));
   if (!options.seeds.empty()) {
     if (options.seeds.size() < 4) throw Error("a remeshed surface needs at least 4 seeds; give more");
     return;
@@ -157,7 +159,8 @@ void Pipeline::optimise_levels() {
   const std::vector<std::size_t> counts = choose_levels();
   state_.seeds =
       options_.seeds.empty() ? initial_seeds(surface_, counts.front(), options_.random_seed) : options_.seeds;
-  place_on_features(counts.front());
+  if (options_.places.empty()) place_on_features(counts.front());
+  else state_.places = options_.places;
 
   // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
   double total = constrained_ ? kConstrainedShare * cost(counts.back()) : 0;
@@ -274,6 +277,9 @@ void Pipeline::extract() {
   result_.mesh = dual_mesh(final.vertices, final.polygons);
   if (result_.input_topology.oriented) orient(result_.mesh.triangles, result_.mesh.vertices.size());
   const std::vector<Index> vertex_of = dual_vertices(dual, final.vertices.size());
+  result_.places.resize(result_.mesh.vertices.size());
+  for (Index i = 0; i < state_.places.size(); ++i)
+    if (vertex_of[i] != kNone) result_.places[vertex_of[i]] = state_.places[i];
   if (!surface_.mesh.labels.empty())
     for (Index t : dual.mesh_triangle) result_.mesh.labels.push_back(surface_.mesh.labels[t]);
   for (const auto& [a, b] : features_.edges) {

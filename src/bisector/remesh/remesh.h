@@ -40,6 +40,8 @@ struct RemeshOptions {
   std::size_t vertices = 0;
   double edge_length = 0;
   std::vector<Vec3> seeds;                 // start from these, in one level; topology control may add as many as it takes
+  // Of each seed, for the overload with a backend: those on features are there already. Empty: features get seeds of their own.
+  std::vector<SeedPlace> places = {};
 
   SizingOptions sizing;
   FeatureOptions features;
@@ -74,6 +76,7 @@ struct RemeshResult {
   // The restricted Delaunay triangulation of the seeds that own a cell. Its feature_edges are the edges along the input's
   // features; labels are those of the input's triangles in which its dual vertices lie.
   TriangleMesh mesh;
+  std::vector<SeedPlace> places;  // of mesh's vertices
   MeshTopology topology;          // of mesh
   MeshTopology input_topology;    // after welding and orienting
   bool topology_matches = false;  // manifold, oriented, closed and of Euler characteristic and components as the input

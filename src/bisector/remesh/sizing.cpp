@@ -14,8 +14,8 @@
 #include "bisector/mesh/curvature.h"
 #include "bisector/mesh/degenerate.h"
 #include "bisector/mesh/local_feature_size.h"
+#include "bisector/mesh/size_field.h"
 #include "bisector/mesh/topology.h"
-#include "bisector/voronoi/hilbert.h"
 
 namespace bisector {
 namespace {
@@ -295,77 +295,6 @@ Sizing to_sizing(const Domain& domain, const std::vector<double>& lengths, const
   return sizing;
 }
 
-// Boxes over points in a spatial order, with the least length in each.
-class LengthTree {
- public:
-  LengthTree(const std::vector<Vec3>& points, const std::vector<double>& lengths) : points_(points), lengths_(lengths) {
-    for (std::size_t n = points.size(), below = 0;; ++below) {
-      const std::size_t width = below == 0 ? kLeaf : kArity;
-      std::vector<Node> level((n + width - 1) / width);
-      parallel_each(level.size(), [&](std::size_t i) {
-        Node& node = level[i];
-        for (std::size_t k = i * width; k < std::min(n, (i + 1) * width); ++k) {
-          const Node child = below == 0 ? Node{{points[k], points[k]}, lengths[k]} : levels_[below - 1][k];
-          if (k == i * width) node = child;
-          for (int m = 0; m < 3; ++m) {
-            node.box.lo[m] = std::min(node.box.lo[m], child.box.lo[m]);
-            node.box.hi[m] = std::max(node.box.hi[m], child.box.hi[m]);
-          }
-          node.least = std::min(node.least, child.least);
-        }
-      });
-      n = level.size();
-      levels_.push_back(std::move(level));
-      if (n == 1) break;
-    }
-  }
-
-  // The least of `best` and length + slope * distance over all points; `at` becomes a point where that is so.
-  double query(const Vec3& q, double slope, double best, Index& at) const {
-    descend(levels_.size() - 1, 0, q, slope, best, at);
-    return best;
-  }
-
- private:
-  static constexpr std::size_t kLeaf = 8, kArity = 4;
-
-  struct Node {
-    Box box;
-    double least = 0;
-  };
-
-  static double bound(const Node& node, const Vec3& q, double slope) {
-    Vec3 gap;
-    for (int m = 0; m < 3; ++m) gap[m] = std::max({0.0, node.box.lo[m] - q[m], q[m] - node.box.hi[m]});
-    return node.least + slope * norm(gap);
-  }
-
-  void descend(std::size_t level, std::size_t i, const Vec3& q, double slope, double& best, Index& at) const {
-    if (level == 0) {
-      for (std::size_t k = i * kLeaf; k < std::min(points_.size(), (i + 1) * kLeaf); ++k) {
-        const double h = lengths_[k] + slope * norm(q - points_[k]);
-        if (h < best) {
-          best = h;
-          at = static_cast<Index>(k);
-        }
-      }
-      return;
-    }
-    const std::vector<Node>& below = levels_[level - 1];
-    std::array<std::pair<double, std::size_t>, kArity> order;
-    std::size_t count = 0;
-    for (std::size_t k = i * kArity; k < std::min(below.size(), (i + 1) * kArity); ++k)
-      order[count++] = {bound(below[k], q, slope), k};
-    std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count));
-    for (std::size_t k = 0; k < count && order[k].first < best; ++k)
-      descend(level - 1, order[k].second, q, slope, best, at);
-  }
-
-  const std::vector<Vec3>& points_;
-  const std::vector<double>& lengths_;
-  std::vector<std::vector<Node>> levels_;
-};
-
 // Bisection of edges with all their triangles.
 class Refiner {
  public:
@@ -509,29 +438,6 @@ class Refiner {
 
 }  // namespace
 
-std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths,
-                                    double gradation) {
-  if (points.empty()) return {};
-  const std::vector<Index> order = hilbert_order(points);
-  std::vector<Vec3> sorted(points.size());
-  std::vector<double> h(points.size()), limited(points.size());
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    sorted[k] = points[order[k]];
-    h[k] = lengths[order[k]];
-  }
-  const LengthTree tree(sorted, h);
-  parallel_chunks(sorted.size(), 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
-    Index at = static_cast<Index>(begin);
-    for (std::size_t k = begin; k < end; ++k) {
-      // What limits the point before mostly limits this one, too.
-      const double best = std::min(h[k], h[at] + gradation * norm(sorted[k] - sorted[at]));
-      if (best == h[k]) at = static_cast<Index>(k);
-      limited[order[k]] = tree.query(sorted[k], gradation, best, at);
-    }
-  });
-  return limited;
-}
-
 MeshEstimate estimate_mesh(const TriangleMesh& mesh, const Sizing& sizing) {
   std::vector<double> h(mesh.vertices.size(), sizing.unit_edge);
   for (std::size_t v = 0; v < sizing.density.size(); ++v) h[v] /= fourth_root(sizing.density[v]);
@@ -590,22 +496,6 @@ SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& opti
       for (Index& face : sized.mesh.face_of_triangle) face = mesh.face_of_triangle[face];
   }
   return sized;
-}
-
-std::vector<Index> edge_chain(const SizedMesh& sized, Index a, Index b) {
-  std::vector<Index> chain{a}, ahead{b};
-  while (!ahead.empty()) {
-    const Index from = chain.back(), to = ahead.back();
-    const std::array<Index, 3> edge{std::min(from, to), std::max(from, to), 0};
-    const auto split = std::lower_bound(sized.splits.begin(), sized.splits.end(), edge);
-    if (split != sized.splits.end() && (*split)[0] == edge[0] && (*split)[1] == edge[1]) {
-      ahead.push_back((*split)[2]);
-    } else {
-      chain.push_back(to);
-      ahead.pop_back();
-    }
-  }
-  return chain;
 }
 
 }  // namespace bisector

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bisector/core/types.h"
+#include "bisector/mesh/edge_splits.h"
 
 namespace bisector {
 
@@ -51,12 +52,6 @@ struct MeshEstimate {
 };
 MeshEstimate estimate_mesh(const TriangleMesh& mesh, const Sizing& sizing);
 
-// Lengths h of a mesh's vertices made to obey |h(x) - h(y)| <= gradation |x - y|: h(x) = min over k of h_k + gradation
-// |x - p_k|, with Euclidean distances. The cells that meet this field are Euclidean, too: one that is large
-// beside a fine sheet reaches through to it, however far away it is on the surface. It also needs no connectivity.
-std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths,
-                                    double gradation);
-
 // The density for a mesh as it is. With h0 the edge length of a uniform result and D the diagonal of the box, lfs is
 // taken within [h0 / 4, D], or from the spacing of its sample on if that is larger, and |kappa_max| within [1 / D,
 // 4 / h0]: what is smaller than the edges could show is no reason to be finer still, and no density is 0 or infinite.
@@ -76,7 +71,7 @@ struct SizedMesh {
   TriangleMesh mesh;
   Sizing sizing;
   std::vector<Index> parent;                 // input triangle of each triangle
-  std::vector<std::array<Index, 3>> splits;  // lower end, upper end, middle of every bisected edge, ascending
+  EdgeSplits splits;
 };
 
 // Bisects edges that are longer than 2 h at one of their ends, or over which rho more than doubles unless they are
@@ -85,8 +80,5 @@ struct SizedMesh {
 // rounded; lfs is measured there, other fields are linear. Stops at 400,000 triangles or the input's number, if that is
 // larger; a uniform density bisects nothing. Throws as compute_sizing.
 SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target);
-
-// The vertices of the refined mesh along an input edge, from a to b.
-std::vector<Index> edge_chain(const SizedMesh& sized, Index a, Index b);
 
 }  // namespace bisector

@@ -435,7 +435,7 @@ class Control {
       std::vector<Vec3> next = state_.seeds, normals(next.size());
       for (std::size_t i = 0; i < next.size(); ++i)
         if (const Moments& m = state_.moments.cells[i]; m.mass > 0) next[i] += (1 / m.mass) * m.first;
-      if (options_.constrained) project_to_cells(backend_.surface(), state_.moments.triangles, next, normals);
+      if (options_.constrained) project_to_cells(backend_.surface(), state_.moments.triangles, {}, next, normals);
       if (!move(before, next, held)) return;
     }
   }

@@ -52,7 +52,7 @@ struct Certification {
   std::size_t cpu = 0;        // settled by the CPU's exact arithmetic
 };
 
-// Integrals over the restricted cells; positions are relative to the seed.
+// Integrals over the restricted or clipped cells; positions are relative to the seed.
 struct CellMoments {
   std::vector<Moments> cells;      // by seed; zero for an empty cell
   // The mass, or a quarter of the median mass of the six nearest seeds where that is more: a scale for steps that does
@@ -60,7 +60,7 @@ struct CellMoments {
   std::vector<double> step_mass;
   double mass = 0;                 // sum over the cells
   double energy = 0;               // sum of the second moments: the CVT energy
-  Csr<Index> triangles;            // incident triangles of each cell, ascending
+  Csr<Index> triangles;            // incident triangles of each cell, of the surface or the solid's boundary, ascending
   Certification certification;
   DiagramSeconds seconds;
 };
