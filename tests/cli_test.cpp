@@ -27,6 +27,8 @@
 
 #include "bisector/cvt/compute.h"
 #include "bisector/mesh/io.h"
+#include "bisector/mesh/tet_io.h"
+#include "bisector/mesh/tet_topology.h"
 #include "models.h"
 
 namespace bisector {
@@ -360,6 +362,40 @@ TEST_F(Cli, QualityMeasuresDistance) {
   const Result table = run({"quality", in("sphere.off")});
   EXPECT_NE(table.out.find("q_min"), std::string::npos);
   EXPECT_NE(table.out.find("self_intersections"), std::string::npos);
+}
+
+TEST_F(Cli, QualityMeasuresTetrahedra) {
+  // The cube's corner tetrahedra and the regular one between them, in two regions.
+  TetMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+  mesh.tets = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}};
+  mesh.regions = {1, 1, 1, 1, 2};
+  write_tet_mesh(in("cube.msh"), mesh);
+  const Json report = report_of({"quality", in("cube.msh"), "--reference", in("cube.msh"), "--report", "-"});
+  EXPECT_EQ(report["input"]["tets"], 5);
+  EXPECT_EQ(report["reference"]["tets"], 5);
+  const Json& quality = report["quality"];
+  EXPECT_NEAR(quality["volume"].get<double>(), 1, 1e-14);
+  EXPECT_NEAR(quality["area"].get<double>(), 6, 1e-14);
+  EXPECT_NEAR(quality["dihedral_max"].get<double>(), 90, 1e-12);
+  EXPECT_NEAR(quality["dihedral_min"].get<double>(), std::atan(std::sqrt(2)) * 45 / std::atan(1.0), 1e-12);
+  EXPECT_NEAR(quality["theta_min"].get<double>(), 45, 1e-12);
+  EXPECT_EQ(quality["inverted"], 0);
+  EXPECT_EQ(quality["distance_max"], 0);
+  EXPECT_EQ(report["topology"]["conforming"], true);
+  EXPECT_EQ(report["topology"]["euler"], 2);
+  const Result table = run({"quality", in("cube.msh")});
+  EXPECT_EQ(table.code, 0) << table.err;
+  EXPECT_NE(table.out.find("radius_ratio_min"), std::string::npos);
+  // Triangles alone are a surface.
+  mesh.boundary = boundary_facets(mesh.tets);
+  mesh.tets.clear();
+  mesh.regions.clear();
+  write_tet_mesh(in("shell.mesh"), mesh);
+  const Json shell = report_of({"quality", in("shell.mesh"), "--report", "-"});
+  EXPECT_FALSE(shell["input"].contains("tets") || shell["quality"].contains("volume"));
+  EXPECT_NEAR(shell["quality"]["area"].get<double>(), 6, 1e-14);
+  expect_failure(1, {"quality", in("missing.msh")}, "missing.msh");
 }
 
 TEST_F(Cli, DevicesAreListed) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "bisector/mesh/io.h"
 #include "bisector/mesh/preview.h"
 #include "bisector/mesh/sampling.h"
+#include "bisector/mesh/tet_io.h"
 #include "bisector/voronoi/dual.h"
 #include "bisector/voronoi/tiling.h"
 #include "cells.h"
@@ -287,7 +289,59 @@ struct QualityMeasures {
   QualityReport quality;
   std::size_t self_intersections = 0;
   DistanceReport distance;  // if there is a reference
+  TetQualityReport tets;    // if there are tetrahedra; then the others are the boundary's
+  TetTopology tet_topology;
 };
+
+// A surface, or tetrahedra and their boundary.
+struct MeasuredMesh {
+  TetMesh tets;
+  TriangleMesh surface;
+};
+
+MeasuredMesh read_measured(const std::string& path, const Context& context) {
+  if (!is_tet_format(path)) return {{}, read_mesh(path, context)};
+  MeasuredMesh mesh{read_tet_mesh(path, context), {}};
+  mesh.surface = mesh.tets.tets.empty() ? surface_of_marks(mesh.tets) : boundary_surface(mesh.tets);
+  return mesh;
+}
+
+Json size_json(const MeasuredMesh& mesh) {
+  return mesh.tets.tets.empty() ? input_json(mesh.surface) : cli::size_json(mesh.tets);
+}
+
+using Row = std::function<void(const char* name, const std::string& value, const char* meaning)>;
+
+std::string number(double x) { return fmt::format("{:.6g}", x); }
+
+void print_tets(Console& console, const TetQualityReport& q, const TetTopology& t, const Row& row) {
+  row("dihedral_min", number(q.dihedral_min), "smallest dihedral angle, degrees");
+  row("dihedral_min_mean", number(q.dihedral_min_mean), "average of each tetrahedron's smallest");
+  row("dihedral_max", number(q.dihedral_max), "largest dihedral angle, degrees");
+  row("radius_ratio_min", number(q.radius_ratio_min), "worst 3 r / R of inscribed and circumscribed sphere; 1 is regular");
+  row("radius_ratio_mean", number(q.radius_ratio_mean), "average");
+  row("volume", number(q.volume), "");
+  row("volume_min", number(q.volume_min), "of a tetrahedron");
+  row("inverted", fmt::to_string(q.inverted), "tetrahedra of negative volume");
+  row("zero_volume", fmt::to_string(q.zero_volume), "tetrahedra without volume");
+  row("tet_edge_min", number(q.edge_min), "shortest edge");
+  row("tet_edge_ave", number(q.edge_ave), "");
+  row("tet_edge_max", number(q.edge_max), "longest edge");
+  row("conforming", yes_no(t.conforming), "facets shared by two tetrahedra on opposite sides");
+  if (!t.conforming) {
+    row("", fmt::to_string(t.overused_facets), "facets of more than two tetrahedra");
+    row("", fmt::to_string(t.misoriented_facets), "facets of two tetrahedra on one side");
+    row("", fmt::to_string(t.repeated_vertices), "vertices at the point of another");
+  }
+  if (t.unused_vertices > 0) row("unused_vertices", fmt::to_string(t.unused_vertices), "vertices of no tetrahedron");
+  row("tet_components", fmt::to_string(t.components), "connected through facets");
+  std::string line = "dihedral angles by 10 degrees, %:";
+  std::size_t angles = 0;
+  for (const std::size_t count : q.dihedral_counts) angles += count;
+  for (const std::size_t count : q.dihedral_counts)
+    line += fmt::format(" {:.2g}", angles ? 100 * static_cast<double>(count) / static_cast<double>(angles) : 0.0);
+  console.print(line);
+}
 
 void print_quality(Console& console, const QualityCommand& command, const QualityMeasures& measures,
                    const Json& input) {
@@ -296,10 +350,14 @@ void print_quality(Console& console, const QualityCommand& command, const Qualit
   const auto row = [&](const char* name, const std::string& value, const char* meaning = "") {
     console.print(fmt::format("{:<20}{:>14}{}{}", name, value, *meaning ? "   " : "", meaning));
   };
-  const auto number = [](double x) { return fmt::format("{:.6g}", x); };
   console.print(command.mesh);
   row("vertices", fmt::to_string(input["vertices"].get<std::size_t>()));
   row("faces", fmt::to_string(input["faces"].get<std::size_t>()));
+  if (input.contains("tets")) {
+    row("tets", fmt::to_string(input["tets"].get<std::size_t>()));
+    print_tets(console, measures.tets, measures.tet_topology, row);
+    console.print("boundary");
+  }
   row("q_min", number(q.q_min), "worst triangle quality; 1 is equilateral");
   row("q_ave", number(q.q_ave), "average");
   row("theta_min", number(q.theta_min), "smallest angle, degrees");
@@ -476,19 +534,25 @@ void run(const QualityCommand& command) {
 
   console.phase("reading " + command.mesh);
   const Stopwatch reading;
-  const TriangleMesh mesh = read_mesh(command.mesh, context);
-  TriangleMesh reference;
-  if (!command.reference.empty()) reference = read_mesh(command.reference, context);
+  const MeasuredMesh measured = read_measured(command.mesh, context);
+  const TriangleMesh& mesh = measured.surface;
+  MeasuredMesh reference;
+  if (!command.reference.empty()) reference = read_measured(command.reference, context);
   Json seconds{{"total", 0.0}, {"io", reading.seconds()}};
 
   const Stopwatch measuring;
   QualityMeasures measures;
   measures.quality = measure_quality(mesh);
+  const bool solid = !measured.tets.tets.empty();
+  if (solid) {
+    measures.tets = measure_tet_quality(measured.tets);
+    measures.tet_topology = analyse_tet_topology(measured.tets);
+  }
   console.phase("looking for self-intersections");
   measures.self_intersections = count_self_intersections(mesh);
   if (!command.reference.empty()) {
     console.phase("measuring the distance to " + command.reference);
-    measures.distance = measure_distance(mesh, reference);
+    measures.distance = measure_distance(mesh, reference.surface);
   }
   console.phase("done");
   seconds["quality"] = measuring.seconds();
@@ -497,17 +561,19 @@ void run(const QualityCommand& command) {
   if (!report_path.empty()) {
     stop_watching_interrupts();
     Json report = start_report("quality");
-    report["input"] = input_json(mesh);
-    if (!command.reference.empty()) report["reference"] = input_json(reference);
+    report["input"] = size_json(measured);
+    if (!command.reference.empty()) report["reference"] = size_json(reference);
     report["seconds"] = seconds;
     Json quality = quality_json(measures.quality);
+    if (solid) add_tets(quality, measures.tets);
     quality["self_intersections"] = measures.self_intersections;
     if (!command.reference.empty()) add_distance(quality, measures.distance);
     report["quality"] = std::move(quality);
     report["topology"] = topology_json(measures.quality.topology);
+    if (solid) add_tets(report["topology"], measures.tet_topology);
     write_report(report_path, report);
   }
-  print_quality(console, command, measures, input_json(mesh));
+  print_quality(console, command, measures, size_json(measured));
   if (command.common.verbose) print_seconds(console, seconds);
   console.print_written({report_path});
 }

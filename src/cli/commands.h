@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bisector/remesh/remesh.h"
+#include "bisector/tetmesh/tetmesh.h"
 
 namespace bisector::cli {
 
@@ -53,6 +54,16 @@ struct RvdCommand {
   CommonOptions common;
 };
 
+struct TetCommand {
+  std::string input, output, seeds, boundary, preview;
+  std::string density = "uniform", sizes, features = "auto", feature_file;
+  double edge_length_relative = 0;  // of the input's diagonal; 0: not given
+  double weld = -1;                 // not given
+  TetOptions options;
+  ComputeWords compute;
+  CommonOptions common;
+};
+
 struct QualityCommand {
   std::string mesh, reference;
   CommonOptions common;
@@ -70,6 +81,7 @@ struct CheckCommand {
 // All throw Error and Cancelled; then no output was written, except for a check whose report tells what does not agree.
 void run(const RemeshCommand& command);
 void run(const RvdCommand& command);
+void run(const TetCommand& command);
 void run(const QualityCommand& command);
 void run(const DevicesCommand& command);
 void run(const CheckCommand& command);

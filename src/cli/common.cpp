@@ -32,7 +32,9 @@ Json seconds_json(const DiagramSeconds& seconds) {
 const char* yes_no(bool b) { return b ? "yes" : "no"; }
 
 std::string size_of(const Json& mesh) {
-  return counted(mesh["vertices"], "vertex", "vertices") + ", " + counted(mesh["faces"], "face", "faces");
+  std::string size = counted(mesh["vertices"], "vertex", "vertices") + ", " + counted(mesh["faces"], "face", "faces");
+  if (mesh.contains("tets")) size += ", " + counted(mesh["tets"], "tetrahedron", "tetrahedra");
+  return size;
 }
 
 std::string describe(const MeshTopology& topology) {

@@ -272,13 +272,98 @@ CLI::App* add_rvd(CLI::App& program, RvdCommand& command) {
   return app;
 }
 
+CLI::App* add_tet(CLI::App& program, TetCommand& command) {
+  CLI::App* app = add_command(
+      program, "tet", "Make a high-quality tetrahedral mesh of a solid.",
+      "bisector tet IN -o OUT -n N|--edge-length L [options]",
+      "Examples:\n"
+      "  bisector tet bunny.off -o out.msh -n 10000\n"
+      "  bisector tet part.stl -o out.vtu --edge-length 0.5 --report out.json\n"
+      "  bisector tet coarse.mesh -o fine.mesh -n 50000 --sizes sizes.vtu:h\n\n"
+      "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, .vtk, .vtu). Ctrl-C stops the run;\n"
+      "nothing is written.");
+  add_file(app, "IN", command.input, "FILE", "closed surface or tetrahedral mesh")->required();
+  add_file(app, "-o", command.output, "FILE", "mesh to write: .mesh, .msh or .vtu")->required()->group("Output");
+  add_file(app, "--boundary", command.boundary, "FILE", "also write the boundary's triangles: .off, .obj, .ply\nor .stl")
+      ->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the result, cut open")->group("Output");
+  app->add_option("-n", command.options.vertices, "vertices of the result, about; at least 8")
+      ->type_name("N")->check(whole_number(8, kMostSeeds))->group("Seeds");
+  add_file(app, "--seeds", command.seeds, "FILE.xyz",
+           "start from these points (\"x y z\" lines) inside the\n"
+           "solid; -n is then not needed")
+      ->group("Seeds");
+  add_random_seed(app, command.options.random_seed);
+  app->add_option("--edge-length", command.options.edge_length,
+                  "mean edge length of the result, in the mesh's unit,\n"
+                  "instead of -n")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-length-relative", command.edge_length_relative,
+                  "the same as a share of the bounding box's diagonal")
+      ->type_name("R")->check(number_above_zero())->group("Size");
+  app->add_option("--density", command.density,
+                  "where tetrahedra are smaller: uniform (default),\n"
+                  "lfs[:EXP] or curvature[:EXP] of the boundary, with the\n"
+                  "edge lengths that 'bisector remesh' has for them, or\n"
+                  "attribute:NAME (of the input's vertices; edges are as\n"
+                  "long as its power -1/5)")
+      ->type_name("WORD")->check(parsed_by(parse_density))->group("Size");
+  add_file(app, "--sizes", command.sizes, "FILE[:NAME]",
+           "edge lengths at the vertices of a mesh (.vtk, .vtu with\n"
+           "point data NAME; .mesh with a .sol beside it), instead\n"
+           "of a density; -n makes them a matter of proportion")
+      ->group("Size");
+  app->add_option("--gradation", command.options.sizing.field.gradation,
+                  "edge lengths grow by at most so much per length into\n"
+                  "the solid; default 0.2. Not for uniform density")
+      ->type_name("G")->check(number_below(10))->group("Size");
+  app->add_option("--edge-min", command.options.sizing.field.min_edge, "edges aimed at are no shorter, in the mesh's unit")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-max", command.options.sizing.field.max_edge, "and no longer")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--features", command.features,
+                  "sharp edges to keep: auto (default), none, or all with a\n"
+                  "dihedral deviation of so many degrees. Edges between face\n"
+                  "labels are kept unless none")
+      ->type_name("WORD")->check(parsed_by(parse_features))->group("Features");
+  add_file(app, "--feature-file", command.feature_file, "FILE",
+           "also keep these edges: lines of two vertex numbers,\n"
+           "counted from 0 in the input")
+      ->group("Features");
+  app->add_option("--weld", command.weld,
+                  "join borders that are no farther apart, in the mesh's\n"
+                  "unit; default: only what lies at the same point")
+      ->type_name("T")->check(number_below(1e100))->group("Features");
+  app->add_option("--min-angle", command.options.min_angle,
+                  "degrees that all angles of the boundary's triangles\n"
+                  "should exceed; 0: as they are; default 40")
+      ->type_name("A")->check(number_below(60))->group("Optimisation");
+  app->add_option("--min-dihedral", command.options.min_dihedral,
+                  "degrees that all dihedral angles should exceed; 0: keep\n"
+                  "slivers; default 30")
+      ->type_name("A")->check(number_below(70))->group("Optimisation");
+  app->add_option("--iterations", command.options.iterations, "at most so many; default 100")
+      ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
+  app->add_option("--tolerance", command.options.tolerance,
+                  "end a phase when the energy falls by less than this\n"
+                  "share per iteration; default 1e-6")
+      ->type_name("T")->check(number_below(1))->group("Optimisation");
+  add_compute_options(app, command.compute);
+  add_common_options(app, command.common,
+                     "write a JSON report with quality, distance of the\n"
+                     "boundary to the input and timings; - for stdout");
+  return app;
+}
+
 CLI::App* add_quality(CLI::App& program, QualityCommand& command) {
   CLI::App* app = add_command(
       program, "quality", "Measure angles, topology and distance to another mesh.",
       "bisector quality MESH [--reference IN] [options]",
       "Example:\n"
       "  bisector quality out.obj --reference bunny.off");
-  add_file(app, "MESH", command.mesh, "FILE", "mesh to measure: .off, .obj, .ply or .stl")->required();
+  add_file(app, "MESH", command.mesh, "FILE",
+           "surface to measure: .off, .obj, .ply or .stl; or\n"
+           "tetrahedra: .mesh, .msh, .vtk or .vtu")->required();
   add_file(app, "--reference", command.reference, "IN", "also measure the two-sided distance to this mesh")
       ->group("Output");
   add_common_options(app, command.common, "write a JSON report; - for stdout");
@@ -338,6 +423,31 @@ void check_usage(const RemeshCommand& command, const CLI::App& app) {
     refuse("--min-angle", "seeds have to be on the surface for that; leave out --energy rcvt");
 }
 
+void check_usage(const TetCommand& command, const CLI::App& app) {
+  const auto given = [&](const char* option) { return app.count(option) > 0; };
+  const auto refuse = [&](const char* option, const char* why) {
+    if (given(option)) throw CLI::ValidationError(std::string(option) + ": " + why);
+  };
+  const int sizes = given("-n") + given("--edge-length") + given("--edge-length-relative");
+  if (!given("--seeds") && sizes == 0)
+    throw CLI::ValidationError("how many vertices? give -n N, --edge-length L or --seeds FILE.xyz");
+  if (sizes > 1) throw CLI::ValidationError("-n, --edge-length and --edge-length-relative: give one of them");
+  if (given("--seeds")) {
+    for (const char* option : {"--edge-length", "--edge-length-relative"})
+      refuse(option, "seeds from a file have their own number; leave one of the two out");
+    refuse("--random-seed", "seeds from a file are not random; leave one of the two out");
+  }
+  if (given("--sizes")) refuse("--density", "sizes come from --sizes; leave one of the two out");
+  const SizingOptions& sizing = command.options.sizing.field;
+  if (given("--gradation") && sizing.gradation == 0)
+    throw CLI::ValidationError("--gradation: sizes inside a solid grow from its boundary; it must not be 0");
+  if (sizing.max_edge > 0 && sizing.min_edge > sizing.max_edge)
+    throw CLI::ValidationError("--edge-min is more than --edge-max");
+  if (command.density == "uniform" && !given("--sizes"))
+    for (const char* option : {"--gradation", "--edge-min", "--edge-max"})
+      refuse(option, "a uniform density has edges of one length; choose another --density");
+}
+
 void check_usage(const RvdCommand& command, const CLI::App& app) {
   if (command.seeds.empty() && command.count == 0)
     throw CLI::ValidationError("which seeds? give --seeds FILE.xyz or -n N");
@@ -370,12 +480,15 @@ int run_guarded(const std::function<void()>& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App program{"Bisector makes high-quality triangle meshes of surfaces by optimising certified Voronoi diagrams."};
+  CLI::App program{
+      "Bisector makes high-quality triangle meshes of surfaces and tetrahedral meshes of solids by optimising certified\n"
+      "Voronoi diagrams."};
   program.name("bisector");
   program.formatter(std::make_shared<Help>("bisector COMMAND ..."));
   program.footer(
       "Start with:\n"
       "  bisector remesh IN.off -o OUT.obj -n 10000     remesh with 10,000 vertices\n"
+      "  bisector tet IN.off -o OUT.msh -n 10000        fill it with tetrahedra\n"
       "  bisector quality OUT.obj --reference IN.off    see how good the result is\n"
       "  bisector remesh --help                         all options of a command\n\n"
       "Exit codes: 0 success, 1 bad input or a failed run, 2 bad usage, 130 cancelled. If not 0, nothing is written.");
@@ -385,11 +498,13 @@ int main(int argc, char** argv) {
 
   RemeshCommand remesh;
   RvdCommand rvd;
+  TetCommand tet;
   QualityCommand quality;
   DevicesCommand devices;
   CheckCommand check;
   CLI::App* const remesh_app = add_remesh(program, remesh);
   CLI::App* const rvd_app = add_rvd(program, rvd);
+  CLI::App* const tet_app = add_tet(program, tet);
   CLI::App* const quality_app = add_quality(program, quality);
   CLI::App* const devices_app = add_devices(program, devices);
   CLI::App* const check_app = add_check(program, check);
@@ -402,6 +517,7 @@ int main(int argc, char** argv) {
     program.parse(argc, argv);
     if (remesh_app->parsed()) check_usage(remesh, *remesh_app);
     if (rvd_app->parsed()) check_usage(rvd, *rvd_app);
+    if (tet_app->parsed()) check_usage(tet, *tet_app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);
     return fail_usage(error.what(), chosen());
@@ -415,6 +531,7 @@ int main(int argc, char** argv) {
   return run_guarded([&] {
     if (remesh_app->parsed()) run(remesh);
     if (rvd_app->parsed()) run(rvd);
+    if (tet_app->parsed()) run(tet);
     if (quality_app->parsed()) run(quality);
     if (devices_app->parsed()) run(devices);
     if (check_app->parsed()) run(check);

@@ -21,5 +21,6 @@ inline Output report_output(const std::string& path) { return {path == "-" ? "" 
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
 inline const std::vector<std::string> kMeshFormats{".off", ".obj", ".ply", ".stl"};
+inline const std::vector<std::string> kTetFormats{".mesh", ".msh", ".vtu"};
 
 }  // namespace bisector::cli

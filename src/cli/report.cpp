@@ -70,6 +70,10 @@ Json output_json(const TriangleMesh& mesh) {
   return {{"vertices", mesh.vertices.size()}, {"faces", mesh.triangles.size()}};
 }
 
+Json size_json(const TetMesh& mesh) {
+  return {{"vertices", mesh.vertices.size()}, {"faces", mesh.boundary.size()}, {"tets", mesh.tets.size()}};
+}
+
 Json certification_json(const Certification& certification) {
   return {{"pairs", certification.pairs},
           {"uncertain", certification.uncertain},
@@ -105,6 +109,31 @@ Json quality_json(const QualityReport& quality) {
           {"edge_max", quality.edge_max},
           {"area", quality.area},
           {"zero_area", quality.zero_area}};
+}
+
+void add_tets(Json& quality, const TetQualityReport& tets) {
+  quality["dihedral_min"] = tets.dihedral_min;
+  quality["dihedral_max"] = tets.dihedral_max;
+  quality["dihedral_min_mean"] = tets.dihedral_min_mean;
+  quality["dihedral_counts"] = tets.dihedral_counts;
+  quality["radius_ratio_min"] = tets.radius_ratio_min;
+  quality["radius_ratio_mean"] = tets.radius_ratio_mean;
+  quality["volume"] = tets.volume;
+  quality["volume_min"] = tets.volume_min;
+  quality["inverted"] = tets.inverted;
+  quality["zero_volume"] = tets.zero_volume;
+  quality["tet_edge_min"] = tets.edge_min;
+  quality["tet_edge_ave"] = tets.edge_ave;
+  quality["tet_edge_max"] = tets.edge_max;
+}
+
+void add_tets(Json& topology, const TetTopology& tets) {
+  topology["conforming"] = tets.conforming;
+  topology["tet_components"] = tets.components;
+  topology["overused_facets"] = tets.overused_facets;
+  topology["misoriented_facets"] = tets.misoriented_facets;
+  topology["repeated_vertices"] = tets.repeated_vertices;
+  topology["unused_vertices"] = tets.unused_vertices;
 }
 
 void add_distance(Json& quality, const DistanceReport& distance) {

@@ -8,6 +8,8 @@
 #include "bisector/core/types.h"
 #include "bisector/mesh/distance.h"
 #include "bisector/mesh/quality.h"
+#include "bisector/mesh/tet_quality.h"
+#include "bisector/mesh/tet_topology.h"
 #include "bisector/remesh/remesh.h"
 
 namespace bisector::cli {
@@ -29,9 +31,13 @@ Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& 
 void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds);
 Json input_json(const TriangleMesh& mesh);   // faces as in the file
 Json output_json(const TriangleMesh& mesh);
+Json size_json(const TetMesh& mesh);  // faces: marked triangles
 Json certification_json(const Certification& certification);
 Json topology_json(const MeshTopology& topology);
 Json quality_json(const QualityReport& quality);
+// The keys of tetrahedra, beside those of their boundary.
+void add_tets(Json& quality, const TetQualityReport& tets);
+void add_tets(Json& topology, const TetTopology& tets);
 void add_distance(Json& quality, const DistanceReport& distance);
 // A point, or null if a coordinate is not finite.
 Json point_json(const Vec3& p);

@@ -26,45 +26,7 @@
 
 namespace bisector {
 
-namespace io {
-
-std::string printable(std::string_view text, std::size_t limit) {
-  std::string shown(text.substr(0, limit));
-  for (char& c : shown)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  if (text.size() > limit) shown += "...";
-  return shown;
-}
-
-std::string name_of(const std::string& path) { return printable(path, 4096); }
-
-void fail(const std::string& path, const std::string& what) { throw Error(name_of(path) + ": " + what); }
-
-std::string quantity(std::size_t n, const char* one, const char* many) {
-  return fmt::format("{} {}", n, n == 1 ? one : many);
-}
-
-}  // namespace io
-
-using namespace io;
-
 namespace {
-
-// --- files ---
-
-std::string lower_extension(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
-  if (dot == std::string::npos || (slash != std::string::npos && dot < slash)) return "";
-  std::string extension = path.substr(dot);
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
-}
-
-[[noreturn]] void fail_extension(const std::string& path, const std::string& extension) {
-  if (extension.empty()) fail(path, "no file name extension; use .off, .obj, .ply or .stl");
-  fail(path, "unknown mesh format '" + printable(extension) + "'; use .off, .obj, .ply or .stl");
-}
 
 class File {
  public:
@@ -91,6 +53,35 @@ class File {
   int descriptor_;
 };
 
+}  // namespace
+
+namespace io {
+
+std::string printable(std::string_view text, std::size_t limit) {
+  std::string shown(text.substr(0, limit));
+  for (char& c : shown)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  if (text.size() > limit) shown += "...";
+  return shown;
+}
+
+std::string name_of(const std::string& path) { return printable(path, 4096); }
+
+void fail(const std::string& path, const std::string& what) { throw Error(name_of(path) + ": " + what); }
+
+std::string quantity(std::size_t n, const char* one, const char* many) {
+  return fmt::format("{} {}", n, n == 1 ? one : many);
+}
+
+std::string lower_extension(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
+  if (dot == std::string::npos || (slash != std::string::npos && dot < slash)) return "";
+  std::string extension = path.substr(dot);
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
 std::string read_bytes(const std::string& path) {
   const File file(path, O_RDONLY);
   struct stat status {};
@@ -113,6 +104,19 @@ std::string read_bytes(const std::string& path) {
   if (bytes.find_first_not_of(" \t\r\n") == std::string::npos)
     fail(path, std::string("the file is empty; ") + kExportAgain);
   return bytes;
+}
+
+}  // namespace io
+
+using namespace io;
+
+namespace {
+
+// --- files ---
+
+[[noreturn]] void fail_extension(const std::string& path, const std::string& extension) {
+  if (extension.empty()) fail(path, "no file name extension; use .off, .obj, .ply or .stl");
+  fail(path, "unknown mesh format '" + printable(extension) + "'; use .off, .obj, .ply or .stl");
 }
 
 // --- from what a file holds to triangles ---

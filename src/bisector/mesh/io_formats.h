@@ -27,6 +27,12 @@ std::string name_of(const std::string& path);
 // Throws Error, naming the file.
 [[noreturn]] void fail(const std::string& path, const std::string& what);
 
+// With the dot; empty if there is none.
+std::string lower_extension(const std::string& path);
+
+// All of a file, which must not be empty. Throws Error.
+std::string read_bytes(const std::string& path);
+
 // "1 vertex", "2 vertices".
 std::string quantity(std::size_t n, const char* one, const char* many);
 

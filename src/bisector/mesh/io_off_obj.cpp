@@ -86,25 +86,6 @@ class ObjGroups {
   std::vector<std::int32_t> labels_;
 };
 
-void append_number(std::string& out, double x) {
-  std::array<char, 32> digits;
-  out.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), x).ptr);
-}
-
-void append_index(std::string& out, std::size_t i) {
-  std::array<char, 24> digits;
-  out.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), i).ptr);
-}
-
-void append_point(std::string& out, const Vec3& p) {
-  append_number(out, p.x);
-  out += ' ';
-  append_number(out, p.y);
-  out += ' ';
-  append_number(out, p.z);
-  out += '\n';
-}
-
 }  // namespace
 
 Soup read_off(const std::string& path, std::string_view bytes) {

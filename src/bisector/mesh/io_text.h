@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -17,6 +18,34 @@
 #include "bisector/mesh/io_formats.h"
 
 namespace bisector::io {
+
+// The number that a word is. `fail` is called with what is wrong and must throw.
+template <class Fail>
+double parse_number(std::string_view text, const Fail& fail) {
+  const char* begin = text.data() + (text[0] == '+' && text.size() > 1 && text[1] != '-');
+  const char* end = text.data() + text.size();
+  double x = 0;
+  auto [stop, error] = std::from_chars(begin, end, x);
+  if (error == std::errc::result_out_of_range) {  // too small is as good as zero, too large is not
+    long double wide = 0;
+    error = std::from_chars(begin, end, wide).ec;
+    x = error == std::errc{} ? static_cast<double>(wide) : std::numeric_limits<double>::infinity();
+    if (!std::isfinite(x)) fail("'" + printable(text) + "' is too large; scale the model");
+  }
+  if (error != std::errc{} || stop != end) fail("'" + printable(text) + "' is not a number; mend the line");
+  return x;
+}
+
+template <class Fail>
+std::int64_t parse_integer(std::string_view text, const Fail& fail) {
+  std::int64_t n = 0;
+  const char* begin = text.data() + (text.size() > 1 && text[0] == '+' && text[1] != '-');
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(begin, end, n);
+  if (error == std::errc::result_out_of_range) fail("'" + printable(text) + "' is out of range; mend the line");
+  if (error != std::errc{} || stop != end) fail("'" + printable(text) + "' is not an integer; mend the line");
+  return n;
+}
 
 // Words of a text, line by line, with '\n' or "\r\n" at the ends of lines.
 class TextReader {
@@ -61,18 +90,7 @@ class TextReader {
   double number() {
     const std::string_view text = word();
     if (text.empty()) fail(std::string("a number is missing at the end of the line; ") + kExportAgain);
-    const char* begin = text.data() + (text[0] == '+' && text.size() > 1 && text[1] != '-');
-    const char* end = text.data() + text.size();
-    double x = 0;
-    auto [stop, error] = std::from_chars(begin, end, x);
-    if (error == std::errc::result_out_of_range) {  // too small is as good as zero, too large is not
-      long double wide = 0;
-      error = std::from_chars(begin, end, wide).ec;
-      x = error == std::errc{} ? static_cast<double>(wide) : std::numeric_limits<double>::infinity();
-      if (!std::isfinite(x)) fail("'" + printable(text) + "' is too large; scale the model");
-    }
-    if (error != std::errc{} || stop != end) fail("'" + printable(text) + "' is not a number; mend the line");
-    return x;
+    return parse_number(text, [this](const std::string& what) { fail(what); });
   }
 
   Vec3 point() {
@@ -95,13 +113,7 @@ class TextReader {
   }
 
   std::int64_t integer(std::string_view text) {
-    std::int64_t n = 0;
-    const char* begin = text.data() + (text.size() > 1 && text[0] == '+' && text[1] != '-');
-    const char* end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(begin, end, n);
-    if (error == std::errc::result_out_of_range) fail("'" + printable(text) + "' is out of range; mend the line");
-    if (error != std::errc{} || stop != end) fail("'" + printable(text) + "' is not an integer; mend the line");
-    return n;
+    return parse_integer(text, [this](const std::string& what) { fail(what); });
   }
 
   std::size_t remaining() const { return static_cast<std::size_t>(end_ - at_); }
@@ -161,6 +173,26 @@ inline std::string count_lines_left(TextReader& in) {
   std::size_t lines = 0;
   while (in.next_line()) ++lines;
   return lines == 0 ? "" : quantity(lines, "line", "lines");
+}
+
+// As few digits as it takes to read back the same bits.
+inline void append_number(std::string& out, double x) {
+  std::array<char, 32> digits;
+  out.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), x).ptr);
+}
+
+inline void append_index(std::string& out, std::size_t i) {
+  std::array<char, 24> digits;
+  out.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), i).ptr);
+}
+
+inline void append_point(std::string& out, const Vec3& p) {
+  append_number(out, p.x);
+  out += ' ';
+  append_number(out, p.y);
+  out += ' ';
+  append_number(out, p.z);
+  out += '\n';
 }
 
 }  // namespace bisector::io

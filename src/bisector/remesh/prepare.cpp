@@ -30,16 +30,6 @@ WeldResult keep_apart(const TriangleMesh& input, std::size_t borders) {
   return result;
 }
 
-WeldResult join(const TriangleMesh& input, const RemeshOptions& options) {
-  if (options.weld) return weld(input, *options.weld);
-  const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
-  if (topology.boundary_edges == 0) return keep_apart(input, 0);
-  WeldResult welded = weld(input, 0);
-  const bool useful = welded.border_after < welded.border_before &&
-                      non_manifold_edges(welded.mesh) <= topology.non_manifold_edges;
-  return useful ? welded : keep_apart(input, topology.boundary_edges);
-}
-
 std::string plural(std::size_t count, const char* word) {
   return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
 }
@@ -73,9 +63,19 @@ SizingTarget target_of(const RemeshOptions& options) {
 
 }  // namespace
 
+WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
+  if (tolerance) return weld(input, *tolerance);
+  const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
+  if (topology.boundary_edges == 0) return keep_apart(input, 0);
+  WeldResult welded = weld(input, 0);
+  const bool useful = welded.border_after < welded.border_before &&
+                      non_manifold_edges(welded.mesh) <= topology.non_manifold_edges;
+  return useful ? welded : keep_apart(input, topology.boundary_edges);
+}
+
 PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
   PreparedInput prepared;
-  prepared.welded = join(input, options);
+  prepared.welded = join_borders(input, options.weld);
   TriangleMesh welded = std::exchange(prepared.welded.mesh, {});
   const std::vector<Index>& vertex_of = prepared.welded.vertex_of;
   warn_of_weld(prepared.welded, options, context);

@@ -1,6 +1,7 @@
 // From a mesh as it was read to the domain of remeshing: welded, with its features found and its density laid down.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "bisector/remesh/remesh.h"
@@ -16,6 +17,10 @@ struct PreparedInput {
   WeldResult welded;        // without its mesh
   bool noisy = false;       // normals are noise, and Energy::automatic means restricted
 };
+
+// The input with its borders joined: within `tolerance`, or, without one, at the same point, if that closes borders and makes no
+// edge non-manifold.
+WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
 
 // Throws Error as remesh does.
 PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, const Context& context);

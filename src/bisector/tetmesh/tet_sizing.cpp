@@ -25,6 +25,7 @@ namespace {
 constexpr double kPerVolume = 2 * 0.9235 * 0.9235 * 0.9235;
 constexpr double kPerArea = 1 / std::numbers::sqrt3;  // half of 2 / sqrt 3
 constexpr double kMostVertices = 1e8;
+constexpr double kLongest = 2;       // edge length by h above which an edge is bisected
 constexpr std::size_t kMostTets = 2'000'000;
 constexpr int kRounds = 6;           // of refinement and calibration
 constexpr int kTrials = 40;          // of a calibration
@@ -289,8 +290,8 @@ class Refiner {
 
   void push(Index a, Index b) {
     const Edge e = edge(a, b);
-    const double least = std::min(lengths_[a], lengths_[b]);
-    if (std::get<0>(e) > least * least) queue_.push(e);
+    const double most = kLongest * std::min(lengths_[a], lengths_[b]);
+    if (std::get<0>(e) > most * most) queue_.push(e);
   }
 
   bool bisect(Index a, Index b) {

@@ -15,14 +15,10 @@
 namespace bisector {
 namespace {
 
-// A random planar cell has six neighbours and is certified by about 16 nearest seeds.
-constexpr std::size_t kFirstMost = 40;   // entries of a first list
-constexpr double kFirstMean = 28;        // the radius of the search aims at
 constexpr std::size_t kFirstLeast = 6;  // else the search is repeated with a larger radius
-constexpr std::uint64_t kPlaceMask = 511;
+constexpr std::uint64_t kPlaceMask = 1023;
 constexpr std::size_t kCandidates = kPlaceMask + 1;  // and with a smaller one beyond these
 constexpr int kTrials = 12;
-constexpr double kLargestRun = 5;        // diagonal of the box of one search, in radii
 constexpr double kGrowth = 1.6;          // of the radius, from level to level
 constexpr int kRingLevel = 6;            // the rung at which `nearest` turns to the Delaunay triangulation
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -31,7 +27,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kBelow = 1 - 1e-9;
 constexpr double kMostLost = 0.3;        // of a radius, before lists are built again
 
-// Distance and place in one key: squared distances are positive, so their bits sort like them; the last nine give way.
+// Distance and place in one key: squared distances are positive, so their bits sort like them; the last ten give way.
 std::uint64_t sort_key(double squared, std::size_t place) {
   return (std::bit_cast<std::uint64_t>(squared) & ~kPlaceMask) | place;
 }
@@ -88,7 +84,7 @@ struct Neighbours::LastRung {
   std::optional<Csr<Index>> rings;  // by slot, ascending distance
 };
 
-Neighbours::Neighbours() = default;
+Neighbours::Neighbours(ListLength length) : length_(length) {}
 Neighbours::~Neighbours() { drop_grown(); }
 
 void Neighbours::drop_grown() {
@@ -127,7 +123,7 @@ void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
   built_x_.clear();
   if (use_rings_) return;
 
-  first_.resize(n * kFirstMost);
+  first_.resize(n * length_.most);
   count_.assign(n, 0);
   radius_.assign(n, 0);
   parallel_chunks(tree_.leaves(), 64, [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -157,8 +153,8 @@ bool Neighbours::update() {
   const double any = std::sqrt(*std::max_element(farthest.begin(), farthest.end())) * (1 + 1e-9);
   std::atomic<bool> worth_it = true;
   parallel_chunks(n, 512, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::uint64_t keys[kFirstMost];
-    Index sorted[kFirstMost];
+    std::uint64_t keys[ListLength::kMost];
+    Index sorted[ListLength::kMost];
     for (std::size_t i = begin; i < end && worth_it.load(std::memory_order_relaxed); ++i) {
       const double lost = norm(x[i] - built_x_[i]) * (1 + 1e-9) + any;
       if (!(lost <= kMostLost * built_radius_[i])) {
@@ -169,7 +165,7 @@ bool Neighbours::update() {
       // Beyond the radius others may be missing, so what is listed there does not count for now.
       const double squared = radius_[i] * radius_[i];
       std::size_t within = 0;
-      Index* list = &first_[i * kFirstMost];
+      Index* list = &first_[i * length_.most];
       for (std::size_t k = 0; k < built_count_[i]; ++k) {
         const double d = norm2(x[list[k]] - x[i]);
         const std::uint64_t key = sort_key(d, k);
@@ -199,7 +195,7 @@ bool Neighbours::update() {
 bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Search& search) {
   const std::vector<Vec3>& x = seeds_->x;
   if (!(search.radius > 0)) search.radius = std::max(box.diagonal(), 1e-6 * seeds_->extent);
-  if (box.diagonal() > kLargestRun * search.radius) return false;
+  if (box.diagonal() > length_.longest * search.radius) return false;
   for (int trial = 0;; ++trial) {
     search.found.clear();
     tree_.near(box, search.radius, search.found);
@@ -239,15 +235,15 @@ bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Se
       total += kept;
       std::sort(search.keys.data(), out);
       radius_[i] = all ? kInfinity : search.radius * kBelow;
-      if (kept > kFirstMost) {
-        radius_[i] = std::sqrt(d[search.keys[kFirstMost] & kPlaceMask]) * kBelow;
-        kept = kFirstMost;
+      if (kept > length_.most) {
+        radius_[i] = std::sqrt(d[search.keys[length_.most] & kPlaceMask]) * kBelow;
+        kept = length_.most;
       }
       count_[i] = static_cast<unsigned char>(kept);
-      for (std::size_t k = 0; k < kept; ++k) first_[i * kFirstMost + k] = search.found[search.keys[k] & kPlaceMask];
+      for (std::size_t k = 0; k < kept; ++k) first_[i * length_.most + k] = search.found[search.keys[k] & kPlaceMask];
     }
     const double mean = static_cast<double>(total) / static_cast<double>(end - begin);
-    const double factor = std::clamp(std::sqrt(kFirstMean / std::max(mean, 1.0)), 0.5, 2.0);
+    const double factor = std::clamp(std::pow(length_.mean / std::max(mean, 1.0), length_.power), 0.5, 2.0);
     if (last || least >= kFirstLeast) {
       search.radius *= factor;
       return true;
@@ -262,7 +258,7 @@ NeighbourList Neighbours::list(Index slot) const {
     return {rings.begin(slot), rings.end(slot), kInfinity, kRingLevel};
   }
   if (on_demand_) return {};
-  const Index* begin = first_.data() + slot * kFirstMost;
+  const Index* begin = first_.data() + slot * length_.most;
   return {begin, begin + count_[slot], radius_[slot], 0};
 }
 
@@ -334,7 +330,7 @@ std::size_t Neighbours::nearest_to(Index slot, std::size_t count, Index* slots) 
   // The nearest listed seeds bound the distance of the nearest of all.
   double radius = listed >= count ? norm(seeds_->x[known.begin[count - 1]] - p) * (1 + 1e-9) : seeds_->extent * 1e-3;
   if (!use_rings_ && listed >= count && radius < known.radius) {
-    std::array<Near, kFirstMost> nearest;
+    std::array<Near, ListLength::kMost> nearest;
     std::size_t size = 0;
     for (const Index* j = known.begin; j != known.end; ++j) {
       const double squared = norm2(seeds_->x[*j] - p);

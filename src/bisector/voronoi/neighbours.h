@@ -35,9 +35,20 @@ struct NeighbourList {
   int level = 0;
 };
 
+// How long first lists are: at most `most`, from searches whose radius aims at `mean`. A planar cell has six neighbours and is
+// certified by about 16 nearest seeds; a cell in space has 15 and needs about 42.
+struct ListLength {
+  static constexpr std::size_t kMost = 96;
+  std::size_t most = 40;
+  double mean = 28;
+  double power = 0.5;    // the inverse of the seeds' dimension, about: of the radius in terms of their number
+  double longest = 5;    // diagonal of the box of seeds that share a search, in radii
+};
+inline constexpr ListLength kListsInSpace{88, 72, 1.0 / 3, 3};
+
 class Neighbours {
  public:
-  Neighbours();
+  explicit Neighbours(ListLength length = {});
   ~Neighbours();
 
   // Builds the lists of all slots. `seeds` must outlive their use.
@@ -72,7 +83,8 @@ class Neighbours {
 
   const SortedSeeds* seeds_ = nullptr;
   SeedTree tree_;
-  std::vector<Index> first_;             // room for kFirstMost per slot
+  ListLength length_;
+  std::vector<Index> first_;             // room for length_.most per slot
   std::vector<unsigned char> count_;     // of the lists of first_
   std::vector<double> radius_;
   std::vector<Vec3> built_x_;            // positions and radii of the last build

@@ -5,6 +5,7 @@
 
 #include "bisector/core/parallel.h"
 #include "bisector/voronoi/clip.h"
+#include "bisector/voronoi/fixed_tree_sum.h"
 #include "bisector/voronoi/owner.h"
 #include "bisector/voronoi/polygons.h"
 #include "bisector/voronoi/step_mass.h"
@@ -12,7 +13,6 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kSumBlock = 32;
 constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
 constexpr std::size_t kRanges = 8;  // of triangles, in the sort by cells
 
@@ -61,35 +61,6 @@ struct Walker {
   }
 };
 
-// The rule of all sums: terms in ascending triangle index, by blocks of 32, the blocks' sums likewise.
-class FixedTreeSum {
- public:
-  void add(const Moments& term) {
-    if (count_ % kSumBlock == 0) blocks_.push_back(term);
-    else blocks_.back() += term;
-    ++count_;
-  }
-  Moments finish() {
-    for (std::size_t n = blocks_.size(); n > 1;) {
-      std::size_t kept = 0;
-      for (std::size_t begin = 0; begin < n; begin += kSumBlock) {
-        Moments sum = blocks_[begin];
-        for (std::size_t k = begin + 1; k < std::min(n, begin + kSumBlock); ++k) sum += blocks_[k];
-        blocks_[kept++] = sum;
-      }
-      n = kept;
-    }
-    const Moments sum = blocks_.empty() ? Moments{} : blocks_[0];
-    blocks_.clear();
-    count_ = 0;
-    return sum;
-  }
-
- private:
-  std::size_t count_ = 0;
-  std::vector<Moments> blocks_;
-};
-
 }  // namespace
 
 struct RestrictedVoronoi::Work {
@@ -112,7 +83,7 @@ struct RestrictedVoronoi::Work {
   std::vector<std::size_t> cell_begin;
   std::vector<Index> cursor;            // by range of triangles and slot
 
-  explicit Work(const Surface& s) : surface(s) {}
+  Work(const Surface& s, ListLength lists) : surface(s), neighbours(lists) {}
 
   void find_owners(std::size_t seed_count);
   void clip_facets(bool want_polygons);
@@ -120,10 +91,12 @@ struct RestrictedVoronoi::Work {
   bool confirm_last(std::size_t facet, Index slot, Clipper& clipper) const;
   std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
   void sort_items();
+  void list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
   void gather(RestrictedPolygons& polygons) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
-  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_polygons);
+  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_moments,
+                bool want_polygons);
 };
 
 void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
@@ -267,23 +240,37 @@ void RestrictedVoronoi::Work::sort_items() {
   });
 }
 
-void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
+void RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellMoments& result) {
   sort_items();
-  const std::size_t slots = seeds.x.size(), total = items.size();
-  result.cells.assign(seed_count, Moments{});
+  const std::size_t slots = seeds.x.size();
   result.triangles.offsets.assign(seed_count + 1, 0);
   for (std::size_t i = 0; i < seed_count; ++i) {
     const Index s = seeds.slot[i];
     result.triangles.offsets[i + 1] = result.triangles.offsets[i] + (s == kNone ? 0 : cell_begin[s + 1] - cell_begin[s]);
   }
-  result.triangles.values.resize(total);
+  result.triangles.values.resize(items.size());
   parallel_chunks(slots, 256, [&](std::size_t, std::size_t begin, std::size_t end) {
-    FixedTreeSum sum;
     for (std::size_t s = begin; s < end; ++s) {
       Index* triangles = result.triangles.values.data() + result.triangles.offsets[seeds.id[s]];
+      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) *triangles++ = surface.summaries[items[k].facet].triangle;
+    }
+  });
+  result.certification = {};
+  result.certification.pairs = items.size();
+  for (const Chunk& chunk : chunks) {
+    result.certification.uncertain += chunk.certification.uncertain;
+    result.certification.wider += chunk.certification.wider;
+  }
+  result.certification.cpu = result.certification.uncertain;
+}
+
+void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
+  result.cells.assign(seed_count, Moments{});
+  parallel_chunks(seeds.x.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+    FixedTreeSum sum;
+    for (std::size_t s = begin; s < end; ++s) {
       for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
         const FacetSummary& summary = surface.summaries[items[k].facet];
-        *triangles++ = summary.triangle;
         sum.add(items[k].moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[s])
                                            : chunks[items[k].facet / chunk_size].moments[items[k].moments]);
       }
@@ -293,13 +280,6 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
   set_step_masses(seeds, neighbours, result);
   result.mass = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].second; });
-  result.certification = {};
-  result.certification.pairs = total;
-  for (const Chunk& chunk : chunks) {
-    result.certification.uncertain += chunk.certification.uncertain;
-    result.certification.wider += chunk.certification.wider;
-  }
-  result.certification.cpu = result.certification.uncertain;
 }
 
 // Moves the seeds of the last diagram in place if these are as many and not far off.
@@ -311,7 +291,7 @@ bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSo
 }
 
 void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,
-                                       bool want_polygons) {
+                                       bool want_moments, bool want_polygons) {
   const auto t0 = std::chrono::steady_clock::now();
   followed = follow(given, source);
   if (!followed) {
@@ -323,7 +303,8 @@ void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neighbour
   find_owners(given.size());
   const auto t2 = std::chrono::steady_clock::now();
   clip_facets(want_polygons);
-  sum_cells(given.size(), result);
+  list_triangles(given.size(), result);
+  if (want_moments) sum_cells(given.size(), result);
   const double building = std::chrono::duration<double>(t1 - t0).count();
   const bool delaunay = source == NeighbourSource::delaunay;
   result.seconds = {delaunay ? building : 0, delaunay ? 0 : building, std::chrono::duration<double>(t2 - t1).count(),
@@ -379,17 +360,27 @@ DiagramSeconds& DiagramSeconds::operator+=(const DiagramSeconds& b) {
   return *this;
 }
 
-RestrictedVoronoi::RestrictedVoronoi(const Surface& surface) : work_(std::make_unique<Work>(surface)) {}
+RestrictedVoronoi::RestrictedVoronoi(const Surface& surface, ListLength lists)
+    : work_(std::make_unique<Work>(surface, lists)) {}
 RestrictedVoronoi::~RestrictedVoronoi() = default;
 
 void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result) {
-  work_->evaluate(seeds, source, result, false);
+  work_->evaluate(seeds, source, result, true, false);
 }
 
 void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
                                  RestrictedPolygons& polygons) {
-  work_->evaluate(seeds, source, result, true);
+  work_->evaluate(seeds, source, result, true, true);
   work_->gather(polygons);
 }
+
+void RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
+                              RestrictedPolygons* polygons) {
+  work_->evaluate(seeds, source, result, false, polygons != nullptr);
+  if (polygons) work_->gather(*polygons);
+}
+
+const SortedSeeds& RestrictedVoronoi::seeds() const { return work_->seeds; }
+const Neighbours& RestrictedVoronoi::neighbours() const { return work_->neighbours; }
 
 }  // namespace bisector

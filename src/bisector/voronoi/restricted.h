@@ -68,7 +68,7 @@ struct CellMoments {
 class RestrictedVoronoi {
  public:
   // The surface must outlive the object.
-  explicit RestrictedVoronoi(const Surface& surface);
+  explicit RestrictedVoronoi(const Surface& surface, ListLength lists = {});
   ~RestrictedVoronoi();
 
   // The moments of every cell. Between calls memory is kept, and the owners of the last diagram serve as first guesses.
@@ -76,6 +76,12 @@ class RestrictedVoronoi {
   // The same, and the polygons.
   void evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
                 RestrictedPolygons& polygons);
+  // Only who meets whom: sets `triangles`, `certification` and `seconds`, and the polygons if there is room for them.
+  void trace(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result, RestrictedPolygons* polygons);
+
+  // Of the last diagram.
+  const SortedSeeds& seeds() const;
+  const Neighbours& neighbours() const;
 
  private:
   struct Work;

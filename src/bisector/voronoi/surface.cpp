@@ -9,7 +9,6 @@
 #include "bisector/voronoi/hilbert.h"
 
 namespace bisector {
-namespace {
 
 // The normal as rounded products where these are far from cancelling, else from its exact value.
 Vec3 facet_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -24,8 +23,6 @@ Vec3 facet_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double length = norm(n);
   return {n.x / length, n.y / length, n.z / length};
 }
-
-}  // namespace
 
 Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     : mesh(std::move(given)), density(std::move(given_density)) {

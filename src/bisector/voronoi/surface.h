@@ -31,6 +31,10 @@ struct FacetSummary {
   Index triangle;   // index in the mesh
 };
 
+// (b - a) x (c - a) at unit length, each coordinate off by at most 60 units of roundoff; the zero vector exactly when the corners
+// are collinear.
+Vec3 facet_normal(const Vec3& a, const Vec3& b, const Vec3& c);
+
 struct Surface {
   // `density`: one positive value per vertex, linear on each triangle; empty means 1. Throws Error if the mesh has no
   // area or a density is not positive and finite.

@@ -1,0 +1,259 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bisector/core/parallel.h"
+#include "bisector/mesh/distance.h"
+#include "bisector/mesh/io.h"
+#include "bisector/mesh/tet_preview.h"
+#include "bisector/mesh/tet_io.h"
+#include "bisector/mesh/tet_quality.h"
+#include "bisector/mesh/tet_topology.h"
+#include "bisector/tetmesh/tetmesh.h"
+#include "commands.h"
+#include "common.h"
+#include "console.h"
+#include "outputs.h"
+#include "report.h"
+
+namespace bisector::cli {
+namespace {
+
+struct Input {
+  bool solid = false;
+  TriangleMesh surface;
+  TetMesh tets;
+
+  const std::vector<Vec3>& vertices() const { return solid ? tets.vertices : surface.vertices; }
+};
+
+Input read_input(const std::string& path, const Context& context) {
+  Input input;
+  if (is_tet_format(path)) {
+    input.tets = read_tet_mesh(path, context);
+    input.solid = !input.tets.tets.empty();
+    if (!input.solid) input.surface = surface_of_marks(input.tets);
+  } else {
+    input.surface = read_mesh(path, context);
+  }
+  return input;
+}
+
+Json input_json(const Input& input) {
+  if (!input.solid) return cli::input_json(input.surface);
+  return {{"vertices", input.tets.vertices.size()}, {"faces", boundary_facets(input.tets.tets).size()},
+          {"tets", input.tets.tets.size()}};
+}
+
+// "FILE" or "FILE:NAME".
+SizeSamples read_sizes(const std::string& word) {
+  std::string path = word, name;
+  if (const std::size_t colon = word.rfind(':'); colon != std::string::npos && colon + 1 < word.size()) {
+    path = word.substr(0, colon);
+    name = word.substr(colon + 1);
+  }
+  const TetMesh mesh = read_tet_mesh(path);
+  return {mesh.vertices, read_tet_attribute(path, name), mesh.tets};
+}
+
+TetOptions tet_options(const TetCommand& command, const Input& input) {
+  TetOptions options = command.options;
+  const SizingOptions density = parse_density(command.density);
+  options.sizing.field.kind = density.kind;
+  options.sizing.field.exponent = density.exponent;
+  if (const std::string name = density_attribute(command.density); !name.empty())
+    options.sizing.field.attribute =
+        is_tet_format(command.input) ? read_tet_attribute(command.input, name) : read_vertex_attribute(command.input, name);
+  if (!command.sizes.empty()) options.sizing.sizes = read_sizes(command.sizes);
+  options.features = parse_features(command.features);
+  if (!command.feature_file.empty()) {
+    TriangleMesh surface = input.surface;
+    if (input.solid) {
+      surface.vertices = input.tets.vertices;
+      surface.triangles = boundary_facets(input.tets.tets);
+    }
+    options.features.given = read_feature_edges(command.feature_file, surface);
+  }
+  if (command.edge_length_relative > 0)
+    options.edge_length = command.edge_length_relative * bounding_box(input.vertices()).diagonal();
+  if (command.weld >= 0) options.weld = command.weld;
+  options.threads = command.common.threads;
+  options.compute = compute_options(command.compute);
+  if (!command.seeds.empty()) {
+    options.seeds = read_seeds(command.seeds, options.vertices);
+    options.vertices = options.seeds.size();
+  }
+  return options;
+}
+
+TriangleMesh boundary_mesh(const TetMesh& mesh) {
+  TriangleMesh surface;
+  surface.vertices = mesh.vertices;
+  surface.triangles = mesh.boundary;
+  surface.feature_edges = mesh.feature_edges;
+  return surface;
+}
+
+struct Measures {
+  TetQualityReport tets;
+  QualityReport boundary;
+  TetTopology topology;
+};
+
+Json improved_json(const TetImproveReport& improved) {
+  const auto shapes = [](const TetShapes& s) -> Json {
+    return {{"dihedral_min", s.dihedral_min}, {"dihedral_max", s.dihedral_max}, {"radius_ratio_min", s.radius_ratio_min},
+            {"radius_ratio_mean", s.radius_ratio_mean}, {"below_goal", s.below}};
+  };
+  return {{"rounds", improved.rounds}, {"edge_removals", improved.edge_removals}, {"face_removals", improved.face_removals},
+          {"contractions", improved.contractions}, {"insertions", improved.insertions}, {"moves", improved.moves},
+          {"before", shapes(improved.before)}, {"after", shapes(improved.after)}};
+}
+
+Json tet_report(Console& console, const TetCommand& command, const TetResult& result, const Measures& measures,
+                const Input& input, const TriangleMesh& reference) {
+  Json report = start_report("tet");
+  report["device"] = device_json(result.device);
+  report["input"] = input_json(input);
+  report["output"] = size_json(result.mesh);
+  report["background"] = {{"tets", result.background_tets}};
+  report["iterations"] = result.iterations;
+  report["evaluations"] = result.evaluations;
+  report["energy"] = result.energy;
+  report["gradient_norm"] = result.gradient_norm;
+  report["seconds"] = nullptr;
+  add_device_seconds(report, result.device, result.seconds.diagrams.device);
+  report["certification"] = certification_json(result.certification);
+  report["quality"] = quality_json(measures.boundary);
+  add_tets(report["quality"], measures.tets);
+  console.phase("measuring the distance of the boundary to the input");
+  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), reference));
+  report["quality"]["volume_input"] = result.volume;
+  report["topology"] = topology_json(measures.topology.boundary);
+  add_tets(report["topology"], measures.topology);
+  report["topology"]["matches_input"] = same_topology(measures.topology.boundary, result.input_topology);
+  report["topology"]["ball_property"] = result.boundary.ball_property;
+  report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
+  report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length},
+                      {"boundary_vertices", result.boundary_vertices}};
+  report["conform"] = {{"delaunay", result.delaunay}, {"steiner_points", result.steiner_points}};
+  if (command.options.min_dihedral > 0) report["improved"] = improved_json(result.improved);
+  return report;
+}
+
+Json tet_seconds(const TetSeconds& seconds) {
+  Json json{{"total", seconds.total}};
+  json.update(seconds_json(seconds.diagrams));
+  json["lbfgs"] = seconds.lbfgs;
+  json["extract"] = seconds.extract;
+  json["background"] = seconds.background;
+  json["prepare"] = seconds.prepare;
+  json["boundary"] = seconds.boundary;
+  json["improve"] = seconds.improve;
+  json["tet"] = seconds.total;
+  return json;
+}
+
+void print_summary(Console& console, const TetCommand& command, const TetResult& result, const Measures& measures,
+                   const Json& input, const Json& seconds) {
+  const TetQualityReport& q = measures.tets;
+  console.print(fmt::format("input      {}: {}", command.input, size_of(input)));
+  console.print(fmt::format("output     {}: {}", command.output,
+                            size_of(size_json(result.mesh))));
+  console.print(fmt::format("quality    dihedral angles {:.2f} to {:.2f} degrees; radius ratio {:.4f} on average, {:.4f} at least",
+                            q.dihedral_min, q.dihedral_max, q.radius_ratio_mean, q.radius_ratio_min));
+  console.print(fmt::format("boundary   {} in {}; theta_min {:.2f} degrees, q_min {:.4f}, q_ave {:.4f}",
+                            counted(result.boundary_vertices, "vertex", "vertices"),
+                            counted(result.mesh.boundary.size(), "triangle", "triangles"), measures.boundary.theta_min,
+                            measures.boundary.q_min, measures.boundary.q_ave));
+  const bool same = same_topology(measures.topology.boundary, result.input_topology);
+  console.print(fmt::format("topology   {}{}", describe(measures.topology.boundary), same ? "; as the input" : "; NOT as the input"));
+  console.print(fmt::format("volume     {:.6g}, {:+.3g} % of the input's", q.volume, 100 * (q.volume / result.volume - 1)));
+  const FeatureResult& features = result.boundary.features;
+  if (features.curves > 0)
+    console.print(fmt::format("features   {} of {} kept, {}", features.curves - features.broken,
+                              counted(features.curves, "curve", "curves"), counted(features.corners, "corner", "corners")));
+  print_device(console, result.device);
+  console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
+  if (command.common.verbose)
+    print_seconds(console, seconds, device_seconds_json(result.device, result.seconds.diagrams.device));
+  console.print_written({command.output, command.boundary, command.preview, command.common.report});
+}
+
+void warn_of(Console& console, const TetResult& result, const Measures& measures) {
+  const FeatureResult& features = result.boundary.features;
+  if (features.broken > 0)
+    console.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices", features.broken,
+                             counted(features.curves, "feature curve", "feature curves")));
+  if (!same_topology(measures.topology.boundary, result.input_topology))
+    console.warn(fmt::format("the boundary's topology ({}) is not the input's ({}); ask for more vertices",
+                             describe(measures.topology.boundary), describe(result.input_topology)));
+  const std::size_t count = result.mesh.vertices.size();
+  if (std::max(count, result.wanted) - std::min(count, result.wanted) > result.wanted / 20)
+    console.warn(fmt::format("{} instead of {}: the boundary's shape and good angles took as many",
+                             counted(count, "vertex", "vertices"), result.wanted));
+}
+
+}  // namespace
+
+void run(const TetCommand& command) {
+  const Stopwatch total;
+  const std::string& report_path = command.common.report;
+  check_outputs({{command.output, kTetFormats}, {command.boundary, kMeshFormats}, {command.preview, {".png"}},
+                 report_output(report_path)},
+                {command.input, command.seeds, command.feature_file});
+  const ThreadLimit limit(command.common.threads);
+  Console console(command.common.quiet, report_path == "-");
+  const Context context = console.context();
+
+  console.phase("reading " + command.input);
+  const Stopwatch reading;
+  const Input input = read_input(command.input, context);
+  const TetOptions options = tet_options(command, input);
+  double io = reading.seconds();
+
+  const TetResult result =
+      input.solid ? tetrahedralise(input.tets, options, context) : tetrahedralise(input.surface, options, context);
+  if (result.untiled > 0)
+    throw Error(fmt::format("the final diagram does not tile {} of the input; please report this as a bug",
+                            counted(result.untiled, "tetrahedron or triangle", "tetrahedra or triangles")));
+
+  const Stopwatch measuring;
+  Measures measures;
+  measures.tets = measure_tet_quality(result.mesh);
+  measures.boundary = measure_quality(boundary_mesh(result.mesh));
+  measures.topology = analyse_tet_topology(result.mesh);
+  warn_of(console, result, measures);
+  Json report;
+  if (!report_path.empty()) {
+    TriangleMesh reference = input.surface;
+    if (input.solid) {
+      reference.vertices = input.tets.vertices;
+      reference.triangles = boundary_facets(input.tets.tets);
+    }
+    report = tet_report(console, command, result, measures, input, reference);
+  }
+  Json seconds = tet_seconds(result.seconds);
+  seconds["quality"] = measuring.seconds();
+
+  console.phase("writing " + command.output);
+  stop_watching_interrupts();
+  const Stopwatch writing;
+  write_tet_mesh(command.output, result.mesh);
+  if (!command.boundary.empty()) write_mesh(command.boundary, boundary_surface(result.mesh));
+  io += writing.seconds();
+  const Stopwatch drawing;
+  if (!command.preview.empty()) write_tet_preview(command.preview, result.mesh);
+  seconds["preview"] = drawing.seconds();
+  seconds["io"] = io;
+  seconds["total"] = total.seconds();
+  if (!report_path.empty()) {
+    report["seconds"] = seconds;
+    write_report(report_path, report);
+  }
+  print_summary(console, command, result, measures, input_json(input), seconds);
+}
+
+}  // namespace bisector::cli
