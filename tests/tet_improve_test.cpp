@@ -17,6 +17,7 @@
 #include "bisector/mesh/orientation.h"
 #include "bisector/tetmesh/tet_edit.h"
 #include "bisector/tetmesh/tet_insert.h"
+#include "bisector/mesh/tet_quality.h"
 #include "bisector/tetmesh/tet_shape.h"
 #include "bisector/tetmesh/tet_swap.h"
 #include "models.h"

@@ -69,7 +69,7 @@ TriangleMesh boundary_mesh(const TetMesh& mesh) {
 
 class Tetrahedralise : public testing::TestWithParam<Case> {};
 
-TEST_P(Tetrahedralise, FillsTheSolidWithGoodTetrahedra) {
+TEST_P(Tetrahedralise, FillsTheSolidWithGoodTetrahedraAndKeepsFeatures) {
   const auto& [name, surface, vertices, sharp] = GetParam();
   const TetResult result = tetrahedralise(surface, options_for(vertices));
   const TetMesh& mesh = result.mesh;
@@ -107,11 +107,6 @@ TEST_P(Tetrahedralise, FillsTheSolidWithGoodTetrahedra) {
   const double gap = distance.max / 100 * bounding_box(surface.vertices).diagonal();
   EXPECT_NEAR(quality.volume, result.volume, area * gap + 1e-9);
   EXPECT_LT(gap, result.edge_length);
-}
-
-TEST_P(Tetrahedralise, KeepsFeatures) {
-  const auto& [name, surface, vertices, sharp] = GetParam();
-  const TetResult result = tetrahedralise(surface, options_for(vertices));
   EXPECT_EQ(result.boundary.features.broken, 0u);
   if (sharp == 0) return;
   // Marked edges lie on the box's edges and are as long in sum; its corners are vertices.
@@ -132,7 +127,7 @@ TEST_P(Tetrahedralise, KeepsFeatures) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Solids, Tetrahedralise, testing::ValuesIn(cases()), [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Solids, Tetrahedralise, testing::ValuesIn(cases()), [](const auto& c) { return c.param.name; });
 
 bool same_bits_and_tets(const TetMesh& a, const TetMesh& b) {
   return a.tets == b.tets && a.boundary == b.boundary && same_bits(a.vertices, b.vertices);

@@ -85,7 +85,7 @@ double uniform_edge(const Extent& extent, double vertices) {
   return high;
 }
 
-void check(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options, const SizingTarget& target) {
+void check(const TetMesh& mesh, const TetSizingOptions& options, const SizingTarget& target) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   if ((target.vertices > 0) == (target.edge_length != 0) || (target.vertices == 0 && !positive(target.edge_length)))
     throw Error("sizing: give either a number of vertices or a positive edge length");
@@ -106,7 +106,7 @@ void check(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOpt
     if (!positive(options.sizes.lengths[k]))
       throw Error(fmt::format("sizing: the edge length {:g} of point {} is not positive; correct it", options.sizes.lengths[k], k));
   if (field.kind != DensityKind::attribute || !options.sizes.points.empty()) return;
-  if (field.attribute.size() != mesh.vertices.size() && field.attribute.size() > boundary.vertices.size())
+  if (field.attribute.empty() || field.attribute.size() > mesh.vertices.size())
     throw Error(fmt::format("sizing: {} densities for {} vertices; give one per vertex", field.attribute.size(),
                             mesh.vertices.size()));
   for (std::size_t v = 0; v < field.attribute.size(); ++v)
@@ -398,7 +398,7 @@ double estimate_tet_vertices(double volume, double area, double h) {
 
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
                             const SizingTarget& target) {
-  check(mesh, boundary, options, target);
+  check(mesh, options, target);
   SizedSolid sized;
   sized.mesh = mesh;
   const Extent whole(mesh, boundary);

@@ -36,6 +36,7 @@ constexpr double kFreeShare = 0.5, kJointShare = 0.3, kInnerShare = 0.2;
 // Of the surface's own optimisation: to spread the sites along features, and before the boundary is extracted.
 constexpr int kLayoutSteps = 10, kBoundarySteps = 30;
 constexpr int kJointRounds = 3;
+constexpr double kOptimising = 0.8;  // of the whole run, about
 constexpr int kPushRounds = 8;
 // Heights over the boundary, in lengths of its edges, of sites inside that own none of it: a third layer's distance is 0.8.
 constexpr double kClear = 0.75;
@@ -103,7 +104,7 @@ void Pipeline::run_steps(const std::string& phase, double share, bool constraine
   step_.phase = phase;
   step_.constrained = constrained;
   step_.iterations = share_of(options_.iterations, share);
-  step_.share = 0.8 * share;
+  step_.share = kOptimising * share * std::min(1.0, static_cast<double>(state_.seeds.size()) / static_cast<double>(result_.wanted));
   optimise(backend_, state_, step_, totals_, context_);
   step_.done += step_.share;
 }
@@ -386,6 +387,12 @@ void set_regions(const TetMesh& from, TetMesh& mesh) {
   });
 }
 
+void check_attribute(const TetOptions& options, std::size_t vertices) {
+  const SizingOptions& field = options.sizing.field;
+  if (field.kind == DensityKind::attribute && options.sizing.sizes.points.empty() && field.attribute.size() != vertices)
+    throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex", field.attribute.size(), vertices));
+}
+
 TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& context) {
   const auto begin = Clock::now();
   TriangleMesh surface = boundary_of(mesh);
@@ -417,13 +424,14 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
 TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, const Context& context) {
   const auto begin = Clock::now();
   check_options(options);
+  check_attribute(options, input.vertices.size());
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   const WeldResult welded = join_borders(input, options.weld);
   const TriangleMesh surface = check_surface(welded.mesh);
   TetOptions moved = options;
   std::vector<double>& attribute = moved.sizing.field.attribute;
-  if (attribute.size() == input.vertices.size()) {
+  if (!attribute.empty()) {
     std::vector<double> values(welded.mesh.vertices.size());
     for (std::size_t v = input.vertices.size(); v-- > 0;) values[welded.vertex_of[v]] = attribute[v];
     attribute = std::move(values);
@@ -445,6 +453,7 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
 
 TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const Context& context) {
   check_options(options);
+  check_attribute(options, solid.vertices.size());
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   return mesh_solid(solid, options, context);
