@@ -126,7 +126,7 @@ std::vector<SolidCase> solid_cases() {
   add("random in a shaken grid", shaken(bar, 0.2, 2), seeds_about(bar, 12, 0, 3));
   add("random about five tetrahedra", five_tets(), seeds_about(five_tets(), 12, 0.5, 4));
   add("random in a step", step(), seeds_about(step(), 12, 0, 5));
-  add("random in a hollow cube", hollow(), seeds_about(hollow(), 10, 0, 6));
+  add("random in a hollow cube", hollow(), seeds_about(hollow(), 5, 0, 6));
   add("random in two cubes", two_cubes(), seeds_about(two_cubes(), 10, 0, 7));
   add("random about slivers", slivers(), seeds_about(slivers(), 10, 0, 8));
   add("random with inverted tetrahedra", inverted_among_good(), seeds_about(bar, 10, 0, 9));

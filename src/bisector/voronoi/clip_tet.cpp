@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "bisector/core/parallel.h"
 #include "bisector/mesh/tet_adjacency.h"
 #include "bisector/voronoi/surface.h"
 
@@ -64,6 +65,20 @@ TetFrame::TetFrame(const std::array<Vec3, 4>& given, const Tetrahedron& ranks, c
   }
 }
 
+std::vector<TetFrame> tet_frames(const Solid& solid) {
+  std::vector<TetFrame> frames(solid.mesh.tets.size());
+  parallel_each(frames.size(), [&](std::size_t t) {
+    if (!(solid.six_volumes[t] > 0)) return;
+    const Tetrahedron& v = solid.mesh.tets[t];
+    const auto& q = solid.mesh.vertices;
+    double density[4];
+    for (std::size_t m = 0; m < 4; ++m) density[m] = solid.density.empty() ? 1.0 : solid.density[v[m]];
+    frames[t] = TetFrame({q[v[0]], q[v[1]], q[v[2]], q[v[3]]}, v, solid.density.empty() ? nullptr : density,
+                         solid.six_volumes[t]);
+  });
+  return frames;
+}
+
 TetClipper::TetClipper() : planes_(64), starting_(64), ending_(64) { reserve(64); }
 
 void TetClipper::reset(const SortedSeeds& seeds, const Neighbours& neighbours) {
@@ -77,6 +92,15 @@ void TetClipper::begin(Index slot) {
   seed_ = seeds_->x[slot];
   list_ = neighbours_->list(slot);
   loaded_ = 0;
+}
+
+void TetClipper::set_plane(Plane& plane, Index other) const {
+  plane.n = seeds_->x[other] - seed_;
+  plane.squared = norm2(plane.n);
+  plane.k = 0.5 * plane.squared;
+  plane.length = std::sqrt(plane.squared) * (1 + 4 * kUnit);
+  plane.key = kFirstSeedKey + seeds_->id[other];
+  plane.slot = other;
 }
 
 // Loads neighbours up to `count`, by blocks of four. Half squares are rounded down by more than float's error, so a plane that is
@@ -95,12 +119,7 @@ void TetClipper::load(std::size_t count) {
       }
       const Index other = list_.begin[loaded_ + m];
       Plane& plane = listed_[loaded_ + m];
-      plane.n = seeds_->x[other] - seed_;
-      plane.squared = norm2(plane.n);
-      plane.k = 0.5 * plane.squared;
-      plane.length = std::sqrt(plane.squared) * (1 + 4 * kUnit);
-      plane.key = kFirstSeedKey + seeds_->id[other];
-      plane.slot = other;
+      set_plane(plane, other);
       block.x[m] = static_cast<float>(scale_ * plane.n.x);
       block.y[m] = static_cast<float>(scale_ * plane.n.y);
       block.z[m] = static_cast<float>(scale_ * plane.n.z);
@@ -152,6 +171,28 @@ void TetClipper::start(const TetFrame& tet) {
       vertices_[m].on[e] = kCornerFacets[m][e];
       vertices_[m].adjacent[e] = kCornerFacets[m][e];  // leaving a facet along the edge of the other two leads to the corner opposite it
     }
+  }
+}
+
+// Which vertices are adjacent is not known then; moments are what needs it.
+void TetClipper::take(const TetFrame& tet, const std::vector<Index>& labels,
+                      const std::vector<std::array<Index, 3>>& triples) {
+  start(tet);
+  reserve(triples.size());
+  if (planes_.size() < labels.size() + 4) planes_.resize(labels.size() + 4);
+  std::vector<Index> planes;
+  for (const Index label : labels) {
+    planes.push_back(is_facet(label) ? label & ~kFacetLabel : static_cast<Index>(plane_count_));
+    if (!is_facet(label)) set_plane(planes_[plane_count_++], label);
+  }
+  size_ = triples.size();
+  for (Index v = 0; v < size_; ++v) {
+    Vertex& vertex = vertices_[v];
+    for (std::size_t e = 0; e < 3; ++e) vertex.on[e] = planes[triples[v][e]];
+    if (std::max({vertex.on[0], vertex.on[1], vertex.on[2]}) < 4)
+      set_vertex(vertex, local_[6 - vertex.on[0] - vertex.on[1] - vertex.on[2]], 8 * kUnit * largest_);
+    else
+      place(vertex);
   }
 }
 
@@ -257,8 +298,10 @@ bool TetClipper::cut(std::size_t neighbour) {
   bounded_ = false;
   if (planes_.size() == plane_count_) {
     planes_.resize(2 * plane_count_);
-    starting_.resize(2 * plane_count_);
-    ending_.resize(2 * plane_count_);
+  }
+  if (starting_.size() < planes_.size()) {
+    starting_.resize(planes_.size());
+    ending_.resize(planes_.size());
   }
   const Index plane = static_cast<Index>(plane_count_++);
   planes_[plane] = by;

@@ -10,6 +10,7 @@
 #include "bisector/voronoi/exact_tet.h"
 #include "bisector/voronoi/moments.h"
 #include "bisector/voronoi/neighbours.h"
+#include "bisector/voronoi/solid.h"
 
 namespace bisector {
 
@@ -30,6 +31,9 @@ struct TetFrame {
   unsigned char anchor[4];  // of each facet: its first corner in order
 };
 
+// Those of all tetrahedra of a solid; of no use for one of no volume.
+std::vector<TetFrame> tet_frames(const Solid& solid);
+
 // Clips tetrahedra to cells and integrates over the result. One object per thread; memory is kept between calls.
 class TetClipper {
  public:
@@ -41,6 +45,12 @@ class TetClipper {
   void begin(Index slot);
   // Clips the tetrahedron, which must outlive the use of the result. False if the (perturbed) intersection is empty.
   bool clip(const TetFrame& tet);
+
+  // Takes the polyhedron that these planes bound (labels, the tetrahedron's facets last) with these vertices, as triples of
+  // positions among them, which the caller knows to be the result.
+  void take(const TetFrame& tet, const std::vector<Index>& labels, const std::vector<std::array<Index, 3>>& triples);
+  // Takes the whole tetrahedron.
+  void take(const TetFrame& tet) { start(tet); }
 
   // The last polyhedron. No bisector bounds it if it is the whole tetrahedron.
   bool whole() const { return plane_count_ == 4; }
@@ -99,6 +109,7 @@ class TetClipper {
   };
 
   void start(const TetFrame& tet);
+  void set_plane(Plane& plane, Index other) const;
   void load(std::size_t count);
   unsigned may_cut(const Block& block) const;
   void bound();

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <chrono>
 
-#include "bisector/core/error.h"
 #include "bisector/core/parallel.h"
 #include "bisector/voronoi/clip_tet.h"
 #include "bisector/voronoi/fixed_tree_sum.h"
+#include "bisector/voronoi/polyhedra.h"
 #include "bisector/voronoi/step_mass.h"
 
 namespace bisector {
@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::size_t kWalks = 16;   // cells that are walked together
 constexpr std::size_t kWholes = 256;  // cells that are taken whole together
-constexpr std::size_t kMostPlanes = 0xffff;
 
 double seconds_between(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
   return std::chrono::duration<double>(b - a).count();
@@ -73,32 +72,6 @@ struct Walker {
   std::uint64_t generation = 0;  // of the seeds that the clipper knows
 };
 
-void append_polyhedron(TetClipper& clipper, const SortedSeeds& seeds, Index tet, Index slot, ClippedPolyhedra& out) {
-  out.pairs.push_back({tet, seeds.id[slot]});
-  const std::vector<Index>& labels = clipper.labels();
-  if (labels.size() > kMostPlanes)
-    throw Error("the cell of seed " + std::to_string(seeds.id[slot]) +
-                " has more than 65,535 facets in one tetrahedron; spread the seeds");
-  for (const Index label : labels) out.labels.push_back(is_facet(label) ? label : seeds.id[label]);
-  out.label_offsets.push_back(out.labels.size());
-  struct Vertex {
-    std::array<std::uint16_t, 3> triple;
-    Index index;
-  };
-  std::vector<Vertex> vertices;
-  for (Index v = 0; v < clipper.vertex_count(); ++v) {
-    const std::array<Index, 3> on = clipper.triple(v);
-    vertices.push_back({{static_cast<std::uint16_t>(on[0]), static_cast<std::uint16_t>(on[1]),
-                         static_cast<std::uint16_t>(on[2])}, v});
-  }
-  std::sort(vertices.begin(), vertices.end(), [](const Vertex& a, const Vertex& b) { return a.triple < b.triple; });
-  for (const Vertex& v : vertices) {
-    out.triples.push_back(v.triple);
-    out.vertices.push_back(seeds.x[slot] + clipper.vertex(v.index));
-  }
-  out.vertex_offsets.push_back(out.triples.size());
-}
-
 }  // namespace
 
 struct ClippedVoronoi::Work {
@@ -138,18 +111,8 @@ ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
     : solid(s),
       inner_whole(inner == InnerCells::whole && s.density.empty()),
       boundary(s.boundary, kListsInSpace),
-      frames(s.mesh.tets.size()),
-      enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0) {
-  parallel_each(frames.size(), [&](std::size_t t) {
-    if (!(solid.six_volumes[t] > 0)) return;
-    const Tetrahedron& v = solid.mesh.tets[t];
-    const auto& q = solid.mesh.vertices;
-    double density[4];
-    for (std::size_t m = 0; m < 4; ++m) density[m] = solid.density.empty() ? 1.0 : solid.density[v[m]];
-    frames[t] = TetFrame({q[v[0]], q[v[1]], q[v[2]], q[v[3]]}, v, solid.density.empty() ? nullptr : density,
-                         solid.six_volumes[t]);
-  });
-}
+      frames(tet_frames(s)),
+      enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0) {}
 
 Walker& ClippedVoronoi::Work::walker() {
   Walker& walker = walkers.local();
