@@ -341,7 +341,7 @@ CLI::App* add_tet(CLI::App& program, TetCommand& command) {
   app->add_option("--min-dihedral", command.options.min_dihedral,
                   "degrees that all dihedral angles should exceed; 0: keep\n"
                   "slivers; default 30")
-      ->type_name("A")->check(number_below(70))->group("Optimisation");
+      ->type_name("A")->check(number_below(55))->group("Optimisation");
   app->add_option("--iterations", command.options.iterations, "at most so many; default 100")
       ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
   app->add_option("--tolerance", command.options.tolerance,

@@ -1,6 +1,7 @@
 #include "bisector/tetmesh/improve.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <numbers>
@@ -21,15 +22,20 @@ constexpr double kGain = 1e-3;      // of a sine: a smaller rise is none
 constexpr double kMeanGain = 2e-3;  // of the mean radius ratio
 constexpr int kLastSweeps = 2;
 constexpr std::size_t kCheck = 1024;  // vertices or tetrahedra between two looks at whether to go on
+// Parts of the angle below which vertices are put in, one after the other.
+constexpr std::array<double, 4> kInsertStages{0, 0.5, 0.75, 1};
 constexpr std::size_t kTrials = 4;    // places for a new vertex that are tried
 
 double sine(double degrees) { return std::sin(degrees * std::numbers::pi / 180); }
+
+// Tetrahedra and their shapes, ascending.
+using Shapes = std::vector<std::pair<Index, double>>;
 
 class Improver {
  public:
   Improver(const TetMesh& mesh, const TetImproveOptions& options, TetImproveReport& report, const Context& context)
       : edit_(mesh), smoother_(edit_, options.slide), options_(options), report_(report), context_(context),
-        goal_(sine(options.goal)), insert_below_(sine(options.insert_below)),
+        goal_(sine(options.goal)),
         insertions_left_(static_cast<std::size_t>(options.insertions * static_cast<double>(mesh.vertices.size()))),
         touched_(mesh.vertices.size(), 0) {}
 
@@ -42,26 +48,28 @@ class Improver {
   double least_shape() const;
   double mean_ratio() const;
   // Works on all tetrahedra with a shape below the goal, worst first; how many gave way.
-  std::size_t climb(bool insert);
-  bool mend(Index t, bool insert);
+  std::size_t climb();
+  bool mend(Index t);
   bool swap(Index t);
   bool smooth(Index t);
   bool contract(Index t);
+  bool may_insert(Index t) const { return insertions_left_ && edit_.tet(t).shape < insert_below_; }
   bool insert_vertex(Index t);
-  // Tetrahedra at the vertices with a shape of `beat` or less, ascending, and their shapes.
-  std::vector<std::pair<Index, double>> poor_around(const std::vector<Index>& vertices, double beat);
+  // Those at the vertices with a shape of `beat` or less.
+  Shapes poor_around(const std::vector<Index>& vertices, double beat);
   // Whether all have a shape above `beat` now, but for poor ones that were there before and are no worse.
-  bool worth_keeping(const std::vector<Index>& changed, const std::vector<std::pair<Index, double>>& poor, double beat) const;
+  bool worth_keeping(const std::vector<Index>& changed, const Shapes& poor, double beat) const;
   // Notes that there is something new around the tetrahedra, and whether there is since all was tried on one.
   void touch(const std::vector<Index>& tets);
-  bool tried(Index t, bool insert) const;
+  bool tried(Index t) const;
 
   TetEdit edit_;
   TetSmoother smoother_;
   const TetImproveOptions& options_;
   TetImproveReport& report_;
   const Context& context_;
-  double goal_, insert_below_;
+  double goal_;
+  double insert_below_ = 0;  // tetrahedra with a smaller shape may get a vertex now
   std::size_t insertions_left_;
 
   struct Failure {
@@ -149,16 +157,16 @@ void Improver::touch(const std::vector<Index>& tets) {
     for (const Index v : edit_.tet(t).corners) touched_[v] = time_;
 }
 
-bool Improver::tried(Index t, bool insert) const {
+bool Improver::tried(Index t) const {
   if (t >= failures_.size()) return false;
   const Failure& failure = failures_[t];
   const Tetrahedron& corners = edit_.tet(t).corners;
-  return failure.corners == corners && failure.insert == insert &&
+  return failure.corners == corners && (failure.insert || !may_insert(t)) &&
          std::all_of(corners.begin(), corners.end(), [&](Index v) { return touched_[v] <= failure.time; });
 }
 
-std::vector<std::pair<Index, double>> Improver::poor_around(const std::vector<Index>& vertices, double beat) {
-  std::vector<std::pair<Index, double>> poor;
+Shapes Improver::poor_around(const std::vector<Index>& vertices, double beat) {
+  Shapes poor;
   for (const Index v : vertices)
     for (const Index t : edit_.star(v))
       if (edit_.tet(t).shape <= beat) poor.push_back({t, edit_.tet(t).shape});
@@ -166,8 +174,7 @@ std::vector<std::pair<Index, double>> Improver::poor_around(const std::vector<In
   return poor;
 }
 
-bool Improver::worth_keeping(const std::vector<Index>& changed, const std::vector<std::pair<Index, double>>& poor,
-                             double beat) const {
+bool Improver::worth_keeping(const std::vector<Index>& changed, const Shapes& poor, double beat) const {
   return std::all_of(changed.begin(), changed.end(), [&](Index t) {
     const double shape = edit_.tet(t).shape;
     if (shape > beat) return true;
@@ -177,7 +184,6 @@ bool Improver::worth_keeping(const std::vector<Index>& changed, const std::vecto
 }
 
 bool Improver::insert_vertex(Index t) {
-  if (!insertions_left_ || edit_.tet(t).shape >= insert_below_) return false;
   const double beat = edit_.tet(t).shape + kGain;
   std::size_t tries = 0;
   for (const TetInsertion& insertion : find_insertions(edit_, t)) {
@@ -192,7 +198,7 @@ bool Improver::insert_vertex(Index t) {
     }
     std::sort(around.begin(), around.end());
     around.erase(std::unique(around.begin(), around.end()), around.end());
-    const std::vector<std::pair<Index, double>> poor = poor_around(around, beat);
+    const Shapes poor = poor_around(around, beat);
     if (edit_.replace(insertion.old, fresh)) {
       smoother_.raise_minimum(v, goal_);
       for (const Index w : around) smoother_.raise_minimum(w, goal_);
@@ -210,11 +216,11 @@ bool Improver::insert_vertex(Index t) {
   return false;
 }
 
-bool Improver::mend(Index t, bool insert) {
-  return swap(t) || smooth(t) || contract(t) || (insert && insert_vertex(t));
+bool Improver::mend(Index t) {
+  return swap(t) || smooth(t) || contract(t) || (may_insert(t) && insert_vertex(t));
 }
 
-std::size_t Improver::climb(bool insert) {
+std::size_t Improver::climb() {
   struct Item {
     double shape;
     Index tet;
@@ -222,19 +228,20 @@ std::size_t Improver::climb(bool insert) {
   };
   std::vector<Item> queue;
   for (Index t = 0; t < edit_.size(); ++t)
-    if (edit_.tet(t).alive && edit_.tet(t).shape < goal_) queue.push_back({edit_.tet(t).shape, t, edit_.tet(t).corners});
+    if (const TetEdit::Tet& tet = edit_.tet(t); tet.alive && tet.shape < goal_)
+      queue.push_back({tet.shape, t, tet.corners});
   std::sort(queue.begin(), queue.end(),
             [](const Item& a, const Item& b) { return a.shape != b.shape ? a.shape < b.shape : a.tet < b.tet; });
   std::size_t mended = 0, done = 0;
   for (const Item& item : queue) {
     if (done++ % kCheck == 0) context_.check();
     const TetEdit::Tet& tet = edit_.tet(item.tet);
-    if (!tet.alive || tet.corners != item.corners || tet.shape >= goal_ || tried(item.tet, insert)) continue;
-    if (mend(item.tet, insert)) {
+    if (!tet.alive || tet.corners != item.corners || tet.shape >= goal_ || tried(item.tet)) continue;
+    if (mend(item.tet)) {
       ++mended;
     } else {
       failures_.resize(edit_.size(), {});
-      failures_[item.tet] = {item.corners, time_, insert};
+      failures_[item.tet] = {item.corners, time_, may_insert(item.tet)};
     }
   }
   return mended;
@@ -246,17 +253,17 @@ void Improver::run() {
   for (int round = 0; round < options_.rounds; ++round) {
     report_progress("smoothing", round, 0.1 + 0.4 * round / options_.rounds);
     smooth_all(least_shape(), true);
-    climb(false);
+    climb();
     const double before = std::exchange(mean, mean_ratio());
     if (mean < before + kMeanGain) break;
   }
-  bool insert = false;
-  for (int round = 0; round < options_.rounds; ++round) {
+  // New vertices are few: the worst have the first choice.
+  std::size_t stage = 0;
+  for (int round = 0; round < options_.rounds && stage < kInsertStages.size(); ++round) {
     report_progress("removing slivers", round, 0.5 + 0.4 * round / options_.rounds);
     ++report_.rounds;
-    if (climb(insert)) continue;
-    if (insert) break;
-    insert = true;
+    insert_below_ = sine(kInsertStages[stage] * options_.insert_below);
+    if (!climb()) ++stage;
   }
   for (int round = 0; round < kLastSweeps; ++round) {
     report_progress("smoothing", round, 0.9);
@@ -286,9 +293,13 @@ TetShapes measure_shapes(const TetMesh& mesh, double goal) {
 
 TetImproveResult improve_tets(const TetMesh& mesh, const TetImproveOptions& options, const Context& context) {
   if (!(options.goal > 0 && options.goal <= 60))
-    throw Error("the goal for dihedral angles is " + std::to_string(options.goal) + " degrees: give one above 0 and up to 60");
-  if (!(options.insertions >= 0))
-    throw Error("the share of new vertices is " + std::to_string(options.insertions) + ": give 0 or more");
+    throw Error("the goal for dihedral angles is " + std::to_string(options.goal) +
+                " degrees: give one above 0 and up to 60");
+  if (!(options.insert_below >= 0 && options.insert_below <= 60))
+    throw Error("new vertices are wanted for dihedral angles below " + std::to_string(options.insert_below) +
+                " degrees: give 0 to 60");
+  if (!(options.insertions >= 0 && options.insertions <= 10))
+    throw Error("the share of new vertices is " + std::to_string(options.insertions) + ": give 0 to 10");
   const auto start = std::chrono::steady_clock::now();
   TetImproveResult result;
   Improver improver(mesh, options, result.report, context);

@@ -15,8 +15,9 @@
 namespace bisector {
 
 struct TetImproveOptions {
-  double goal = 35;           // degrees, in (0, 60]: tetrahedra with a smaller dihedral angle are worked on
-  double insert_below = 30;   // degrees: where nothing else helps, those with a smaller one get new vertices
+  // Degrees, in (0, 60]: tetrahedra with a dihedral angle below this, or above 180 less this, are worked on.
+  double goal = 35;
+  double insert_below = 30;   // likewise: where nothing else helps, such tetrahedra get new vertices
   double insertions = 0.02;   // new vertices, at most, over those of the mesh given
   int rounds = 30;            // at most
   TetSlide slide = {};        // how boundary vertices may move; as it is, they don't
@@ -42,10 +43,12 @@ struct TetImproveResult {
   TetImproveReport report;
 };
 
-// All tetrahedra of the result are exactly positive and conforming, the least dihedral_shape (tet_shape.h) is not
-// lower than before, and the facets of the boundary, between regions, and marked ones are those given, with the same
+// All tetrahedra of the result are exactly positive and conforming, the least sine of a dihedral angle is not lower
+// than before, and the facets of the boundary, between regions, and marked ones are those given, with the same
 // corners in the same places unless they may slide; marked edges stay, too. The same mesh gives the same result.
-// Throws Error as TetEdit does, and for a goal out of range; throws Cancelled.
+// Throws Error if a tetrahedron is flat or inverted, an index is out of range, a coordinate is not finite, the
+// regions are not as many as the tetrahedra, a facet has more than two of those, or an option is out of range; throws
+// Cancelled.
 TetImproveResult improve_tets(const TetMesh& mesh, const TetImproveOptions& options = {}, const Context& context = {});
 
 }  // namespace bisector

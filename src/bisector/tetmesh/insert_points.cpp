@@ -5,8 +5,8 @@
 #include <string>
 
 #include "bisector/core/error.h"
-#include "bisector/mesh/tet_adjacency.h"
 #include "bisector/mesh/orientation.h"
+#include "bisector/mesh/tet_adjacency.h"
 #include "bisector/tetmesh/tet_edit.h"
 #include "bisector/voronoi/hilbert.h"
 
@@ -81,7 +81,8 @@ class Inserter {
   // Rounding here changes which of many valid cavities is taken.
   bool in_sphere(Index t) const {
     const Tetrahedron& c = mesh_.tet(t).corners;
-    const Vec3 a = mesh_.point(c[0]) - p_, b = mesh_.point(c[1]) - p_, d = mesh_.point(c[2]) - p_, e = mesh_.point(c[3]) - p_;
+    const Vec3 a = mesh_.point(c[0]) - p_, b = mesh_.point(c[1]) - p_;
+    const Vec3 d = mesh_.point(c[2]) - p_, e = mesh_.point(c[3]) - p_;
     return norm2(a) * dot(cross(b, d), e) - norm2(b) * dot(cross(a, d), e) + norm2(d) * dot(cross(a, b), e) -
                norm2(e) * dot(cross(a, b), d) >
            0;
@@ -143,7 +144,8 @@ class Inserter {
     for (std::size_t i = 0; i < joined.size(); ++i)
       for (int k = 0; k < 4; ++k) {
         const Index other = mesh_.tet(joined[i]).across[k];
-        if (inner(joined[i], k) && std::find(joined.begin(), joined.end(), other) == joined.end()) joined.push_back(other);
+        if (inner(joined[i], k) && std::find(joined.begin(), joined.end(), other) == joined.end())
+          joined.push_back(other);
       }
     cavity_ = std::move(joined);
   }

@@ -12,8 +12,8 @@ namespace bisector {
 // The mesh with the points in it. `vertices` becomes the vertex of each point, or kNone for points that are outside,
 // on something kept, or at a vertex; the mesh's own vertices stay the first ones, and the points follow in the order
 // given. A point's cavity are the tetrahedra with the point in their circumscribed sphere, without those that the
-// boundary would hide from it (Bowyer 1981, Watson 1981): Delaunay where the boundary allows. Throws Error as TetEdit
-// does; throws Cancelled.
+// boundary would hide from it (Bowyer 1981, Watson 1981): Delaunay where the boundary allows. Throws Error as
+// improve_tets does, and for a point that is not finite; throws Cancelled.
 TetMesh insert_points(const TetMesh& mesh, const std::vector<Vec3>& points, std::vector<Index>& vertices,
                       const Context& context = {});
 

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "bisector/core/error.h"
-#include "bisector/mesh/tet_adjacency.h"
 #include "bisector/mesh/orientation.h"
+#include "bisector/mesh/tet_adjacency.h"
 #include "bisector/tetmesh/tet_shape.h"
 
 namespace bisector {
@@ -32,8 +32,8 @@ std::array<Index, 2> sorted_edge(Index a, Index b) { return {std::min(a, b), std
 void check_lists(const TetMesh& mesh) {
   const auto check_index = [&](Index v, const char* what, std::size_t i) {
     if (v >= mesh.vertices.size())
-      throw Error(std::string(what) + " " + std::to_string(i) + " has vertex " + std::to_string(v) + ", but there are " +
-                  std::to_string(mesh.vertices.size()));
+      throw Error(std::string(what) + " " + std::to_string(i) + " has vertex " + std::to_string(v) +
+                  ", but there are " + std::to_string(mesh.vertices.size()) + " vertices");
   };
   for (std::size_t t = 0; t < mesh.tets.size(); ++t)
     for (const Index v : mesh.tets[t]) check_index(v, "tetrahedron", t);
@@ -45,8 +45,8 @@ void check_lists(const TetMesh& mesh) {
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(mesh.vertices[v][k])) throw Error("vertex " + std::to_string(v) + " is not finite");
   if (!mesh.regions.empty() && mesh.regions.size() != mesh.tets.size())
-    throw Error("there are " + std::to_string(mesh.regions.size()) + " regions for " + std::to_string(mesh.tets.size()) +
-                " tetrahedra: give one for each, or none");
+    throw Error("there are " + std::to_string(mesh.regions.size()) + " regions for " +
+                std::to_string(mesh.tets.size()) + " tetrahedra: give one for each, or none");
 }
 
 }  // namespace
@@ -135,7 +135,8 @@ const std::vector<Index>& TetEdit::star(Index v) {
   return star_;
 }
 
-bool TetEdit::ring(Index t, int i, int j, std::size_t most, std::vector<Index>& tets, std::vector<Index>& vertices) const {
+bool TetEdit::ring(Index t, int i, int j, std::size_t most, std::vector<Index>& tets,
+                   std::vector<Index>& vertices) const {
   tets.clear();
   vertices.clear();
   const Index a = tets_[t].corners[i], b = tets_[t].corners[j];
@@ -228,7 +229,8 @@ bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> 
     for (const Index t : old)
       for (int i = 0; i < 4; ++i)
         for (int j = 0; j < i; ++j)
-          if (const auto e = sorted_edge(tets_[t].corners[i], tets_[t].corners[j]); kept_edge(e[0], e[1]) && !has_edge(e))
+          if (const auto e = sorted_edge(tets_[t].corners[i], tets_[t].corners[j]);
+              kept_edge(e[0], e[1]) && !has_edge(e))
             return false;
   }
 
@@ -279,7 +281,9 @@ bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> 
   return true;
 }
 
-bool TetEdit::replace(std::span<const Index> old, std::span<const Tetrahedron> fresh) { return exchange(old, fresh, nullptr); }
+bool TetEdit::replace(std::span<const Index> old, std::span<const Tetrahedron> fresh) {
+  return exchange(old, fresh, nullptr);
+}
 
 Index TetEdit::add_point(const Vec3& p) {
   const Index v = static_cast<Index>(points_.size());

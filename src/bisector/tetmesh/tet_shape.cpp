@@ -48,9 +48,9 @@ double dihedral_shape(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d
   for (int k = 0; k < 6; ++k) {
     const auto [i, j] = kFacets[k];
     const double s2 = norm2(f.corners[kEnds[k][1]] - f.corners[kEnds[k][0]]) / (f.areas2[i] * f.areas2[j]);
-    least = std::min(least, dot(f.normals[i], f.normals[j]) > 0 ? kObtuseGain * kObtuseGain * s2 : s2);
+    least = std::min(least, s2);
   }
-  return std::min(1.0, f.volume6 * std::sqrt(least));
+  return f.volume6 * std::sqrt(least);
 }
 
 DihedralSines dihedral_sines(const Vec3& x, const Vec3& b, const Vec3& c, const Vec3& d) {
@@ -65,13 +65,7 @@ DihedralSines dihedral_sines(const Vec3& x, const Vec3& b, const Vec3& c, const 
     const auto [i, j] = kFacets[k];
     const Vec3 edge = f.corners[kEnds[k][1]] - f.corners[kEnds[k][0]];
     const double length2 = norm2(edge);
-    double value = f.volume6 * std::sqrt(length2 / (f.areas2[i] * f.areas2[j]));
-    if (dot(f.normals[i], f.normals[j]) > 0) value *= kObtuseGain;
-    if (value >= 1) {
-      sines.value[k] = 1;
-      sines.gradient[k] = {};
-      continue;
-    }
+    const double value = f.volume6 * std::sqrt(length2 / (f.areas2[i] * f.areas2[j]));
     Vec3 gradient = volume - areas[i] - areas[j];
     if (kEnds[k][0] == 0) gradient -= (1 / length2) * edge;
     sines.value[k] = value;

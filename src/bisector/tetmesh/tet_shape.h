@@ -5,12 +5,11 @@
 
 namespace bisector {
 
-// The smallest sine of the six dihedral angles, with those of obtuse angles counted kObtuseGain times and at most 1:
-// in (0, 1] for det(b - a, c - a, d - a) > 0, and not positive otherwise.
+// The smallest sine of the six dihedral angles, so that angles near 0 and near 180 degrees count alike: in (0, 1] for
+// det(b - a, c - a, d - a) > 0, and 0 otherwise.
 double dihedral_shape(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
-inline constexpr double kObtuseGain = 1.3;
 
-// Sines (counted as above) of the six angles of a positively oriented tetrahedron, and their derivatives by `x`.
+// Sines of the six angles of a positively oriented tetrahedron, and their derivatives by `x`.
 struct DihedralSines {
   double value[6];
   Vec3 gradient[6];

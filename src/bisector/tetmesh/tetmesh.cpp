@@ -32,10 +32,11 @@ using Clock = std::chrono::steady_clock;
 using Kind = SeedPlace::Kind;
 
 // Of the steps allowed: sites free, then held on the boundary together with the others, then inside the finished boundary.
-constexpr double kFreeShare = 0.5, kJointShare = 0.3, kInnerShare = 0.2;
+constexpr double kFreeShare = 0.35, kJointShare = 0.2, kInnerShare = 0.15;
 // Of the surface's own optimisation: to spread the sites along features, and before the boundary is extracted.
 constexpr int kLayoutSteps = 10, kBoundarySteps = 30;
 constexpr int kJointRounds = 3;
+constexpr double kGoalBeyond = 5;    // degrees: aiming a little higher raises the mean as well
 constexpr double kOptimising = 0.8;  // of the whole run, about
 constexpr int kPushRounds = 8;
 // Heights over the boundary, in lengths of its edges, of sites inside that own none of it: a third layer's distance is 0.8.
@@ -305,7 +306,8 @@ void Pipeline::extract() {
   begin = Clock::now();
   if (options_.min_dihedral > 0) {
     TetImproveOptions improve;
-    improve.goal = options_.min_dihedral;
+    improve.insert_below = options_.min_dihedral;
+    improve.goal = options_.min_dihedral + kGoalBeyond;
     context_.report({"improving", 0, 1, state_.energy, state_.gradient_norm, 0.85});
     TetImproveResult improved = improve_tets(result_.mesh, improve, context_);
     result_.mesh = std::move(improved.mesh);

@@ -26,7 +26,7 @@ struct TetOptions {
   TetSizingOptions sizing;
   FeatureOptions features;
   std::uint64_t random_seed = 1;
-  int iterations = 100;      // at most, over all phases
+  int iterations = 100;      // of which phases may make shares: 0.35 on each level, 0.2 with the boundary, 0.15 inside it
   double tolerance = 1e-6;   // a phase ends when the energy falls by less than this share per step
   double min_angle = 40;     // degrees; goal for the boundary's triangles (remesh/improve.h), 0: none
   double min_dihedral = 30;  // degrees; goal for the tetrahedra (tetmesh/improve.h), 0: slivers stay
