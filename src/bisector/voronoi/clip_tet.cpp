@@ -26,6 +26,7 @@ typedef std::int32_t FourMask __attribute__((vector_size(4 * sizeof(float))));
 constexpr Index kCornerFacets[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
 // The two corners that are not in the set, by the bits of a set of two.
 constexpr unsigned char kOtherCorners[13][2] = {{}, {}, {}, {2, 3}, {}, {1, 3}, {0, 3}, {}, {}, {1, 2}, {0, 2}, {}, {0, 1}};
+constexpr unsigned char kBefore[3] = {2, 0, 1}, kAfter[3] = {1, 2, 0};
 constexpr Index kFirstSeedKey = 4;
 
 double max_coordinate(const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
@@ -137,7 +138,7 @@ void TetClipper::reserve(std::size_t vertices) {
   boundary_.resize(3 * n);
 }
 
-void TetClipper::set_vertex(Vertex& v, const Vec3& at, double slack) const {
+inline void TetClipper::set_vertex(Vertex& v, const Vec3& at, double slack) const {
   v.at = at;
   v.slack = slack;
   v.scaled[0] = static_cast<float>(scale_ * at.x);
@@ -145,7 +146,7 @@ void TetClipper::set_vertex(Vertex& v, const Vec3& at, double slack) const {
   v.scaled[2] = static_cast<float>(scale_ * at.z);
 }
 
-void TetClipper::start(const TetFrame& tet) {
+inline void TetClipper::start(const TetFrame& tet) {
   tet_ = &tet;
   uncertain_ = wider_ = bounded_ = collected_ = labelled_ = false;
   largest_ = tet_squared_ = 0;
@@ -224,7 +225,7 @@ bool TetClipper::clip(const TetFrame& tet) {
 // With |n| < 2 r, r the polyhedron's reach, a product as coded is off by less than 2e-6 |n| r < 4e-6 r^2, and by less than
 // 4 r slack for the vertex's own error. Planes with |n| >= 2 r do not cut at all. Whatever overflows or is not a number counts
 // as cutting.
-unsigned TetClipper::may_cut(const Block& block) const {
+inline unsigned TetClipper::may_cut(const Block& block) const {
   const auto load4 = [](const float* p) { return *reinterpret_cast<const Four*>(p); };
   const Four x = load4(block.x), y = load4(block.y), z = load4(block.z);
   const Four limit = load4(block.half) - margin_scaled_;
@@ -235,7 +236,7 @@ unsigned TetClipper::may_cut(const Block& block) const {
          (~static_cast<unsigned>(below[2]) & 4) | (~static_cast<unsigned>(below[3]) & 8);
 }
 
-void TetClipper::bound() {
+inline void TetClipper::bound() {
   bounded_ = true;
   double squared = 0, slack = 0;
   for (const Vertex *v = vertices_.data(), *end = v + size_; v != end; ++v) {
@@ -257,7 +258,7 @@ bool TetClipper::bounded_by(Index slot) const {
 }
 
 // Decides for every vertex on which side it is; lists those outside in removed_.
-std::size_t TetClipper::count_outside(const Plane& by) {
+inline std::size_t TetClipper::count_outside(const Plane& by) {
   const double one_norm = taxicab(by.n);
   const double below = by.k * (1 - 1e-12) - kTiny, above = by.k * (1 + 1e-12) + kTiny;
   signed char* sides = sides_.data();
@@ -356,7 +357,7 @@ void TetClipper::erase(Index v) {
       if (back == last) back = v;
 }
 
-void TetClipper::place(Vertex& v) {
+inline void TetClipper::place(Vertex& v) {
   // By key; planes of one vertex have different keys.
   const auto keyed = [&](Index plane) { return std::uint64_t{planes_[plane].key} << 32 | plane; };
   const std::uint64_t p = keyed(v.on[0]), q = keyed(v.on[1]), r = keyed(v.on[2]);
@@ -370,7 +371,7 @@ void TetClipper::place(Vertex& v) {
 
 // The edge is q_0 + t e, from its first end in order, and t = (k - n . q_0) / (n . e). All data are within the tetrahedron's
 // distance P of the seed, so with rounded data and operations t is off by less than 20 u P |n| / |n . e|.
-void TetClipper::place_on_edge(Vertex& v, const Plane& f, const Plane& g, const Plane& bisector) {
+inline void TetClipper::place_on_edge(Vertex& v, const Plane& f, const Plane& g, const Plane& bisector) {
   // The facets opposite two corners meet along the edge of the other two.
   const unsigned pair = (1u << (f.slot & ~kFacetLabel)) | (1u << (g.slot & ~kFacetLabel));
   unsigned ends[2] = {kOtherCorners[pair][0], kOtherCorners[pair][1]};
@@ -387,7 +388,7 @@ void TetClipper::place_on_edge(Vertex& v, const Plane& f, const Plane& g, const 
 // As Clipper::meet: in the facet's plane with origin at the seed's foot, where the bisectors are the lines with the directions
 // t = n x m, which cross at (c_b t_a - c_a t_b) / (t_a . m_b). Data and operations are those bounded there. However small the
 // angle, the vertex stays in the facet.
-void TetClipper::place_on_facet(Vertex& v, const Plane& f, const Plane& a, const Plane& b) {
+inline void TetClipper::place_on_facet(Vertex& v, const Plane& f, const Plane& a, const Plane& b) {
   const Vec3 along_a = cross(f.n, a.n), along_b = cross(f.n, b.n);
   const double determinant = dot(along_a, b.n);
   const double square = determinant * determinant, squares = a.squared * b.squared;
@@ -406,7 +407,7 @@ void TetClipper::place_on_facet(Vertex& v, const Plane& f, const Plane& a, const
 // Cramer's rule. All data are within the tetrahedron's distance P of the seed, and with rounded data and operations each term of
 // the numerator is off by less than 20 u P |a| |b| |c| and the determinant by 20 u |a| |b| |c|, which bounds the error of the
 // quotient as coded.
-void TetClipper::place_at_planes(Vertex& v, const Plane& a, const Plane& b, const Plane& c) {
+inline void TetClipper::place_at_planes(Vertex& v, const Plane& a, const Plane& b, const Plane& c) {
   const Vec3 bc = cross(b.n, c.n), ca = cross(c.n, a.n), ab = cross(a.n, b.n);
   const double determinant = dot(a.n, bc);
   const double square = determinant * determinant, squares = a.squared * b.squared * c.squared;
@@ -494,7 +495,10 @@ template <bool kUniform>
 Moments TetClipper::integrate() {
   if (whole()) return moved(tet_->moments, local_[tet_->order[0]]);
   collect();
-  relative_.resize(std::max(relative_.size(), size_));
+  if (relative_.size() < size_) {
+    relative_.resize(vertices_.size());
+    polygon_.resize(vertices_.size());
+  }
   if constexpr (!kUniform) {
     densities_.resize(std::max(densities_.size(), size_));
     for (Index v = 0; v < size_; ++v) densities_[v] = density(vertices_[v]);
@@ -503,30 +507,26 @@ Moments TetClipper::integrate() {
   Moments sum;
   for (const Index plane : bounding_) {
     if (plane == at_apex[0] || plane == at_apex[1] || plane == at_apex[2]) continue;
-    polygon_.clear();
-    std::size_t start_at = 0;
+    std::size_t n = 0, start_at = 0;
     Index least = kNone;
-    for (Index v = a_vertex_[plane];;) {
-      const Index* on = vertices_[v].on;
-      const std::size_t here = on[0] == plane ? 0 : on[1] == plane ? 1 : 2;
+    Index v = a_vertex_[plane];
+    do {
+      const Vertex& vertex = vertices_[v];
+      const std::size_t here = std::size_t{vertex.on[1] == plane} + 2 * std::size_t{vertex.on[2] == plane};
       // The edge that starts here, counter-clockwise seen from outside, is that with the plane before this one.
-      const Index key = planes_[on[here == 0 ? 2 : here - 1]].key;
-      if (key < least) {
-        least = key;
-        start_at = polygon_.size();
-      }
-      polygon_.push_back(v);
-      v = vertices_[v].adjacent[here == 2 ? 0 : here + 1];
-      if (v == polygon_[0]) break;
-    }
+      const Index key = planes_[vertex.on[kBefore[here]]].key;
+      start_at = key < least ? n : start_at;
+      least = std::min(key, least);
+      polygon_[n++] = v;
+      v = vertex.adjacent[kAfter[here]];
+    } while (v != polygon_[0]);
     if (apex == kNone) {
       apex = polygon_[start_at];
       std::copy_n(vertices_[apex].on, 3, at_apex);
       const Vec3 origin = vertex(apex);
-      for (std::size_t v = 0; v < size_; ++v) relative_[v] = vertex(v) - origin;
+      for (std::size_t k = 0; k < size_; ++k) relative_[k] = vertex(k) - origin;
       continue;
     }
-    const std::size_t n = polygon_.size();
     const auto next = [n](std::size_t k) { return k + 1 == n ? 0 : k + 1; };
     const Index a = polygon_[start_at];
     for (std::size_t k = next(start_at), l = next(k); l != start_at; k = l, l = next(l)) {

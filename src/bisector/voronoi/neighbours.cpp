@@ -63,14 +63,38 @@ struct Neighbours::Search {
   double radius = 0;  // carried along, for seeds nearby need similar ones
   std::vector<Index> found;
   std::vector<double> px, py, pz, squared;  // of the seeds found
-  std::vector<std::uint64_t> keys;
+  std::vector<std::uint64_t> keys, spread;
 
+  void sort_keys(std::size_t n, double limit);
   void resize(std::size_t n) {
     if (px.size() >= n) return;
     for (auto* array : {&px, &py, &pz, &squared}) array->resize(2 * n);
     keys.resize(2 * n);
+    spread.resize(2 * n);
   }
 };
+
+// Sorts the first n keys, all of squared distances below `limit`: spread over buckets, what is left is a step or two each.
+void Neighbours::Search::sort_keys(std::size_t n, double limit) {
+  constexpr std::size_t kBuckets = 64, kFew = 16;
+  if (!(limit > 1e-290 && limit < kInfinity)) return std::sort(keys.data(), keys.data() + n);
+  const double scale = kBuckets / limit;
+  const auto bucket = [&](std::uint64_t key) {
+    return std::min(kBuckets - 1, static_cast<std::size_t>(std::bit_cast<double>(key) * scale));
+  };
+  unsigned end[kBuckets + 1] = {};  // of each bucket, once it is filled; before that its begin
+  for (std::size_t k = 0; k < n; ++k) ++end[bucket(keys[k]) + 1];
+  for (std::size_t b = 0; b < kBuckets; ++b) end[b + 1] += end[b];
+  for (std::size_t k = 0; k < n; ++k) spread[end[bucket(keys[k])]++] = keys[k];
+  for (std::size_t b = 0, begin = 0; b < kBuckets; begin = end[b++])
+    if (end[b] - begin > kFew) std::sort(spread.data() + begin, spread.data() + end[b]);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::uint64_t key = spread[k];
+    std::size_t m = k;
+    for (; m > 0 && keys[m - 1] > key; --m) keys[m] = keys[m - 1];
+    keys[m] = key;
+  }
+}
 
 struct Neighbours::Grown {
   std::vector<Index> values;
@@ -233,7 +257,7 @@ bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Se
       std::size_t kept = static_cast<std::size_t>(out - search.keys.data());
       least = std::min(least, kept);
       total += kept;
-      std::sort(search.keys.data(), out);
+      search.sort_keys(kept, squared);
       radius_[i] = all ? kInfinity : search.radius * kBelow;
       if (kept > length_.most) {
         radius_[i] = std::sqrt(d[search.keys[length_.most] & kPlaceMask]) * kBelow;
