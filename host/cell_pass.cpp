@@ -23,34 +23,32 @@ std::uint32_t word(std::size_t n) { return static_cast<std::uint32_t>(n); }
 
 }  // namespace
 
-CellPass::CellPass(Device& device, bool is_double)
-    : device_(device), double_(is_double), triangle_of_(device), by_triangle_(device), begins_(device),
+CellPass::CellPass(Device& device, bool is_double, bool is_solid)
+    : device_(device), double_(is_double), solid_(is_solid), place_of_(device), by_place_(device), begins_(device),
       items_{Buffer(device), Buffer(device)}, digit_counts_(device), block_begins_{Buffer(device), Buffer(device)},
-      sums_{Buffer(device), Buffer(device)}, sorted_triangles_(device), cells_(device) {}
+      sums_{Buffer(device), Buffer(device)}, sorted_places_(device), cells_(device) {}
 
-void CellPass::set_surface(Commands& commands, const Surface& surface) {
-  triangles_ = surface.facet_of.size();
-  std::vector<Index> triangle_of;
-  for (const FacetSummary& summary : surface.summaries) triangle_of.push_back(summary.triangle);
-  upload(commands, triangle_of_, triangle_of);
+void CellPass::set_elements(Commands& commands, const std::vector<Index>& places, std::size_t count) {
+  places_ = count;
+  upload(commands, place_of_, places);
 }
 
 void CellPass::sort(Commands& commands, std::size_t cells, Scan& scan, const PairStore& store) {
-  by_triangle_.reserve((triangles_ + 1) * kWord);
+  by_place_.reserve((places_ + 1) * kWord);
   begins_.reserve((cells + 1) * kWord);
   for (Buffer& items : items_) items.reserve(store.count * 2 * kWord);
-  scan.reserve(std::max(triangles_, cells) + 1);
+  scan.reserve(std::max(places_, cells) + 1);
   commands.phase(Phase::sort);
-  commands.fill(by_triangle_, 0, (triangles_ + 1) * kWord, 0);
+  commands.fill(by_place_, 0, (places_ + 1) * kWord, 0);
   commands.fill(begins_, 0, (cells + 1) * kWord, 0);
   const std::uint32_t pairs = word(store.count);
   commands.dispatch({"count_pairs", {}},
-                    {reads(store.pairs), reads(store.status), reads(triangle_of_), updates(by_triangle_), updates(begins_)},
+                    {reads(store.pairs), reads(store.status), reads(place_of_), updates(by_place_), updates(begins_)},
                     pairs, store.count);
-  scan.record(commands, by_triangle_, triangles_ + 1);
+  scan.record(commands, by_place_, places_ + 1);
   scan.record(commands, begins_, cells + 1);
   commands.dispatch({"scatter_pairs", {}},
-                    {reads(store.pairs), reads(store.status), reads(triangle_of_), updates(by_triangle_), writes(items_[0])},
+                    {reads(store.pairs), reads(store.status), reads(place_of_), updates(by_place_), writes(items_[0])},
                     pairs, store.count);
   std::vector<std::uint32_t>& begins = begins_of_cells_;
   begins.resize(cells + 1);
@@ -73,8 +71,10 @@ void CellPass::sort(Commands& commands, std::size_t cells, Scan& scan, const Pai
   }
 }
 
-void CellPass::sum(Commands& commands, const DeviceSeeds& seeds, const NeighbourPass& neighbours, bool medians, Scan& scan,
-                   const Buffer& counters, const PairStore& store, CellMoments& result) {
+void CellPass::sum(SeedStage& stage, const PairStore& store, CellMoments& result) {
+  Commands& commands = stage.commands;
+  const DeviceSeeds& seeds = stage.seeds;
+  const NeighbourPass& neighbours = stage.neighbours;
   const std::size_t cells = seeds.count(), real = double_ ? sizeof(double) : sizeof(float);
   const std::vector<std::uint32_t>& begins = begins_of_cells_;
   const std::size_t items = begins.back();
@@ -86,7 +86,7 @@ void CellPass::sum(Commands& commands, const DeviceSeeds& seeds, const Neighbour
   }
   for (Buffer& sums : sums_) sums.reserve(blocks * kSumReals * real);
   for (Buffer& block_begins : block_begins_) block_begins.reserve((cells + 1) * kWord);
-  sorted_triangles_.reserve(items * kWord);
+  sorted_places_.reserve(items * kWord);
   cells_.reserve(cells * kCellReals * real);
 
   commands.phase(Phase::sum);
@@ -96,29 +96,29 @@ void CellPass::sum(Commands& commands, const DeviceSeeds& seeds, const Neighbour
   for (std::size_t terms = most; level == 0 || terms > 1; ++level) {
     const Buffer &block_begins = block_begins_[level % 2], &sums = sums_[level % 2], &terms_in = sums_[(level + 1) % 2];
     commands.dispatch({"count_blocks", {}}, {reads(*term_begins), writes(block_begins)}, count, cells + 1);
-    scan.record(commands, block_begins, cells + 1);
+    stage.scan.record(commands, block_begins, cells + 1);
     commands.dispatch(kernel("sum", double_, {level == 0}),
                       {reads(*term_begins), reads(block_begins), reads(items_[sorted_]), reads(store.mass_second),
-                       reads(store.first), reads(terms_in), writes(sums), reads(store.pairs), reads(triangle_of_),
-                       writes(sorted_triangles_), updates(counters)},
+                       reads(store.first), reads(terms_in), writes(sums), reads(store.pairs), reads(place_of_),
+                       writes(sorted_places_), updates(stage.counters)},
                       count, blocks);
     term_begins = &block_begins;
     terms = (terms + kBlock - 1) / kBlock;
     blocks = std::min(blocks, blocks / kBlock + cells);
   }
   const Buffer& totals = sums_[(level + 1) % 2];
-  commands.dispatch(kernel("cells", double_, {medians}),
+  commands.dispatch(kernel("cells", double_, {!stage.delaunay()}),
                     {reads(*term_begins), reads(totals), reads(neighbours.info()), reads(neighbours.lists()),
                      reads(neighbours.wide_lists()), writes(cells_)},
                     count, cells);
 
   std::vector<std::byte> words(cells * kCellReals * real);
-  std::vector<std::uint32_t> sorted_triangles(items);
+  std::vector<std::uint32_t> sorted_places(items);
   Counters counted{};
   commands.phase(Phase::transfer);
   commands.download(cells_, 0, words.data(), words.size());
-  if (items) commands.download(sorted_triangles_, 0, sorted_triangles.data(), items * kWord);
-  commands.download(counters, 0, counted.data(), sizeof counted);
+  if (items) commands.download(sorted_places_, 0, sorted_places.data(), items * kWord);
+  commands.download(stage.counters, 0, counted.data(), sizeof counted);
   commands.run();
   if (counted[kTwice])
     throw DeviceError(device_.description().name + ": pairs were met twice, so its atomic operations are not to be trusted; "
@@ -133,7 +133,7 @@ void CellPass::sum(Commands& commands, const DeviceSeeds& seeds, const Neighbour
   }
   result.triangles.values.resize(items);
   parallel_each(cells, [&](std::size_t slot) {
-    std::copy(sorted_triangles.begin() + begins[slot], sorted_triangles.begin() + begins[slot + 1],
+    std::copy(sorted_places.begin() + begins[slot], sorted_places.begin() + begins[slot + 1],
               result.triangles.values.begin() + static_cast<std::ptrdiff_t>(result.triangles.offsets[seeds.sorted.id[slot]]));
   });
 }
@@ -155,8 +155,8 @@ void CellPass::read_cells(const DeviceSeeds& seeds, const std::vector<std::byte>
       }
     }
     const Index i = seeds.sorted.id[slot];
-    result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[4]}, scale);
-    result.step_mass[i] = reals[5] < 0 ? -1 : scale * scale * reals[5];
+    result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[4]}, scale, solid_);
+    result.step_mass[i] = reals[5] < 0 ? -1 : scaled({reals[5], {}, 0}, scale, solid_).mass;
   });
   result.mass = fixed_sum(n, [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(n, [&](std::size_t i) { return result.cells[i].second; });

@@ -3,36 +3,32 @@
 
 #include <vector>
 
-#include "bisector/voronoi/clip.h"
+#include "bisector/core/parallel.h"
 #include "bisector/voronoi/neighbours.h"
-#include "bisector/voronoi/surface.h"
 
 namespace bisector::host {
 
-struct ExactPolygon {
-  bool empty = true;
-  Moments moments;
-  std::vector<Index> labels;  // in cyclic order: slots or facet edges
-};
-
 class ExactRung {
  public:
-  explicit ExactRung(const Surface& surface) : surface_(surface) {}
-
   // For new seeds. Lists come from `neighbours` if given, else they are grown on demand from a few times `spacing`.
   void begin(const SortedSeeds& seeds, const Neighbours* neighbours, double spacing);
-  // The slots that own the sites.
-  std::vector<Index> owners(const std::vector<Index>& sites);
-  // The parts of facets that lie in cells, for entries (facet, slot).
-  struct Item {
-    Index facet, slot;
-  };
-  std::vector<ExactPolygon> clip(const std::vector<Item>& items);
+  // The slots that own the points.
+  std::vector<Index> owners(const std::vector<Vec3>& points);
   // Neighbours that can answer Neighbours::nearest_to().
   const Neighbours& neighbours();
+  // Calls visit(k, clipper) for k < count, with a clipper (voronoi/clip.h, clip_tet.h) that knows the seeds, in parallel.
+  template <class Clipper, class Visit>
+  void for_each(std::size_t count, const Visit& visit, std::size_t chunk = 64) {
+    const Neighbours& near = neighbours();
+    parallel_chunks(count, chunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+      Clipper clipper;
+      if constexpr (requires { clipper.reset(*seeds_, near); }) clipper.reset(*seeds_, near);
+      else clipper.reset(*seeds_);
+      for (std::size_t k = begin; k < end; ++k) visit(k, clipper);
+    });
+  }
 
  private:
-  const Surface& surface_;
   const SortedSeeds* seeds_ = nullptr;
   const Neighbours* given_ = nullptr;
   Neighbours own_;

@@ -12,9 +12,7 @@
 namespace bisector::host {
 namespace {
 
-// A random planar cell has six neighbours and is certified by about 16 nearest seeds.
-constexpr std::uint32_t kMost = 32, kLeast = 12, kWideMost = 224;
-constexpr double kCell = 1.8, kWideCell = 2.5 * kCell;  // edge of a grid's cells, in typical spacings
+constexpr std::uint32_t kLeast = 12;
 constexpr std::size_t kLeastTargets = 4096;
 constexpr float kUnlimited = 2e37f;                   // beyond kInfinity of kernels/real.glsl
 constexpr std::size_t kWord = sizeof(std::uint32_t);
@@ -32,24 +30,24 @@ struct TargetsPush {
 
 }  // namespace
 
-NeighbourPass::NeighbourPass(Device& device, bool is_double)
-    : device_(device), double_(is_double), grid_(device), wide_grid_(device), info_(device), lists_(device),
+NeighbourPass::NeighbourPass(Device& device, bool is_double, const ListSizes& sizes)
+    : device_(device), double_(is_double), sizes_(sizes), grid_(device), wide_grid_(device), info_(device), lists_(device),
       wide_lists_(device), targets_(device), is_target_(device) {}
 
 void NeighbourPass::begin(Commands& commands, const DeviceSeeds& seeds, double spacing, Scan& scan) {
   const std::size_t n = seeds.count();
-  grid_.plan(seeds.sorted, kCell * spacing, seeds.scale, scan);
-  wide_grid_.plan(seeds.sorted, kWideCell * spacing, seeds.scale, scan);
+  grid_.plan(seeds.sorted, sizes_.cell * spacing, seeds.scale, scan);
+  wide_grid_.plan(seeds.sorted, sizes_.wide_cell * spacing, seeds.scale, scan);
   wide_grid_built_ = false;
   const std::size_t range = device_.limits().storage_range / kWord;
-  most_ = static_cast<std::uint32_t>(std::min<std::size_t>(kMost, range / n));
+  most_ = static_cast<std::uint32_t>(std::min<std::size_t>(sizes_.most, range / n));
   if (most_ < kLeast)
     throw DeviceError(fmt::format("{}: {} seeds are more than its buffers hold ({} bytes each); use --device cpu",
                                   device_.description().name, n, device_.limits().storage_range));
   lists_.reserve(n * most_ * kWord);
   info_.reserve(n * 4 * kWord);
-  target_room_ = std::min(std::max(kLeastTargets, n / 4), range / kWideMost);
-  wide_lists_.reserve(target_room_ * kWideMost * kWord);
+  target_room_ = std::min(std::max(kLeastTargets, static_cast<std::size_t>(sizes_.wide_share * static_cast<double>(n))), range / sizes_.wide_most);
+  wide_lists_.reserve(target_room_ * sizes_.wide_most * kWord);
   targets_.reserve(target_room_ * kWord);
   is_target_.reserve(n * kWord);
   commands.phase(Phase::grid);
@@ -66,7 +64,7 @@ void NeighbourPass::search(Commands& commands, const DeviceSeeds& seeds, const S
                            bool targets, std::size_t first_target, std::size_t items) {
   const SearchPush push{grid.push(), seeds.residual, 2, static_cast<std::uint32_t>(first_target),
                         static_cast<std::uint32_t>(target_room_)};
-  commands.dispatch(kernel("neighbours", double_, {targets ? kWideMost : most_, targets}),
+  commands.dispatch(kernel("neighbours", double_, {targets ? sizes_.wide_most : most_, targets, targets ? sizes_.wide_examined : sizes_.examined}),
                     {reads(seeds.words), reads(seeds.ids), reads(grid.ends()), reads(grid.slots()),
                      writes(targets ? wide_lists_ : lists_), writes(info_), updates(counters), reads(targets_)},
                     push, items);

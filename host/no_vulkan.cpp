@@ -1,6 +1,7 @@
 // What is left of the host layer in a build without Vulkan.
 #include "host/device.h"
 #include "host/vulkan_backend.h"
+#include "host/vulkan_solid_backend.h"
 
 namespace bisector {
 namespace {
@@ -20,6 +21,11 @@ Device::~Device() = default;
 const DeviceDescription& Device::description() const { throw DeviceError(kWithout); }
 
 std::unique_ptr<Backend> make_vulkan_backend(const Surface&, std::unique_ptr<Device>, const VulkanOptions&) {
+  throw DeviceError(kWithout);
+}
+
+std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid&, std::unique_ptr<Device>, const VulkanOptions&,
+                                                        InnerCells) {
   throw DeviceError(kWithout);
 }
 

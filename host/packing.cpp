@@ -39,9 +39,9 @@ void upload(Commands& commands, Buffer& buffer, const void* data, std::size_t by
   if (bytes) commands.upload(buffer, 0, data, bytes);
 }
 
-Moments scaled(const Moments& m, double scale) {
-  const double squared = scale * scale;
-  return {squared * m.mass, (squared * scale) * m.first, (squared * squared) * m.second};
+Moments scaled(const Moments& m, double scale, bool is_solid) {
+  const double squared = scale * scale, mass = is_solid ? squared * scale : squared;
+  return {mass * m.mass, (mass * scale) * m.first, (mass * squared) * m.second};
 }
 
 }  // namespace bisector::host

@@ -55,7 +55,7 @@ inline Kernel kernel(const char* name, bool is_double, std::vector<std::uint32_t
   return {std::string(name) + (is_double ? "_double" : "_single"), std::move(constants)};
 }
 
-// Lengths times `scale`, a power of two.
-Moments scaled(const Moments& m, double scale);
+// Lengths times `scale`, a power of two, of moments over an area or a volume.
+Moments scaled(const Moments& m, double scale, bool is_solid = false);
 
 }  // namespace bisector::host

@@ -11,17 +11,10 @@ namespace {
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
 constexpr int kRoundsPerRun = 6;           // of proposals and clipping, before the host looks again
-constexpr std::uint32_t kWideCorners = 48;
 constexpr std::uint32_t kAsCounted = kNone;
 
-struct StartPush {
-  std::uint32_t facet_base, first_facet, facet_count, proposal_room, pair_room;
-};
-struct SamplesPush {
-  std::uint32_t facet_base, first, count, proposal_room;
-};
 struct AdvancePush {
-  std::uint32_t of_pairs, room, most_groups;
+  std::uint32_t of_pairs, room, most_groups, most_items;
 };
 struct AdmitPush {
   std::uint32_t table_mask, pair_room;
@@ -38,18 +31,9 @@ std::uint32_t word(std::size_t n) { return static_cast<std::uint32_t>(n); }
 
 }  // namespace
 
-// Which specialisation of the clip kernel.
-struct PairPass::Kind {
-  unsigned rung = 0;
-  bool listed = false, labels = false;
-};
-
 PairPass::PairPass(Device& device, bool is_double, const Rooms& rooms)
-    : device_(device), double_(is_double), proposals_(device), table_(device), flagged_(device), gathered_(device),
-      settled_(device), values_(device), no_labels_(device), sample_facets_(device), doubts_(device),
-      proposal_room_(rooms.proposals), table_size_(rooms.table), first_room_(rooms.pairs) {}
-
-void PairPass::set_plan(Commands& commands, const FacetSamples& plan) { upload(commands, sample_facets_, plan.facets); }
+    : device_(device), double_(is_double), buffers_(device, rooms), gathered_(device), settled_(device), values_(device),
+      first_room_(rooms.pairs), most_at_once_(static_cast<std::size_t>(2 * rooms.batch_pairs) + 64) {}
 
 // As many as there is room for first moments in one binding.
 std::size_t PairPass::most_pairs() const {
@@ -58,33 +42,32 @@ std::size_t PairPass::most_pairs() const {
 
 void PairPass::make_room(const PairJob& job) {
   const std::size_t real = real_size(), most = most_pairs();
+  const double expected = job.domain.expected_pairs();
   PairStore& store = job.store;
   if (first_room_) {
     if (store.room == 0) store.room = first_room_;
-  } else if (store.room < static_cast<std::size_t>(1.1 * job.plan.expected_pairs) + 1) {
-    store.room = static_cast<std::size_t>(1.3 * job.plan.expected_pairs) + 4096;
+  } else if (store.room < static_cast<std::size_t>(1.1 * expected) + 1) {
+    store.room = static_cast<std::size_t>(1.3 * expected) + 4096;
   }
   if (store.room > most) {
-    if (job.plan.expected_pairs > static_cast<double>(most))
-      throw DeviceError(fmt::format("{}: about {:.0f} pairs of cells and triangles are more than its buffers hold; use "
+    if (expected > static_cast<double>(most))
+      throw DeviceError(fmt::format("{}: about {:.0f} pairs of cells and {} are more than its buffers hold; use "
                                     "--device cpu, or fewer vertices",
-                                    device_.description().name, job.plan.expected_pairs));
+                                    device_.description().name, expected, job.domain.elements()));
     store.room = most;
   }
   store.pairs.reserve(store.room * 2 * kWord);
   store.status.reserve(store.room * kWord);
   store.mass_second.reserve(store.room * 2 * real);
   store.first.reserve(store.room * 3 * real);
-  proposals_.reserve(proposal_room_ * 2 * kWord);
-  table_.reserve(table_size_ * kWord);
-  flagged_.reserve(3 * table_size_ * kWord);
-  no_labels_.reserve(kWord);
-  doubts_.reserve(2 * job.seeds.count() * kWord);
-  if (sample_facets_.size() == 0) sample_facets_.reserve(kWord);
+  buffers_.proposals.reserve(buffers_.proposal_room * 2 * kWord);
+  buffers_.table.reserve(buffers_.table_size * kWord);
+  buffers_.flagged.reserve(3 * buffers_.table_size * kWord);
+  buffers_.no_labels.reserve(kWord);
+  buffers_.doubts.reserve(3 * job.seeds.count() * kWord);
 }
 
 void PairPass::run(const PairJob& job, Certification& certification) {
-  set_counter(job, kTargetCount, 0);
   for (;;) {
     make_room(job);
     certification = {};
@@ -93,45 +76,43 @@ void PairPass::run(const PairJob& job, Certification& certification) {
     job.commands.fill(job.counters, 0, (kForCpu + 1) * kWord, 0);
     job.commands.fill(job.counters, kUnsureMet * kWord, 2 * kWord, 0);
     unsettled_ = 0;
-    job.commands.fill(doubts_, 0, 2 * job.seeds.count() * kWord, 0);
+    job.commands.fill(buffers_.doubts, 0, 3 * job.seeds.count() * kWord, 0);
     bool complete = true;
-    std::size_t chunk = 0;
-    for (const FacetBatch& batch : job.plan.batches) {
-      while (batch.first >= job.surface.facets[chunk].first + job.surface.facets[chunk].count) ++chunk;
+    for (std::size_t batch = 0; complete && batch < job.domain.batches(); ++batch) {
       const std::size_t begin = job.store.count;
-      complete = run_batch(job, batch, chunk, certification);
-      if (!complete) break;
-      job.store.ranges.push_back({chunk, begin, job.store.count});
+      complete = run_batch(job, batch, certification);
+      job.store.ranges.push_back({job.domain.chunk_of(batch), begin, job.store.count});
     }
     if (complete) return;
   }
 }
 
 // False if some buffer was too small: then it is larger now, and all has to be done again.
-bool PairPass::run_batch(const PairJob& job, const FacetBatch& batch, std::size_t chunk, Certification& certification) {
-  start(job, batch, chunk);
+bool PairPass::run_batch(const PairJob& job, std::size_t batch, Certification& certification) {
+  const std::size_t chunk = job.domain.chunk_of(batch);
+  start(job, batch);
   for (;;) {
     spread(job, chunk);
     const Counters counters = read_counters(job);
     if (const std::uint32_t overflow = counters[kOverflow]) {
-      if (overflow & kOverflowProposals) proposal_room_ *= 2;
-      if (overflow & kOverflowTable) table_size_ *= 2;
+      if (overflow & kOverflowProposals) buffers_.proposal_room *= 2;
+      if (overflow & kOverflowTable) buffers_.table_size *= 2;
       if (overflow & kOverflowPairs) {
         const std::size_t most = most_pairs();
         if (job.store.room >= most)
-          throw DeviceError(fmt::format("{}: more than {} pairs of cells and triangles, which its buffers do not hold; use "
+          throw DeviceError(fmt::format("{}: more than {} pairs of cells and {}, which its buffers do not hold; use "
                                         "--device cpu, or fewer vertices",
-                                        device_.description().name, most));
+                                        device_.description().name, most, job.domain.elements()));
         job.store.room = std::min(job.store.room * 2, most);
       }
       return false;
     }
     job.store.count = counters[kPairs];
-    if (counters[kProposals] != counters[kProposalsEnd]) continue;
+    if (counters[kProposals] != counters[kProposalsEnd] || counters[kPairs] != counters[kPairsEnd]) continue;
     if (const std::size_t count = counters[kShort]) {
       certification.wider += count;
-      job.neighbours.widen(job.commands, job.seeds, job.scan, flagged_, count, job.store.pairs, counters[kTargetCount],
-                           job.counters);
+      job.neighbours.widen(job.commands, job.seeds, job.scan, buffers_.flagged, count, job.store.pairs,
+                           counters[kTargetCount], job.counters);
       clip_flagged(job, chunk, 1, 0, count);
       set_counter(job, kShort, 0);
     } else if (!climb(job, chunk, counters, certification)) {
@@ -161,17 +142,16 @@ bool PairPass::climb(const PairJob& job, std::size_t chunk, const Counters& coun
 
 std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, float share, Certification& certification) {
   std::size_t refined = 0;
-  const bool double_next = !job.surface.double_facets.empty();
   for (const PairStore::Range& range : job.store.ranges)
     // No more at once than the lists of flagged pairs hold.
-    for (std::size_t first = range.begin; first < range.end; first += table_size_) {
-      const DoubtfulPush push{word(first), word(std::min(table_size_, range.end - first)), word(table_size_),
-                              static_cast<float>(job.surface.surface->mass / job.surface.surface->area), share};
+    for (std::size_t first = range.begin; first < range.end; first += buffers_.table_size) {
+      const DoubtfulPush push{word(first), word(std::min(buffers_.table_size, range.end - first)), word(buffers_.table_size),
+                              static_cast<float>(job.domain.mean_density()), share};
       job.commands.phase(Phase::clip);
       job.commands.fill(job.counters, kProposals * kWord, 3 * kWord, 0);
-      job.commands.dispatch({"doubtful", {double_next}},
-                            {reads(job.store.pairs), reads(job.store.status), reads(doubts_), reads(cells), updates(job.counters),
-                             updates(flagged_)},
+      job.commands.dispatch({"doubtful", {job.domain.double_next(), job.domain.is_solid()}},
+                            {reads(job.store.pairs), reads(job.store.status), reads(buffers_.doubts), reads(cells),
+                             updates(job.counters), updates(buffers_.flagged)},
                             push, push.count);
       Counters counters = read_counters(job);
       const std::size_t found = counters[kUncertain] + counters[kForCpu];
@@ -187,80 +167,56 @@ std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, float shar
   return refined;
 }
 
-void PairPass::start(const PairJob& job, const FacetBatch& batch, std::size_t chunk) {
-  const FacetChunk& facets = job.surface.facets[chunk];
-  const PairStore& store = job.store;
-  Commands& commands = job.commands;
-  commands.phase(Phase::clip);
-  commands.fill(table_, 0, table_size_ * kWord, 0);
-  commands.fill(job.counters, kProposals * kWord, 3 * kWord, 0);
-  const StartPush push{word(facets.first), word(batch.first), word(batch.count), word(proposal_room_), word(store.room)};
-  commands.dispatch(kernel("start", double_),
-                    {reads(job.seeds.words), reads(facets.words), reads(facets.meta), reads(facets.wholes),
-                     reads(job.sites.owners()), updates(store.pairs), updates(store.status), updates(store.mass_second),
-                     updates(store.first), writes(proposals_), updates(job.counters)},
-                    push, batch.count);
-  if (batch.sample_count) {
-    const SamplesPush samples{word(facets.first), word(batch.first_sample), word(batch.sample_count), word(proposal_room_)};
-    commands.dispatch({"start_samples", {}},
-                      {reads(sample_facets_), reads(job.samples.owners()), updates(proposals_), updates(job.counters),
-                       reads(job.sites.owners()), reads(facets.meta)},
-                      samples, batch.sample_count);
-  }
-  // Whole facets are pairs already; what follows starts after them.
-  advance(job, true);
+void PairPass::start(const PairJob& job, std::size_t batch) {
+  job.commands.phase(Phase::clip);
+  job.commands.fill(buffers_.table, 0, buffers_.table_size * kWord, 0);
+  job.commands.fill(job.counters, kProposals * kWord, 3 * kWord, 0);
+  job.domain.start(job, buffers_, batch);
+  // What is a pair by now is not clipped.
+  advance(job, true, kNone);
 }
 
-void PairPass::advance(const PairJob& job, bool of_pairs) {
-  const AdvancePush push{of_pairs, word(of_pairs ? job.store.room : proposal_room_), device_.limits().groups};
+void PairPass::advance(const PairJob& job, bool of_pairs, std::size_t most) {
+  const AdvancePush push{of_pairs, word(of_pairs ? job.store.room : buffers_.proposal_room), device_.limits().groups,
+                         word(most)};
   job.commands.dispatch({"advance", {}}, {updates(job.counters)}, push, 1);
 }
 
 // Records rounds in which proposals become pairs, and pairs are clipped and propose more.
 void PairPass::spread(const PairJob& job, std::size_t chunk) {
-  const AdmitPush admit{word(table_size_ - 1), word(job.store.room)};
+  const AdmitPush admit{word(buffers_.table_size - 1), word(job.store.room)};
   for (int round = 0; round < kRoundsPerRun; ++round) {
-    advance(job, false);
+    advance(job, false, most_at_once_);
     job.commands.dispatch_indirect({"admit", {}},
-                                   {reads(proposals_), updates(table_), updates(job.store.pairs), updates(job.counters)}, admit,
-                                   job.counters, kProposalGroups * kWord);
-    advance(job, true);
+                                   {reads(buffers_.proposals), updates(buffers_.table), updates(job.store.pairs),
+                                    updates(job.counters)},
+                                   admit, job.counters, kProposalGroups * kWord);
+    advance(job, true, most_at_once_);
     ClipPush push{};
     push.pair_count = kAsCounted;
-    clip(job, chunk, {}, push, no_labels_, [&](const Kernel& k, std::initializer_list<Binding> bindings, const ClipPush& p) {
-      job.commands.dispatch_indirect(k, bindings, p, job.counters, kPairGroups * kWord);
-    });
+    clip(job, chunk, {}, push, buffers_.no_labels,
+         [&](const Kernel& k, std::initializer_list<Binding> bindings, const ClipPush& p) {
+           job.commands.dispatch_indirect(k, bindings, p, job.counters, kPairGroups * kWord);
+         });
   }
 }
 
-template <class Dispatch>
-void PairPass::clip(const PairJob& job, std::size_t chunk, const Kind& kind, ClipPush push, const Buffer& labels,
-                    const Dispatch& dispatch) {
-  const bool doubled = kind.rung == 2;
-  const FacetChunk& facets = (doubled ? job.surface.double_facets : job.surface.facets)[chunk];
-  push.facet_base = word(facets.first);
+void PairPass::clip(const PairJob& job, std::size_t chunk, const ClipKind& kind, ClipPush push, const Buffer& labels,
+                    const ClipDispatch& dispatch) {
   push.residual = job.seeds.residual;
   push.two = 2;
-  push.proposal_room = word(proposal_room_);
-  push.flagged_room = word(table_size_);
-  const bool double_next = !doubled && !job.surface.double_facets.empty();
-  const std::uint32_t corners = kind.labels || kind.rung == 0 ? kMostCorners : kWideCorners;
-  const PairStore& store = job.store;
+  push.proposal_room = word(buffers_.proposal_room);
+  push.flagged_room = word(buffers_.table_size);
+  push.cells = word(job.seeds.count());
   job.commands.phase(Phase::clip);
-  dispatch(kernel("clip", double_ || doubled,
-                  {corners, job.surface.surface->density.empty(), kind.rung, kind.listed, kind.labels, doubled, double_next}),
-           {reads(doubled ? job.seeds.doubles : job.seeds.words), reads(job.seeds.ids), reads(facets.words),
-            reads(facets.meta), reads(job.neighbours.info()), updates(doubts_), reads(job.neighbours.lists()),
-            reads(job.neighbours.wide_lists()), reads(store.pairs), updates(store.status), updates(store.mass_second),
-            updates(store.first), updates(proposals_), updates(job.counters), updates(flagged_), writes(labels)},
-           push);
+  job.domain.clip(job, buffers_, chunk, kind, push, labels, dispatch);
 }
 
 void PairPass::clip_flagged(const PairJob& job, std::size_t chunk, unsigned rung, unsigned region, std::size_t count) {
   ClipPush push{};
-  push.first_pair = word(region * table_size_);
+  push.first_pair = word(region * buffers_.table_size);
   push.pair_count = word(count);
-  clip(job, chunk, {rung, true, false}, push, no_labels_,
+  clip(job, chunk, {rung, true, false}, push, buffers_.no_labels,
        [&](const Kernel& k, std::initializer_list<Binding> bindings, const ClipPush& p) {
          job.commands.dispatch(k, bindings, p, count);
        });
@@ -291,24 +247,22 @@ void PairPass::settle_exactly(const PairJob& job, const Counters& counters) {
   const std::size_t count = counters[kForCpu];
   Commands& commands = job.commands;
   gathered_.reserve(3 * count * kWord);
-  const GatherPush gather{word(2 * table_size_), word(count)};
-  commands.dispatch({"gather", {}}, {reads(flagged_), reads(job.store.pairs), writes(gathered_)}, gather, count);
+  const GatherPush gather{word(2 * buffers_.table_size), word(count)};
+  commands.dispatch({"gather", {}}, {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_)}, gather, count);
   std::vector<Index> gathered(3 * count);
   commands.download(gathered_, 0, gathered.data(), gathered.size() * kWord);
   commands.run();
 
-  std::vector<ExactRung::Item> items(count);
-  for (std::size_t k = 0; k < count; ++k) items[k] = {gathered[3 * k + 1], gathered[3 * k + 2]};
-  const std::vector<ExactPolygon> polygons = job.exact.clip(items);
+  std::vector<PairName> names(count);
+  for (std::size_t k = 0; k < count; ++k) names[k] = {gathered[3 * k + 1], gathered[3 * k + 2]};
+  const std::vector<ExactPair> pairs = job.domain.clip_exactly(job, names);
 
   std::vector<std::uint32_t> settled, proposals;
   RealWords values(double_);
   for (std::size_t k = 0; k < count; ++k) {
-    const ExactPolygon& polygon = polygons[k];
-    settled.insert(settled.end(), {gathered[3 * k], polygon.empty ? kStatusEmpty : kStatusClipped});
-    values.moments(scaled(polygon.moments, job.seeds.scale));
-    for (const Index label : polygon.labels)
-      if (!is_edge(label)) proposals.insert(proposals.end(), {items[k].facet, label});
+    settled.insert(settled.end(), {gathered[3 * k], pairs[k].empty ? kStatusEmpty : kStatusClipped});
+    values.moments(pairs[k].moments);
+    for (const PairName& proposal : pairs[k].proposals) proposals.insert(proposals.end(), {proposal.element, proposal.slot});
   }
   upload(commands, settled_, settled);
   upload(commands, values_, values);
@@ -318,10 +272,10 @@ void PairPass::settle_exactly(const PairJob& job, const Counters& counters) {
                     word(count), count);
   set_counter(job, kForCpu, 0);
   const std::size_t before = counters[kProposals], added = proposals.size() / 2;
-  if (before + added > proposal_room_) {
+  if (before + added > buffers_.proposal_room) {
     set_counter(job, kOverflow, kOverflowProposals);
   } else if (added) {
-    commands.upload(proposals_, before * 2 * kWord, proposals.data(), proposals.size() * kWord);
+    commands.upload(buffers_.proposals, before * 2 * kWord, proposals.data(), proposals.size() * kWord);
     set_counter(job, kProposals, word(before + added));
   }
 }

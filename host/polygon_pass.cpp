@@ -3,13 +3,14 @@
 #include <algorithm>
 
 #include "bisector/core/parallel.h"
+#include "bisector/voronoi/clip.h"
 #include "bisector/voronoi/polygons.h"
 
 namespace bisector::host {
 namespace {
 
 constexpr std::size_t kWindow = std::size_t{1} << 16;  // pairs that are labelled at once
-constexpr std::size_t kStride = PairPass::kMostCorners + 1;
+constexpr std::size_t kStride = FacetPairs::kMostCorners + 1;
 constexpr std::size_t kChunk = 1024;
 
 // Where the labels of a pair are; none if the pair is to be clipped exactly or is whole.
@@ -21,7 +22,7 @@ struct Found {
 
 }  // namespace
 
-void PolygonPass::run(PairPass& pairs, const PairJob& job, RestrictedPolygons& polygons) {
+void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, RestrictedPolygons& polygons) {
   const PairStore& store = job.store;
   labels_.reserve(kWindow * kStride * sizeof(Index));
   std::vector<Index> names(2 * store.count), status(store.count);
@@ -57,17 +58,17 @@ void PolygonPass::run(PairPass& pairs, const PairJob& job, RestrictedPolygons& p
         found.push_back(entry);
       }
     }
-  std::vector<ExactRung::Item> items;
+  std::vector<PairName> items;
   for (const std::size_t k : doubtful) items.push_back({found[k].facet, found[k].slot});
-  const std::vector<ExactPolygon> exact = job.exact.clip(items);
+  const std::vector<std::vector<Index>> exact = domain.label_exactly(items);
   for (std::size_t k = 0; k < doubtful.size(); ++k) {
     Found& entry = found[doubtful[k]];
     entry.first_label = labels.size();
-    entry.count = static_cast<Index>(exact[k].labels.size());
-    labels.insert(labels.end(), exact[k].labels.begin(), exact[k].labels.end());
+    entry.count = static_cast<Index>(exact[k].size());
+    labels.insert(labels.end(), exact[k].begin(), exact[k].end());
   }
 
-  const Surface& surface = *job.surface.surface;
+  const Surface& surface = domain.surface();
   const SortedSeeds& seeds = job.seeds.sorted;
   const auto triangle = [&](const Found& f) { return surface.summaries[f.facet].triangle; };
   sort_in_parallel(found, [&](const Found& a, const Found& b) {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "bisector/voronoi/restricted.h"
-#include "host/pair_pass.h"
+#include "host/facet_pairs.h"
 
 namespace bisector::host {
 
@@ -12,7 +12,7 @@ class PolygonPass {
   explicit PolygonPass(Device& device) : labels_(device) {}
 
   // The polygons of all pairs in the store, in order of triangles, then cells.
-  void run(PairPass& pairs, const PairJob& job, RestrictedPolygons& polygons);
+  void run(PairPass& pairs, const PairJob& job, FacetPairs& domain, RestrictedPolygons& polygons);
 
  private:
   Buffer labels_;

@@ -35,8 +35,8 @@ class SeedGrid {
   Buffer ends_, slots_;
 };
 
-// About how far apart seeds lie, if they lie on a surface: the median for a sample. It depends on the seeds alone, not on
-// what was computed before.
-double typical_spacing(const std::vector<Vec3>& seeds);
+// About how far apart seeds lie, if they lie on a surface, or else in a solid: the median for a sample. It depends on the seeds
+// alone, not on what was computed before.
+double typical_spacing(const std::vector<Vec3>& seeds, bool in_solid);
 
 }  // namespace bisector::host

@@ -8,6 +8,7 @@ layout(push_constant) uniform Push {
   uint of_pairs;    // else of proposals
   uint room;
   uint most_groups;  // in one dimension
+  uint most_items;
 };
 #include "counters.glsl"
 
@@ -17,7 +18,8 @@ void main() {
   const uint arguments = of_pairs != 0 ? kPairGroups : kProposalGroups;
   counters[begin] = counters[begin + 1];
   // After an overflow the batch is thrown away.
-  counters[begin + 1] = counters[kOverflow] != 0 ? counters[begin] : min(counters[count], room);
+  const uint items = min(max(counters[count], counters[begin]) - counters[begin], most_items);
+  counters[begin + 1] = counters[kOverflow] != 0 ? counters[begin] : min(counters[begin] + items, room);
   const uint groups = (counters[begin + 1] - counters[begin] + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
   const uint x = min(groups, most_groups);
   counters[arguments] = x;

@@ -39,6 +39,7 @@ layout(push_constant) uniform Push {
   uint pair_count;      // kNone: as many as the counters say
   uint proposal_room;
   uint flagged_room;    // entries of one region
+  uint cell_count;
 };
 #include "counters.glsl"
 #include "facet.glsl"

@@ -4,11 +4,7 @@
 //
 // To include: `facet_words`, `facet_meta`, `facet_base`, `residual`, `ids` and seed(), and the constant kMostCorners.
 
-const uint kClipped = 1;      // moments and labels are final
-const uint kEmpty = 2;
-const uint kShortList = 3;    // the list ended before the cell was closed
-const uint kCrowded = 4;      // more corners than there is room for
-const uint kUnsure = 5;       // a decision within its error bound
+#include "statuses.glsl"
 
 #if BISECTOR_DOUBLE
 const real kSquareError = 1e-12LF;   // relative, of |d|^2 with all that is compared with it
@@ -210,32 +206,7 @@ void bound_polygon() {
   reach = min(facet_squared, r);
 }
 
-// Whether c and o are opposite corners of a rectangle with sides along the axes, p and q being the others: exactly, for it is a
-// matter of equal coordinates.
-bool is_rectangle(uint c, uint o, uint p, uint q) {
-  const uvec3 low_c = ids[c].yzw, low_o = ids[o].yzw, low_p = ids[p].yzw, low_q = ids[q].yzw;
-  const Point at_c = seed(c), at_o = seed(o), at_p = seed(p), at_q = seed(q);
-  for (int k = 0; k < 3; ++k) {
-    const bool with_p = same_coordinate(at_c, low_c, at_p, low_p, k) && same_coordinate(at_o, low_o, at_q, low_q, k);
-    const bool with_q = same_coordinate(at_c, low_c, at_q, low_q, k) && same_coordinate(at_o, low_o, at_p, low_p, k);
-    if (!with_p && !with_q) return false;
-  }
-  return true;
-}
-
-// The side of a corner where the bisectors of seeds a and b meet, with respect to that of c, if the four seeds are the corners of
-// such a rectangle, else 0. Grids of seeds are full of them. The bisector's row of the corner opposite the cell's own seed
-// is the sum of the other two, so the determinant is 0, and each of the four weights has the cofactor +1 or -1 times
-// the corner's denominator, -1 for c and the seed opposite it (src/bisector/voronoi/exact.h): the lowest index decides.
-int tie_of(uint slot, uint a, uint b, uint c) {
-  uint opposite;
-  if (is_rectangle(c, slot, a, b)) opposite = slot;
-  else if (is_rectangle(c, a, slot, b)) opposite = a;
-  else if (is_rectangle(c, b, slot, a)) opposite = b;
-  else return 0;
-  const uint lowest = min(min(ids[slot].x, ids[a].x), min(ids[b].x, ids[c].x));
-  return lowest == ids[c].x || lowest == ids[opposite].x ? -1 : 1;
-}
+#include "ties.glsl"
 
 #if BISECTOR_DOUBLE
 // The only axis along which c lies apart from the reference, if the reference is level with the own seed there; else -1.

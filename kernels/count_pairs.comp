@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // Incident pairs per triangle and per cell.
 #include "common.glsl"
+#include "statuses.glsl"
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) readonly buffer Status { uint status_of[]; };
@@ -9,8 +10,6 @@ layout(std430, binding = 2) readonly buffer Triangles { uint triangle_of[]; };  
 layout(std430, binding = 3) buffer ByTriangle { uint by_triangle[]; };
 layout(std430, binding = 4) buffer ByCell { uint by_cell[]; };
 layout(push_constant) uniform Push { uint pair_count; };
-
-const uint kEmpty = 2;
 
 void main() {
   const uint pair = invocation();

@@ -2,13 +2,15 @@
 #extension GL_GOOGLE_include_directive : require
 // Lists the pairs of cells whose masses or energies single precision may have off by too much.
 #include "common.glsl"
+#include "statuses.glsl"
 
 layout(constant_id = 0) const bool kDoubleNext = false;
+layout(constant_id = 1) const bool kSolid = false;  // masses are volumes, not areas
 
 // Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a polygon
-// for as far off as its farthest corner, by less still.
-const float kMassError = 4e-4, kEnergyError = 1.2e-3;
-const uint kClipped = 1;        // of clipper.glsl
+// for as far off as its farthest corner, by less still. The bounds of polyhedra, whose vertices have more to be off by, are found
+// to be five hundred times too large and more.
+const float kMassError = kSolid ? 3e-3 : 4e-4, kEnergyError = kSolid ? 9e-3 : 1.2e-3;
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) readonly buffer Status { uint status_of[]; };
@@ -32,7 +34,8 @@ void main() {
   if (status_of[pair] != kClipped) return;
   precise float least = 0.25 * cells[6 * slot + 5];
   precise float mass = max(cells[6 * slot], least);
-  precise float energy = max(cells[6 * slot + 4], mass * mass / mean_density);
+  const float extent = mass / mean_density;
+  precise float energy = max(cells[6 * slot + 4], mass * (kSolid ? pow(extent, 2.0 / 3.0) : extent));
   precise float most_mass = kMassError * share * mass;
   precise float most_energy = kEnergyError * share * energy;
   if (!(uintBitsToFloat(doubts[2 * slot]) > most_mass) && !(uintBitsToFloat(doubts[2 * slot + 1]) > most_energy)) return;

@@ -8,9 +8,9 @@
 
 layout(constant_id = 0) const uint kMost = 32;       // entries of a list
 layout(constant_id = 1) const bool kTargets = false;  // lists for some slots only, kept apart from the first ones
+layout(constant_id = 2) const uint kExamined = 512;   // seeds; if eight invocations take turns, loops stay below llvmpipe's limit
 
 const int kRings = 5;
-const uint kExamined = kTargets ? 1024 : 512;  // seeds; even if eight invocations take turns, loops stay below llvmpipe's limit
 
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };

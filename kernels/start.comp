@@ -3,6 +3,7 @@
 // Opens a batch of facets: one whose corners lie in one cell lies in it, for cells are convex; for others the owners of their
 // corners are proposed.
 #include "common.glsl"
+#include "statuses.glsl"
 #include "real.glsl"
 #include "points.glsl"
 
@@ -30,7 +31,6 @@ layout(push_constant) uniform Push {
 #include "facet.glsl"
 LOAD_POINT(seed, seed_words)
 
-const uint kWhole = 6;  // a status, as those of clipper.glsl
 
 struct Moments {
   real mass;

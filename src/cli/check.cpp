@@ -56,7 +56,7 @@ void print_row(Console& console, const DeviceCheckRow& row) {
 
 Json row_json(const DeviceCheckRow& row) {
   const Parity& p = row.parity;
-  return {{"model", row.model},
+  Json json{{"model", row.model},
           {"seeds", row.seeds},
           {"neighbors", word(row.neighbours)},
           {"precision", row.device.precision},
@@ -76,6 +76,8 @@ Json row_json(const DeviceCheckRow& row) {
           {"certification", certification_json(row.certification)},
           {"seconds", row.seconds},
           {"cpu_seconds", row.cpu_seconds}};
+  if (row.tets) json["tets"] = row.tets;
+  return json;
 }
 
 Json check_report(const std::vector<DeviceCheckRow>& rows, std::size_t failed, double seconds) {

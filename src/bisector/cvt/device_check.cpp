@@ -9,6 +9,7 @@
 #include "bisector/core/random.h"
 #include "bisector/cvt/cpu_backend.h"
 #include "bisector/cvt/optimise.h"
+#include "bisector/cvt/solid_backend.h"
 #include "bisector/mesh/sampling.h"
 
 namespace bisector {
@@ -134,17 +135,119 @@ std::vector<Case> make_cases() {
           {"plate", "optimised", plate, optimised_seeds(plate, 500)}};
 }
 
+struct SolidCase {
+  std::string model, seeds_name;
+  TetMesh mesh;
+  std::vector<Vec3> seeds;
+};
+
+// The cubes of an n x n x n grid over [0, 1]^3 but for those along its axis in z, where n > 2, in six tetrahedra each; inner
+// vertices moved by up to `shake` of a cube's edge.
+TetMesh block(Index n, double shake) {
+  TetMesh mesh;
+  for (Index k = 0; k <= n; ++k)
+    for (Index j = 0; j <= n; ++j)
+      for (Index i = 0; i <= n; ++i) {
+        Vec3 p{double(i) / n, double(j) / n, double(k) / n};
+        const bool inside = i > 0 && i < n && j > 0 && j < n && k > 0 && k < n;
+        Random random(3, mesh.vertices.size());
+        for (int axis = 0; inside && axis < 3; ++axis) p[axis] += shake / n * (2 * random.uniform() - 1);
+        mesh.vertices.push_back(p);
+      }
+  const Index steps[3] = {1, n + 1, (n + 1) * (n + 1)};
+  constexpr int kOrders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}};
+  for (Index k = 0; k < n; ++k)
+    for (Index j = 0; j < n; ++j)
+      for (Index i = 0; i < n; ++i) {
+        if (n > 2 && i == n / 2 && j == n / 2) continue;
+        for (const auto& order : kOrders) {
+          const Index a = i + j * steps[1] + k * steps[2], b = a + steps[order[0]], c = b + steps[order[1]];
+          mesh.tets.push_back({a, b, c, c + steps[order[2]]});
+        }
+      }
+  return mesh;
+}
+
+std::vector<Vec3> random_points(std::size_t count) {
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < count; ++i) {
+    Random random(4, i);
+    const double x = random.uniform(), y = random.uniform(), z = random.uniform();
+    points.push_back({x, y, z});
+  }
+  return points;
+}
+
+std::vector<Vec3> grid_points(int n) {
+  std::vector<Vec3> points;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < n; ++k) points.push_back({(i + 0.5) / n, (j + 0.5) / n, (k + 0.5) / n});
+  return points;
+}
+
+// Lloyd's steps.
+std::vector<Vec3> relaxed_points(const TetMesh& mesh, std::size_t count) {
+  const Solid solid(mesh);
+  CpuSolidBackend cpu(solid, NeighbourSource::nearest);
+  std::vector<Vec3> points = random_points(count);
+  CellMoments moments;
+  for (int step = 0; step < 10; ++step) {
+    cpu.evaluate(points, moments);
+    for (std::size_t i = 0; i < count; ++i)
+      if (moments.cells[i].mass > 0) points[i] += (1 / moments.cells[i].mass) * moments.cells[i].first;
+  }
+  return points;
+}
+
+std::vector<SolidCase> make_solid_cases() {
+  const TetMesh coarse = block(2, 0), ring = block(5, 0.2);
+  return {{"block", "random", coarse, random_points(1000)},
+          {"block", "grid", coarse, grid_points(7)},
+          {"ring", "random", ring, random_points(500)},
+          {"ring", "optimised", ring, relaxed_points(ring, 300)},
+          {"ring", "grid", ring, grid_points(6)},
+          {"ring", "vertices", ring, ring.vertices}};
+}
+
+struct Polygons {
+  RestrictedPolygons polygons;
+};
+struct Polyhedra {
+  RestrictedPolygons polygons;
+  ClippedPolyhedra polyhedra;
+};
+
+void evaluate(Backend& backend, const std::vector<Vec3>& seeds, CellMoments& moments, Polygons& cells) {
+  backend.evaluate(seeds, moments, cells.polygons);
+}
+void evaluate(SolidBackend& backend, const std::vector<Vec3>& seeds, CellMoments& moments, Polyhedra& cells) {
+  backend.evaluate(seeds, moments, cells.polygons, cells.polyhedra);
+}
+
+template <class Cells>
 struct Measured {
   CellMoments moments;
-  RestrictedPolygons polygons;
+  Cells cells;
   bool repeats = false;
   double seconds = 0;
 };
 
+Parity parity_of(const Measured<Polygons>& a, const Measured<Polygons>& b, const Surface& surface) {
+  return compare(a.moments, a.cells.polygons, b.moments, b.cells.polygons, surface);
+}
+// The polygons of the boundary count too.
+Parity parity_of(const Measured<Polyhedra>& a, const Measured<Polyhedra>& b, const Solid& solid) {
+  Parity parity = compare(a.moments, a.cells.polyhedra, b.moments, b.cells.polyhedra, solid);
+  parity.same_labels &= a.cells.polygons.labels == b.cells.polygons.labels;
+  return parity;
+}
+
 // The evaluation that is timed comes after one of fewer seeds, so that neither start-up nor the very same diagram helps it.
-Measured measure(Backend& backend, const std::vector<Vec3>& seeds) {
-  Measured measured;
-  backend.evaluate(seeds, measured.moments, measured.polygons);
+template <class Cells, class Kind>
+Measured<Cells> measure(Kind& backend, const std::vector<Vec3>& seeds) {
+  Measured<Cells> measured;
+  evaluate(backend, seeds, measured.moments, measured.cells);
   CellMoments other;
   backend.evaluate({seeds.begin(), seeds.end() - 1}, other);
   const auto begin = std::chrono::steady_clock::now();
@@ -161,13 +264,44 @@ bool agrees(const DeviceCheckRow& row) {
          p.centroid_error <= limits.cells && p.energy_error <= limits.cells && p.sum_error <= limits.sum;
 }
 
-std::vector<Precision> precisions_of(const Surface& surface, const std::string& device, Precision asked) {
+template <class Domain>
+std::vector<Precision> precisions_of(const Domain& domain, const std::string& device, Precision asked) {
   if (asked != Precision::automatic) return {asked};
-  const BackendDescription best = make_backend(surface, {device, asked, NeighbourSource::nearest})->description();
+  const BackendDescription best = make_backend(domain, {device, asked, NeighbourSource::nearest})->description();
   if (best.kind == "cpu") return {Precision::double_};
   if (best.precision == "single") return {Precision::single};
   return {Precision::single, Precision::double_};
 }
+
+// What a check has to tell and to whom.
+struct Check {
+  std::string device;
+  Precision asked;
+  const Context& context;
+  const std::function<void(const DeviceCheckRow&)>& done;
+  std::vector<Precision> precisions = {};  // known from the first domain on
+  std::vector<DeviceCheckRow> rows = {};
+
+  template <class Cells, class Cpu, class Domain, class Problem>
+  void run(const Domain& domain, const Problem& problem, std::size_t triangles, std::size_t tets) {
+    if (precisions.empty()) precisions = precisions_of(domain, device, asked);
+    for (const NeighbourSource source : {NeighbourSource::nearest, NeighbourSource::delaunay}) {
+      Cpu cpu(domain, source);
+      const auto expected = measure<Cells>(cpu, problem.seeds);
+      for (const Precision p : precisions) {
+        context.check();
+        const auto backend = make_backend(domain, {device, p, source}, context);
+        const auto found = measure<Cells>(*backend, problem.seeds);
+        DeviceCheckRow row{problem.model, problem.seeds_name, source, backend->description(), triangles,
+                           problem.seeds.size(), tets, parity_of(expected, found, domain), found.moments.certification,
+                           found.repeats, found.seconds, expected.seconds};
+        row.passed = agrees(row);
+        done(row);
+        rows.push_back(std::move(row));
+      }
+    }
+  }
+};
 
 }  // namespace
 
@@ -177,29 +311,16 @@ ParityLimits parity_limits(const BackendDescription& device) {
 
 std::vector<DeviceCheckRow> check_device(const std::string& device, Precision precision, const Context& context,
                                          const std::function<void(const DeviceCheckRow&)>& done) {
-  std::vector<DeviceCheckRow> rows;
-  std::vector<Precision> precisions;
+  Check check{device, precision, context, done};
   for (Case& test : make_cases()) {
     const Surface surface(std::move(test.mesh));
-    if (precisions.empty()) precisions = precisions_of(surface, device, precision);
-    for (const NeighbourSource source : {NeighbourSource::nearest, NeighbourSource::delaunay}) {
-      CpuBackend cpu(surface, source);
-      const Measured expected = measure(cpu, test.seeds);
-      for (const Precision p : precisions) {
-        context.check();
-        const std::unique_ptr<Backend> backend = make_backend(surface, {device, p, source}, context);
-        const Measured found = measure(*backend, test.seeds);
-        DeviceCheckRow row{test.model, test.seeds_name, source, backend->description(), surface.facets.size(),
-                           test.seeds.size(),
-                           compare(expected.moments, expected.polygons, found.moments, found.polygons, surface),
-                           found.moments.certification, found.repeats, found.seconds, expected.seconds};
-        row.passed = agrees(row);
-        done(row);
-        rows.push_back(std::move(row));
-      }
-    }
+    check.run<Polygons, CpuBackend>(surface, test, surface.facets.size(), 0);
   }
-  return rows;
+  for (SolidCase& test : make_solid_cases()) {
+    const Solid solid(std::move(test.mesh));
+    check.run<Polyhedra, CpuSolidBackend>(solid, test, solid.boundary.facets.size(), solid.mesh.tets.size());
+  }
+  return std::move(check.rows);
 }
 
 }  // namespace bisector

@@ -22,7 +22,8 @@ struct DeviceCheckRow {
   std::string model, seeds;
   NeighbourSource neighbours = NeighbourSource::nearest;
   BackendDescription device;
-  std::size_t triangles = 0, seed_count = 0;
+  std::size_t triangles = 0, seed_count = 0;  // triangles of the surface, or the solid's boundary
+  std::size_t tets = 0;                       // of a solid
   Parity parity;                // with the CPU
   Certification certification;  // of the device's diagram
   bool repeats = false;         // the same to the last bit after another diagram in between

@@ -1,10 +1,7 @@
 #include "bisector/cvt/solid_backend.h"
 
-#include <fmt/format.h>
-
 #include <utility>
 
-#include "bisector/core/error.h"
 #include "bisector/core/processor.h"
 
 namespace bisector {
@@ -25,16 +22,6 @@ void CpuSolidBackend::evaluate(const std::vector<Vec3>& seeds, CellMoments& mome
 void CpuSolidBackend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons,
                                ClippedPolyhedra& polyhedra) {
   diagram_.evaluate(seeds, source_, moments, polygons, polyhedra);
-}
-
-std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const ComputeOptions& options, const Context&) {
-  if (options.device.starts_with("vulkan"))
-    throw DeviceError(fmt::format("--device {}: clipped Voronoi diagrams of solids are computed on the CPU only; use --device cpu", options.device));
-  if (options.device != "auto" && options.device != "cpu")
-    throw Error(fmt::format("--device {}: is none of auto, cpu, vulkan, vulkan:INDEX, vulkan:UUID", options.device));
-  if (options.precision == Precision::single)
-    throw Error("--precision single: the CPU computes in double precision only; use --precision double or a device");
-  return std::make_unique<CpuSolidBackend>(solid, options.neighbours);
 }
 
 }  // namespace bisector

@@ -175,6 +175,8 @@ inline void TetClipper::start(const TetFrame& tet) {
   }
 }
 
+void TetClipper::take(const TetFrame& tet) { start(tet); }
+
 // Which vertices are adjacent is not known then; moments are what needs it.
 void TetClipper::take(const TetFrame& tet, const std::vector<Index>& labels,
                       const std::vector<std::array<Index, 3>>& triples) {

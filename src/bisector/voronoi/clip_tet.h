@@ -50,7 +50,7 @@ class TetClipper {
   // positions among them, which the caller knows to be the result.
   void take(const TetFrame& tet, const std::vector<Index>& labels, const std::vector<std::array<Index, 3>>& triples);
   // Takes the whole tetrahedron.
-  void take(const TetFrame& tet) { start(tet); }
+  void take(const TetFrame& tet);
 
   // The last polyhedron. No bisector bounds it if it is the whole tetrahedron.
   bool whole() const { return plane_count_ == 4; }
