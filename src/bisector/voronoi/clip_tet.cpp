@@ -199,6 +199,19 @@ void TetClipper::take(const TetFrame& tet, const std::vector<Index>& labels,
   }
 }
 
+// Cuts by the neighbours from k on that may cut, up to four of the `count` listed. False if the polyhedron is empty then.
+inline bool TetClipper::cut_by_block(std::size_t k, std::size_t count) {
+  if (k >= loaded_) load(k + 4);
+  if (!bounded_) bound();
+  const unsigned present = (1u << std::min<std::size_t>(4, count - k)) - 1;
+  for (unsigned planes = may_cut(blocks_[k / 4]) & present; planes; planes &= planes - 1) {
+    const std::size_t neighbour = k + static_cast<unsigned>(std::countr_zero(planes));
+    if (wider_ && bounded_by(list_.begin[neighbour])) continue;
+    if (!cut(neighbour)) return false;
+  }
+  return true;
+}
+
 bool TetClipper::clip(const TetFrame& tet) {
   start(tet);
   for (;;) {
@@ -206,15 +219,9 @@ bool TetClipper::clip(const TetFrame& tet) {
     for (std::size_t k = 0; k < count; k += 4) {
       if (k >= loaded_) load(k + 4);
       if (!bounded_) bound();
-      const Block& block = blocks_[k / 4];
       // Security radius: all of the polyhedron is nearer to this seed than to any other from here on.
-      if (2 * reach_scaled_ < block.half[0]) return true;
-      const unsigned present = (1u << std::min<std::size_t>(4, count - k)) - 1;
-      for (unsigned planes = may_cut(block) & present; planes; planes &= planes - 1) {
-        const std::size_t neighbour = k + static_cast<unsigned>(std::countr_zero(planes));
-        if (wider_ && bounded_by(list_.begin[neighbour])) continue;
-        if (!cut(neighbour)) return false;
-      }
+      if (2 * reach_scaled_ < blocks_[k / 4].half[0]) return true;
+      if (!cut_by_block(k, count)) return false;
     }
     if (!bounded_) bound();
     if (list_.radius == kInfinity || 4 * reach_ < list_.radius * list_.radius * (1 - 1e-9)) return true;
@@ -222,6 +229,24 @@ bool TetClipper::clip(const TetFrame& tet) {
     list_ = neighbours_->wider(slot_, list_);
     loaded_ = 0;
   }
+}
+
+void TetClipper::narrow(const TetFrame& around) {
+  start(around);
+  const std::size_t count = static_cast<std::size_t>(list_.end - list_.begin);
+  for (std::size_t k = 0; k < count; k += 4) {
+    if (!cut_by_block(k, count)) return;
+  }
+  collect();
+  std::sort(bounding_.begin(), bounding_.end(), [&](Index a, Index b) {
+    return planes_[a].squared != planes_[b].squared ? planes_[a].squared < planes_[b].squared : planes_[a].key < planes_[b].key;
+  });
+  narrowed_.clear();
+  for (const Index plane : bounding_)
+    if (plane >= 4) narrowed_.push_back(planes_[plane].slot);
+  list_.begin = narrowed_.data();
+  list_.end = narrowed_.data() + narrowed_.size();
+  loaded_ = 0;
 }
 
 // With |n| < 2 r, r the polyhedron's reach, a product as coded is off by less than 2e-6 |n| r < 4e-6 r^2, and by less than

@@ -43,6 +43,9 @@ class TetClipper {
   void reset(const SortedSeeds& seeds, const Neighbours& neighbours);
   // The cell that the following calls are about.
   void begin(Index slot);
+  // For many tetrahedra within `around`: from here on passes over those of the cell's first neighbours that the others keep from
+  // bounding anything there.
+  void narrow(const TetFrame& around);
   // Clips the tetrahedron, which must outlive the use of the result. False if the (perturbed) intersection is empty.
   bool clip(const TetFrame& tet);
 
@@ -112,6 +115,7 @@ class TetClipper {
   void set_plane(Plane& plane, Index other) const;
   void load(std::size_t count);
   unsigned may_cut(const Block& block) const;
+  bool cut_by_block(std::size_t k, std::size_t count);
   void bound();
   bool bounded_by(Index slot) const;
   bool cut(std::size_t neighbour);
@@ -137,6 +141,7 @@ class TetClipper {
   Index slot_ = 0;
   Vec3 seed_;
   NeighbourList list_;
+  std::vector<Index> narrowed_;
   std::size_t loaded_ = 0;
   std::vector<Plane> listed_;
   std::vector<Block> blocks_;

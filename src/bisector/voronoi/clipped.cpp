@@ -143,6 +143,7 @@ void ClippedVoronoi::Work::walk(Index slot, const Starts& starts, Walker& walker
   walker.queue.clear();
   walker.terms.clear();
   chunk.first_neighbour.push_back(static_cast<Index>(chunk.neighbours.size()));
+  clipper.narrow(enclosure);
   for (const Index tet : starts)
     if (walker.tets.mark(tet)) walker.queue.push_back(tet);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
