@@ -31,8 +31,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Kind = SeedPlace::Kind;
 
-// Of the steps allowed: sites free, then held on the boundary together with the others, then inside the finished boundary.
-constexpr double kFreeShare = 0.35, kJointShare = 0.2, kInnerShare = 0.15;
+// Of the steps allowed: sites free, on one level or the coarser ones, and on the finest of several, which starts near its minimum;
+// then held on the boundary together with the others; then inside the finished boundary.
+constexpr double kFreeShare = 0.35, kFinestShare = 0.2, kJointShare = 0.2, kInnerShare = 0.15;
 // Of the surface's own optimisation: to spread the sites along features, and before the boundary is extracted.
 constexpr int kLayoutSteps = 10, kBoundarySteps = 30;
 constexpr int kJointRounds = 3;
@@ -42,6 +43,8 @@ constexpr int kPushRounds = 8;
 // Heights over the boundary, in lengths of its edges, of sites inside that own none of it: a third layer's distance is 0.8.
 constexpr double kClear = 0.75;
 constexpr std::size_t kFewest = 8;
+constexpr std::size_t kManyTets = 8;  // for each site, beyond which a stand-in pays
+constexpr int kStandInSteps = 20;     // of its surface's optimisation, per level
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -58,12 +61,87 @@ void check_options(const TetOptions& options) {
     throw Error(fmt::format("a tetrahedral mesh needs at least {} vertices; ask for more", kFewest));
 }
 
+// A solid and what computes its diagrams.
+struct Domain {
+  Domain(TetMesh mesh, std::vector<double> density, const ComputeOptions& compute, const Context& context)
+      : solid(std::move(mesh), std::move(density)), backend(make_backend(solid, compute, context)) {}
+
+  Solid solid;
+  std::unique_ptr<SolidBackend> backend;
+};
+
+// Stand-ins with fewer tetrahedra for while sites are free, when neither the boundary's details nor a density between the sites
+// matter yet.
+class StandIns {
+ public:
+  StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& boundary, const FeatureGraph& features,
+           const TetOptions& options, const Context& context)
+      : mesh_(mesh), surface_(surface), boundary_(boundary), features_(features), options_(options), context_(context) {}
+
+  // For `count` of `final_count` sites; null if the solid itself will do.
+  SolidBackend* choose(std::size_t count, std::size_t final_count, const SolidBackend& whole);
+
+ private:
+  void make_coarse(std::size_t vertices);
+
+  const TetMesh& mesh_;
+  const TriangleMesh& surface_;
+  Backend& boundary_;
+  const FeatureGraph& features_;
+  const TetOptions& options_;
+  const Context& context_;
+  std::unique_ptr<Domain> domain_;
+  bool tried_ = false;
+};
+
+SolidBackend* StandIns::choose(std::size_t count, std::size_t final_count, const SolidBackend& whole) {
+  if (!whole.solid().density.empty()) {
+    if (count == final_count) return nullptr;
+    SizingTarget target;
+    target.vertices = count;
+    SizedSolid sized = refine_for_sizes(mesh_, surface_, options_.sizing, target);
+    std::vector<double> density = sized.volume_density();
+    domain_ = std::make_unique<Domain>(std::move(sized.mesh), std::move(density), options_.compute, context_);
+    return domain_->backend.get();
+  }
+  if (whole.solid().mesh.tets.size() < kManyTets * final_count) return nullptr;
+  if (!std::exchange(tried_, true)) {
+    // Twice as many vertices as the result will have on its boundary, which has edges of the same length.
+    const double h = std::cbrt(whole.solid().volume / static_cast<double>(final_count));
+    make_coarse(static_cast<std::size_t>(2 * boundary_.surface().area / (h * h)));
+  }
+  return domain_ ? domain_->backend.get() : nullptr;
+}
+
+// Of a remeshed boundary. Where that does not bound a solid, or there is no TetGen, there is no stand-in.
+void StandIns::make_coarse(std::size_t vertices) {
+  if (find_tetgen().empty() || 4 * vertices > surface_.triangles.size()) return;
+  RemeshOptions remeshing;
+  remeshing.vertices = std::max<std::size_t>(vertices, 100);
+  remeshing.iterations = kStandInSteps;
+  remeshing.topology = TopologyControl::check;
+  remeshing.min_angle = 0;
+  Context quiet = context_;
+  quiet.progress = nullptr;
+  quiet.warning = nullptr;
+  const RemeshResult coarse = remesh(boundary_, features_, remeshing, quiet);
+  try {
+    domain_ = std::make_unique<Domain>(tetgen_tets(check_surface(coarse.mesh), {}, {}, quiet).mesh, std::vector<double>{},
+                                       options_.compute, context_);
+  } catch (const DeviceError&) {
+    throw;
+  } catch (const Error&) {
+    domain_.reset();
+  }
+}
+
 // Sites in a solid, first free, then with the boundary's on it; in the end the tetrahedra between them.
 class Pipeline {
  public:
-  Pipeline(SolidBackend& backend, Backend& boundary, const FeatureGraph& features, const SizedSolid& sized,
+  Pipeline(SolidBackend& backend, Backend& boundary, StandIns& stand_ins, const FeatureGraph& features, const SizedSolid& sized,
            const TetOptions& options, const Context& context)
-      : backend_(backend), boundary_(boundary), features_(features), sized_(sized), options_(options), context_(context),
+      : backend_(backend), boundary_(boundary), stand_ins_(stand_ins), features_(features), sized_(sized), options_(options),
+        context_(context),
         curves_(features, backend.solid().mesh.vertices) {
     step_.tolerance = options.tolerance;
     step_.curves = &curves_;
@@ -85,10 +163,11 @@ class Pipeline {
   std::vector<Index> pokers() const;
   void push_inside();
   void match_count();
-  void run_steps(const std::string& phase, double share, bool constrained);
+  void run_steps(SolidBackend& backend, const std::string& phase, double share, bool constrained);
 
   SolidBackend& backend_;
   Backend& boundary_;
+  StandIns& stand_ins_;
   const FeatureGraph& features_;
   const SizedSolid& sized_;
   const TetOptions& options_;
@@ -101,12 +180,12 @@ class Pipeline {
   TetResult result_;
 };
 
-void Pipeline::run_steps(const std::string& phase, double share, bool constrained) {
+void Pipeline::run_steps(SolidBackend& backend, const std::string& phase, double share, bool constrained) {
   step_.phase = phase;
   step_.constrained = constrained;
   step_.iterations = share_of(options_.iterations, share);
   step_.share = kOptimising * share * std::min(1.0, static_cast<double>(state_.seeds.size()) / static_cast<double>(result_.wanted));
-  optimise(backend_, state_, step_, totals_, context_);
+  optimise(backend, state_, step_, totals_, context_);
   step_.done += step_.share;
 }
 
@@ -114,22 +193,24 @@ void Pipeline::run_steps(const std::string& phase, double share, bool constraine
 void Pipeline::free_phase() {
   const std::vector<std::size_t> counts =
       options_.seeds.empty() ? tet_level_counts(sized_.vertices) : std::vector<std::size_t>{options_.seeds.size()};
-  if (options_.seeds.empty()) {
-    std::vector<double> weight = backend_.solid().density;
-    for (double& rho : weight) rho = std::pow(rho, 0.6);
-    state_.seeds = sample_solid(backend_.solid().mesh, counts.front(), options_.random_seed, weight);
-  } else {
-    state_.seeds = options_.seeds;
-  }
+  state_.seeds = options_.seeds;
   for (std::size_t level = 0; level < counts.size(); ++level) {
+    SolidBackend* const stand_in = stand_ins_.choose(counts[level], counts.back(), backend_);
+    SolidBackend& backend = stand_in ? *stand_in : backend_;
     if (level > 0) {
       RestrictedPolygons polygons;
       ClippedPolyhedra polyhedra;
-      backend_.evaluate(state_.seeds, state_.moments, polygons, polyhedra);
+      backend.evaluate(state_.seeds, state_.moments, polygons, polyhedra);
       state_.seeds = refine_sites(polyhedra, state_.moments, state_.seeds, counts[level]);
+    } else if (options_.seeds.empty()) {
+      std::vector<double> weight = backend.solid().density;
+      for (double& rho : weight) rho = std::pow(rho, 0.6);
+      state_.seeds = sample_solid(backend.solid().mesh, counts.front(), options_.random_seed, weight);
     }
     state_.places.assign(state_.seeds.size(), {Kind::interior});
-    run_steps(counts.size() > 1 ? fmt::format("free, level {}/{}", level + 1, counts.size()) : "free", kFreeShare, false);
+    const bool finest = level > 0 && level + 1 == counts.size();
+    run_steps(backend, counts.size() > 1 ? fmt::format("free, level {}/{}", level + 1, counts.size()) : "free",
+              finest ? kFinestShare : kFreeShare, false);
   }
 }
 
@@ -183,6 +264,7 @@ std::vector<Index> Pipeline::pokers() const {
 
 // Thesis 5.5.2: the sites whose cells meet the boundary are put there and held, and all are optimised together.
 void Pipeline::joint_phase() {
+  backend_.evaluate(state_.seeds, state_.moments);
   std::vector<Vec3> on_boundary, interior, normals;
   std::vector<Vec3> feet = state_.seeds;
   project_to_cells(backend_.surface(), state_.moments.triangles, {}, feet, normals);
@@ -193,7 +275,7 @@ void Pipeline::joint_phase() {
   result_.boundary_sites = on_boundary.size();
   set_boundary(remesh_boundary(std::move(on_boundary), {}, false), std::move(interior));
   for (int round = 0; round < kJointRounds; ++round) {
-    run_steps("with the boundary", kJointShare / kJointRounds, true);
+    run_steps(backend_, "with the boundary", kJointShare / kJointRounds, true);
     if (round + 1 < kJointRounds && !promote() && round > 0) break;
   }
 }
@@ -287,7 +369,7 @@ void Pipeline::push_inside() {
 
 void Pipeline::inner_phase() {
   match_count();
-  run_steps("inside", kInnerShare, false);
+  run_steps(backend_, "inside", kInnerShare, false);
   push_inside();
   complete(backend_, state_, step_, totals_);
 }
@@ -413,7 +495,8 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   const double preparing = seconds_since(begin);
   const std::unique_ptr<SolidBackend> backend = make_backend(solid, options.compute, context);
   const std::unique_ptr<Backend> boundary_backend = make_backend(boundary, options.compute, context);
-  TetResult result = Pipeline(*backend, *boundary_backend, features, sized, options, context).run();
+  StandIns stand_ins(mesh, surface, *boundary_backend, features, options, context);
+  TetResult result = Pipeline(*backend, *boundary_backend, stand_ins, features, sized, options, context).run();
   set_regions(sized.mesh, result.mesh);
   result.background_tets = sized.mesh.tets.size();
   result.seconds.prepare = preparing;
