@@ -18,6 +18,8 @@
 #include "bisector/cvt/solid_backend.h"
 #include "bisector/mesh/io.h"
 #include "bisector/mesh/tet_io.h"
+#include "bisector/tetmesh/check_surface.h"
+#include "bisector/tetmesh/tetgen.h"
 #include "common.h"
 #include "delaunay_time.h"
 
@@ -115,7 +117,7 @@ std::string milliseconds(double seconds) { return fmt::format("{:.{}f}", 1e3 * s
 
 void measure(const std::string& path, const Options& options, Table& table, std::vector<Line>& lines) {
   const std::string name = std::filesystem::path(path).stem().string();
-  const Solid solid(read_tet_mesh(path));
+  const Solid solid(is_tet_format(path) ? read_tet_mesh(path) : tetgen_tets(check_surface(read_mesh(path))).mesh);
   lines.push_back({name, {}, {}, {}});
   for (const std::size_t count : options.seeds) {
     const std::vector<Vec3> sites = random_sites(solid, count);
@@ -175,7 +177,7 @@ void run(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   CLI::App app{"Times cold evaluations of clipped Voronoi diagrams beside CGAL's Delaunay triangulation."};
-  app.add_option("MESHES", options.models, "tetrahedral meshes")->required();
+  app.add_option("MESHES", options.models, "closed surfaces or tetrahedral meshes")->required();
   app.add_option("--seeds", options.seeds, "counts of sites, uniform in the solid")->delimiter(',');
   app.add_option("--repeat", options.repeat, "runs of each")->check(CLI::Range(1, 1000));
   app.add_option("--threads", options.threads, "number of threads")->check(CLI::Range(1, 1024));
