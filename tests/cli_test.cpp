@@ -29,7 +29,10 @@
 #include "bisector/mesh/io.h"
 #include "bisector/mesh/tet_io.h"
 #include "bisector/mesh/tet_topology.h"
+#include "bisector/mesh/topology.h"
+#include "bisector/tetmesh/tetgen.h"
 #include "models.h"
+#include "solids.h"
 
 namespace bisector {
 namespace {
@@ -133,7 +136,7 @@ Json timeless(Json report) {
 
 TEST_F(Cli, HelpAndVersion) {
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"--help"}, {"remesh", "--help"}, {"rvd", "--help"}, {"quality", "-h"}, {"check", "--help"}, {"--version"}}) {
+           {"--help"}, {"remesh", "--help"}, {"tet", "--help"}, {"rvd", "--help"}, {"quality", "-h"}, {"check", "--help"}, {"--version"}}) {
     const Result result = run(arguments);
     EXPECT_EQ(result.code, 0);
     EXPECT_NE(result.out.find(arguments.size() > 1 ? arguments[0] : "isector"), std::string::npos);
@@ -890,6 +893,338 @@ class Variable {
   const char* name_;
   std::optional<std::string> before_;
 };
+
+// --- tet ---
+
+class CliTet : public Cli {
+ protected:
+  CliTet() { write_tet_mesh(in("cube.mesh"), test::tet_box(2)); }
+
+  // Report of a short run on `input` with more options; the result is in `output`.
+  Json tet(const std::string& input, std::vector<std::string> more, const std::string& output = "out.mesh") const {
+    more.insert(more.begin(), {"tet", in(input), "-o", in(output), "--iterations", "20", "--quiet", "--report", "-"});
+    return report_of(more);
+  }
+
+  // A solid with a number h(x) at each vertex.
+  void write_field(const std::string& name, const TetMesh& mesh, const std::function<double(double)>& h) const {
+    std::ostringstream text;
+    text.precision(17);
+    text << "# vtk DataFile Version 3.0\nsolid\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS " << mesh.vertices.size()
+         << " double\n";
+    for (const Vec3& p : mesh.vertices) text << p.x << ' ' << p.y << ' ' << p.z << '\n';
+    text << "CELLS " << mesh.tets.size() << ' ' << 5 * mesh.tets.size() << '\n';
+    for (const Tetrahedron& t : mesh.tets) text << "4 " << t[0] << ' ' << t[1] << ' ' << t[2] << ' ' << t[3] << '\n';
+    text << "CELL_TYPES " << mesh.tets.size() << '\n';
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) text << "10\n";
+    text << "POINT_DATA " << mesh.vertices.size() << "\nSCALARS h double 1\nLOOKUP_TABLE default\n";
+    for (const Vec3& p : mesh.vertices) text << h(p.x) << '\n';
+    write_text(name, text.str());
+  }
+
+  // Mean length of the edges with their middle at x < 0.25 and at x > 0.75, the latter over the former.
+  double growth(const std::string& name) const {
+    const TetMesh mesh = read_tet_mesh(in(name));
+    std::set<std::array<Index, 2>> edges;
+    for (const Tetrahedron& t : mesh.tets)
+      for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < i; ++j) edges.insert({std::min(t[i], t[j]), std::max(t[i], t[j])});
+    double sum[2] = {0, 0}, count[2] = {0, 0};
+    for (const auto& e : edges) {
+      const double x = 0.5 * (mesh.vertices[e[0]].x + mesh.vertices[e[1]].x);
+      if (x > 0.25 && x < 0.75) continue;
+      sum[x > 0.5] += norm(mesh.vertices[e[0]] - mesh.vertices[e[1]]);
+      ++count[x > 0.5];
+    }
+    return sum[1] / count[1] / (sum[0] / count[0]);
+  }
+
+  // What `quality` says of a file must be a mesh of the cube that conforms.
+  void expect_cube(const std::string& name) const {
+    const Json report = report_of({"quality", in(name), "--quiet", "--report", "-"});
+    EXPECT_EQ(report["topology"]["conforming"], true) << name;
+    EXPECT_EQ(report["topology"]["euler"], 2) << name;
+    EXPECT_EQ(report["quality"]["inverted"], 0) << name;
+    EXPECT_EQ(report["quality"]["zero_volume"], 0) << name;
+    EXPECT_NEAR(report["quality"]["volume"].get<double>(), 1, 1e-12) << name;
+  }
+};
+
+TEST_F(CliTet, FillsASurface) {
+  if (find_tetgen().empty()) GTEST_SKIP() << "built without TetGen";
+  const Result result = run({"tet", in("sphere.off"), "-o", in("out.msh"), "-n", "300", "--boundary", in("skin.ply"),
+                             "--preview", in("p.png"), "--report", in("r.json")});
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  for (const char* line : {"input ", "output ", "quality ", "boundary ", "topology ", "volume ", "time ", "written "})
+    EXPECT_NE(("\n" + result.out).find(std::string("\n") + line), std::string::npos) << line;
+  EXPECT_TRUE(read_text(in("p.png")).starts_with("\x89PNG"));
+  const TetMesh mesh = read_tet_mesh(in("out.msh"));
+  const TriangleMesh skin = read_mesh(in("skin.ply"));
+  const Json report = Json::parse(read_text(in("r.json")));
+  EXPECT_EQ(report["output"]["vertices"], mesh.vertices.size());
+  EXPECT_EQ(report["output"]["tets"], mesh.tets.size());
+  EXPECT_EQ(report["output"]["faces"], skin.triangles.size());
+  EXPECT_EQ(report["sizing"]["boundary_vertices"], skin.vertices.size());
+  EXPECT_EQ(boundary_facets(mesh.tets).size(), skin.triangles.size());
+  EXPECT_EQ(analyse_topology(skin.triangles, skin.vertices.size()).euler, 2);
+  EXPECT_TRUE(analyse_tet_topology(mesh).conforming);
+}
+
+TEST_F(CliTet, TheExamplePart) {
+  if (find_tetgen().empty()) GTEST_SKIP() << "built without TetGen";
+  const Result result = run({"tet", BISECTOR_SOURCE_DIR "/examples/part.off", "-o", in("out.vtu"), "-n", "1500",
+                             "--iterations", "4", "--report", in("r.json")});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const Json report = Json::parse(read_text(in("r.json")));
+  EXPECT_EQ(report["topology"]["matches_input"], true);
+  EXPECT_EQ(report["topology"]["conforming"], true);
+  EXPECT_EQ(report["quality"]["inverted"], 0);
+  EXPECT_NEAR(report["output"]["vertices"].get<double>(), 1500, 75);
+  EXPECT_GE(report["quality"]["dihedral_min"].get<double>(), 10);
+}
+
+TEST_F(CliTet, ReportHasWhatIsDocumented) {
+  const Json report = tet("cube.mesh", {"-n", "100"});
+  const auto at = [&](const char* key) {
+    const Json::json_pointer pointer(key);
+    return report.contains(pointer) ? report.at(pointer) : Json();
+  };
+  for (const char* key :
+       {"/input/tets", "/output/tets", "/output/vertices", "/output/faces", "/background/tets", "/iterations",
+        "/evaluations", "/certification/pairs", "/sizing/wanted", "/sizing/boundary_vertices",
+        "/conform/steiner_points", "/conform/refused_sites", "/improved/rounds", "/improved/edge_removals",
+        "/improved/face_removals", "/improved/contractions", "/improved/insertions", "/improved/moves",
+        "/improved/before/below_goal", "/improved/after/below_goal", "/quality/inverted", "/quality/zero_volume",
+        "/topology/tet_components", "/topology/unused_vertices", "/features/curves", "/features/broken"}) {
+    ASSERT_TRUE(at(key).is_number_integer()) << key;
+    EXPECT_GE(at(key).get<long>(), 0) << key;
+  }
+  for (const char* key :
+       {"/energy", "/gradient_norm", "/sizing/edge_length", "/quality/volume", "/quality/volume_input",
+        "/quality/dihedral_min", "/quality/dihedral_max", "/quality/radius_ratio_mean", "/quality/theta_min",
+        "/quality/distance_rms", "/improved/before/dihedral_min", "/improved/after/radius_ratio_mean",
+        "/seconds/total", "/seconds/background", "/seconds/boundary", "/seconds/improve", "/seconds/extract",
+        "/seconds/tet", "/seconds/io"}) {
+    ASSERT_TRUE(at(key).is_number()) << key;
+    EXPECT_GE(at(key).get<double>(), 0) << key;
+  }
+  for (const char* key : {"/conform/delaunay", "/topology/conforming", "/topology/matches_input"})
+    EXPECT_TRUE(at(key).is_boolean()) << key;
+  EXPECT_EQ(at("/input/tets"), 48);
+  EXPECT_EQ(at("/features/curves"), 12);
+  EXPECT_GE(at("/improved/after/dihedral_min"), at("/improved/before/dihedral_min"));
+  const Json slivers = tet("cube.mesh", {"-n", "100", "--min-dihedral", "0"});
+  EXPECT_FALSE(slivers.contains("improved"));
+  EXPECT_LE(slivers["quality"]["dihedral_min"], report["quality"]["dihedral_min"]);
+}
+
+TEST_F(CliTet, EveryFormatHoldsTheSameMesh) {
+  std::optional<TetMesh> first;
+  for (const char* name : {"out.mesh", "out.msh", "out.vtu"}) {
+    tet("cube.mesh", {"-n", "80"}, name);
+    expect_cube(name);
+    const TetMesh mesh = read_tet_mesh(in(name));
+    if (!first) first = mesh;
+    EXPECT_EQ(mesh.vertices, first->vertices) << name;
+    EXPECT_EQ(mesh.tets, first->tets) << name;
+  }
+  // Each can be meshed again.
+  for (const char* name : {"out.mesh", "out.msh", "out.vtu"}) {
+    tet(name, {"-n", "40"}, "again.mesh");
+    expect_cube("again.mesh");
+  }
+}
+
+TEST_F(CliTet, OutputDoesNotDependOnThreads) {
+  std::set<std::string> results, reports;
+  for (const char* threads : {"1", "2", "5"}) {
+    Json report = timeless(tet("cube.mesh", {"-n", "120", "--threads", threads}));
+    reports.insert(report.dump());
+    results.insert(read_text(in("out.mesh")));
+  }
+  EXPECT_EQ(results.size(), 1u);
+  EXPECT_EQ(reports.size(), 1u);
+  tet("cube.mesh", {"-n", "120", "--random-seed", "2"});
+  EXPECT_FALSE(results.contains(read_text(in("out.mesh"))));
+}
+
+TEST_F(CliTet, EdgeLengths) {
+  // The length that -n reports gives about as many vertices, in the unit or as a share of the diagonal.
+  const double length = tet("cube.mesh", {"-n", "120"})["sizing"]["edge_length"];
+  for (const auto& [option, value] :
+       {std::pair("--edge-length", length), std::pair("--edge-length-relative", length / std::sqrt(3.0))}) {
+    const Json report = tet("cube.mesh", {option, std::to_string(value)});
+    EXPECT_NEAR(report["output"]["vertices"].get<double>(), 120, 6) << option;
+    expect_cube("out.mesh");
+  }
+}
+
+TEST_F(CliTet, SizesFromAnotherMeshOrAnAttribute) {
+  const auto h = [](double x) { return 0.2 + 0.3 * x; };
+  write_field("sizes.vtk", test::tet_grid(1, 1, 1), h);
+  tet("cube.mesh", {"-n", "300", "--sizes", in("sizes.vtk:h"), "--gradation", "1"});
+  expect_cube("out.mesh");
+  const double from_file = growth("out.mesh");
+  // The same density by h = rho^(-1/5), at the vertices of the input.
+  write_field("graded.vtk", test::tet_box(4), [&](double x) { return std::pow(h(x), -5); });
+  const std::vector<std::string> density{"-n", "300", "--density", "attribute:h", "--gradation", "1"};
+  tet("graded.vtk", density);
+  expect_cube("out.mesh");
+  EXPECT_NEAR(growth("out.mesh"), from_file, 0.1 * from_file);
+  // Edges are as dense as 1 / h^3: their mean length over x in (a, b) is that of h with this weight.
+  const auto mean = [&](double a, double b) {
+    return 2 * (1 / h(a) - 1 / h(b)) / (1 / (h(a) * h(a)) - 1 / (h(b) * h(b)));
+  };
+  const double expected = mean(0.75, 1) / mean(0, 0.25);
+  EXPECT_NEAR(from_file, expected, 0.15 * expected);
+  // The .sol beside a .mesh says the same as point data.
+  const std::string vtk_result = read_text(in("out.mesh"));
+  const TetMesh solid = read_tet_mesh(in("graded.vtk"));
+  write_tet_mesh(in("graded.mesh"), solid);
+  std::ostringstream sol;
+  sol.precision(17);
+  sol << "MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n" << solid.vertices.size() << "\n1 1\n";
+  for (const Vec3& p : solid.vertices) sol << std::pow(h(p.x), -5) << '\n';
+  write_text("graded.sol", sol.str() + "End\n");
+  tet("graded.mesh", density);
+  EXPECT_EQ(read_text(in("out.mesh")), vtk_result);
+}
+
+TEST_F(CliTet, RegionsAndLabelsStay) {
+  TetMesh solid = test::tet_grid(2, 1, 1);
+  for (const Tetrahedron& t : solid.tets) {
+    double x = 0;
+    for (const Index v : t) x += 0.25 * solid.vertices[v].x;
+    solid.regions.push_back(x < 1 ? 7 : 3);
+  }
+  solid.boundary = boundary_facets(solid.tets);
+  for (const Triangle& t : solid.boundary) {
+    int label = 9;
+    for (int k = 0; k < 3; ++k)
+      if (solid.vertices[t[0]][k] == solid.vertices[t[1]][k] && solid.vertices[t[0]][k] == solid.vertices[t[2]][k])
+        label = 1 + k;
+    solid.boundary_labels.push_back(label);
+  }
+  write_tet_mesh(in("bar.msh"), solid);
+  tet("bar.msh", {"-n", "250"}, "out.msh");
+  const TetMesh mesh = read_tet_mesh(in("out.msh"));
+  std::map<int, double> volume, area;
+  ASSERT_EQ(mesh.regions.size(), mesh.tets.size());
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
+    const auto& t = mesh.tets[i];
+    const Vec3 o = mesh.vertices[t[0]], a = mesh.vertices[t[1]] - o, b = mesh.vertices[t[2]] - o;
+    volume[mesh.regions[i]] += dot(cross(a, b), mesh.vertices[t[3]] - o) / 6;
+    double x = 0;
+    for (const Index v : t) x += 0.25 * mesh.vertices[v].x;
+    EXPECT_EQ(mesh.regions[i], x < 1 ? 7 : 3);
+  }
+  EXPECT_EQ(volume.size(), 2u);
+  TriangleMesh skin = surface_of_marks(mesh);
+  ASSERT_EQ(skin.labels.size(), skin.triangles.size());
+  area = area_of_labels(skin);
+  EXPECT_EQ(area.size(), 3u);
+  EXPECT_NEAR(area[1], 2, 1e-9);
+  EXPECT_NEAR(area[2], 4, 1e-9);
+  EXPECT_NEAR(area[3], 4, 1e-9);
+}
+
+TEST_F(CliTet, SeedsFromAFile) {
+  test::SplitMix64 random(4);
+  std::ostringstream seeds;
+  seeds.precision(17);
+  for (int i = 0; i < 150; ++i) seeds << random.unit() << ' ' << random.unit() << ' ' << random.unit() << '\n';
+  write_text("seeds.xyz", seeds.str());
+  const Json report = tet("cube.mesh", {"--seeds", in("seeds.xyz")});
+  EXPECT_EQ(report["sizing"]["wanted"], 150);
+  EXPECT_NEAR(report["output"]["vertices"].get<double>(), 150, 8);
+  expect_cube("out.mesh");
+}
+
+TEST_F(CliTet, OptionsThatContradictEachOther) {
+  write_text("points.xyz", "0.5 0.5 0.5\n");
+  const auto refused = [&](std::vector<std::string> more, const std::string& part) {
+    more.insert(more.begin(), {"tet", in("cube.mesh"), "-o", in("out.msh")});
+    expect_failure(2, more, part);
+  };
+  refused({}, "how many vertices");
+  refused({"-n", "100", "--edge-length", "0.1"}, "give one of them");
+  refused({"--edge-length", "0.1", "--edge-length-relative", "0.1"}, "give one of them");
+  refused({"--seeds", in("points.xyz"), "--edge-length", "0.1"}, "--edge-length");
+  refused({"--seeds", in("points.xyz"), "--random-seed", "3"}, "--random-seed");
+  refused({"-n", "100", "--sizes", in("points.xyz"), "--density", "lfs"}, "--density");
+  refused({"-n", "100", "--gradation", "0.1"}, "--gradation");
+  refused({"-n", "100", "--density", "lfs", "--gradation", "0"}, "--gradation");
+  refused({"-n", "100", "--density", "lfs", "--edge-min", "0.2", "--edge-max", "0.1"}, "--edge-min");
+  for (const char* n : {"7", "0", "-5", "many", "1.5", ""}) refused({"-n", n}, "-n");
+  for (const char* length : {"0", "-1", "nan", "inf"}) refused({"--edge-length", length}, "--edge-length");
+  for (const char* angle : {"55", "-1", "nan"}) refused({"-n", "100", "--min-dihedral", angle}, "--min-dihedral");
+  refused({"-n", "100", "--min-angle", "60"}, "--min-angle");
+}
+
+TEST_F(CliTet, BadInputIsOneLine) {
+  const auto refused = [&](const std::string& input, std::vector<std::string> more, const std::string& part) {
+    more.insert(more.begin(), {"tet", in(input), "-o", in("out.msh"), "-n", "100"});
+    expect_failure(1, more, part);
+  };
+  refused("missing.off", {}, "missing.off");
+  refused("missing.mesh", {}, "missing.mesh");
+  write_text("cube.txt", "nothing");
+  refused("cube.txt", {}, "cube.txt");
+  for (const char* name : {"out.off", "out.vtk", "out.txt", "out"})
+    expect_failure(1, {"tet", in("cube.mesh"), "-o", in(name), "-n", "100"}, "can be written here");
+  expect_failure(1, {"tet", in("cube.mesh"), "-o", in("nowhere/out.msh"), "-n", "100"}, "does not exist");
+  refused("cube.mesh", {"--boundary", in("skin.msh")}, "skin.msh");
+  refused("cube.mesh", {"--preview", in("p.jpg")}, "p.jpg");
+  refused("cube.mesh", {"--boundary", in("cube.off"), "--report", in("cube.off")}, "cube.off");
+
+  TriangleMesh open = test::icosphere(2);
+  open.triangles.pop_back();
+  write_mesh(in("open.off"), open);
+  refused("open.off", {}, "edges have one triangle");
+  TriangleMesh crossing = test::box(1);
+  for (const Triangle& t : test::box(1).triangles) crossing.triangles.push_back({t[0] + 8, t[1] + 8, t[2] + 8});
+  for (const Vec3& p : test::box(1).vertices) crossing.vertices.push_back(p + Vec3{0.5, 0.25, 0.125});
+  write_mesh(in("crossing.off"), crossing);
+  refused("crossing.off", {}, "intersects itself");
+  write_text("empty.off", "OFF\n0 0 0\n");
+  refused("empty.off", {}, "");
+  refused("cube.mesh", {"--sizes", in("absent.vtk")}, "absent.vtk");
+  refused("cube.mesh", {"--sizes", in("absent.vtk:h")}, "absent.vtk");
+  write_field("sizes.vtk", test::tet_box(1), [](double) { return 0.25; });
+  refused("cube.mesh", {"--sizes", in("sizes.vtk:other")}, "other");
+  refused("sizes.vtk", {"--density", "attribute:other"}, "other");
+  refused("cube.mesh", {"--density", "attribute:h"}, "cube.sol");
+  for (const double bad : {std::nan(""), 0.0, -1.0}) {
+    write_field("bad.vtk", test::tet_box(1), [&](double x) { return x < 0.5 ? 0.25 : bad; });
+    refused("cube.mesh", {"--sizes", in("bad.vtk:h")}, "");
+    refused("bad.vtk", {"--density", "attribute:h"}, "");
+  }
+  write_text("few.xyz", "0.5 0.5 0.5\n");
+  expect_failure(1, {"tet", in("cube.mesh"), "-o", in("out.msh"), "--seeds", in("few.xyz")}, "8 seeds");
+}
+
+TEST_F(CliTet, WithoutTetgenSaysSo) {
+  const Variable nowhere("BISECTOR_TETGEN", in("no-such-program"));
+  expect_failure(1, {"tet", in("sphere.off"), "-o", in("out.msh"), "-n", "100"}, "BISECTOR_TETGEN");
+  tet("cube.mesh", {"-n", "60"});  // needs none
+  expect_cube("out.mesh");
+}
+
+TEST_F(CliTet, InterruptLeavesNothing) {
+  const std::set<std::string> before = files();
+  const pid_t process = start({"tet", in("cube.mesh"), "-o", in("out.msh"), "-n", "20000", "--iterations", "1000000",
+                               "--tolerance", "0", "--report", in("r.json"), "--boundary", in("skin.off")});
+  for (int k = 0; k < 1000 && !catches_interrupts(process); ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  kill(process, SIGINT);
+  const Result result = finish(process);
+  EXPECT_EQ(result.code, 130);
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.err, "bisector: cancelled\n");
+  EXPECT_EQ(files(), before);
+}
 
 TEST_F(Cli, WithoutALoaderOrADriverTheCpuComputes) {
   const std::string nothing = in("nothing");

@@ -431,6 +431,17 @@ TEST(Features, PolyhedraOfFewFacesHaveAllTheirEdges) {
   EXPECT_EQ(of_cut.edges.size(), 12u + 8u);
 }
 
+TEST(Features, PlatesAndBarsHaveTwelveCurves) {
+  for (const Vec3& extent : {Vec3{1, 1, 0.01}, Vec3{100, 1, 1}, Vec3{1000, 300, 1}})
+    for (const int n : {1, 2, 4}) {
+      TriangleMesh mesh = box(n);
+      for (Vec3& p : mesh.vertices) p = {extent.x * p.x, extent.y * p.y, extent.z * p.z};
+      const FeatureGraph graph = detect_features(mesh);
+      EXPECT_EQ(graph.curves.size(), 12u) << extent.x << ' ' << n;
+      EXPECT_EQ(graph.corners.size(), 8u) << extent.x << ' ' << n;
+    }
+}
+
 TEST(Features, ThreadsDoNotMatter) {
   const TriangleMesh mesh = box(20);
   const FeatureGraph expected = detect(mesh);

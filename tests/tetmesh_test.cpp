@@ -129,6 +129,26 @@ TEST_P(Tetrahedralise, FillsTheSolidWithGoodTetrahedraAndKeepsFeatures) {
 
 INSTANTIATE_TEST_SUITE_P(Solids, Tetrahedralise, testing::ValuesIn(cases()), [](const auto& c) { return c.param.name; });
 
+// Solids one or two cells thick: all sites of a free CVT meet the boundary.
+TEST(TetrahedraliseThinSolids, HaveTheCountAndWhatRoomThereIsInside) {
+  TriangleMesh plate = box(2);
+  for (Vec3& p : plate.vertices) p.z *= 0.05;
+  TriangleMesh wall = icosphere(3);
+  const TriangleMesh cavity = icosphere(3);
+  const auto n = static_cast<Index>(wall.vertices.size());
+  for (const Vec3& p : cavity.vertices) wall.vertices.push_back(0.7 * p);
+  for (const auto& [a, b, c] : cavity.triangles) wall.triangles.push_back({a + n, b + n, c + n});
+  for (const auto& [surface, vertices] : {std::pair{plate, 1000.0}, std::pair{wall, 1000.0}}) {
+    const TetResult result = tetrahedralise(surface, options_for(static_cast<std::size_t>(vertices)));
+    EXPECT_NEAR(static_cast<double>(result.mesh.vertices.size()), vertices, 0.05 * vertices);
+    const TetQualityReport quality = measure_tet_quality(result.mesh);
+    EXPECT_EQ(quality.inverted, 0u);
+    EXPECT_GE(quality.dihedral_min, 14);
+    // A mesh without vertices inside has about 0.65.
+    EXPECT_GE(quality.radius_ratio_mean, 0.8);
+  }
+}
+
 bool same_bits_and_tets(const TetMesh& a, const TetMesh& b) {
   return a.tets == b.tets && a.boundary == b.boundary && same_bits(a.vertices, b.vertices);
 }
@@ -256,6 +276,35 @@ TEST(TetrahedraliseErrors, RefusesWhatBoundsNoSolid) {
     crossing.triangles.push_back({a + n, b + n, c + n});
   }
   EXPECT_THROW(tetrahedralise(crossing, options_for(100)), Error);
+}
+
+TEST(TetrahedraliseErrors, RefusesTetrahedraWhoseBoundaryIsNoSuchSurface) {
+  const auto refused = [](const TetMesh& solid, const std::string& part) {
+    try {
+      tetrahedralise(solid, options_for(100));
+      ADD_FAILURE() << "no error: " << part;
+    } catch (const Error& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with("the tetrahedra's boundary: ")) << error.what();
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  };
+  TetMesh edge = single_tet();  // two on one edge
+  edge.vertices.insert(edge.vertices.end(), {{5, -5, 1}, {5, -4, 8}});
+  edge.tets.push_back({0, 1, 4, 5});
+  refused(edge, "1 edge has more than two triangles (");
+  TetMesh vertex = single_tet();
+  vertex.vertices.insert(vertex.vertices.end(), {{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}});
+  vertex.tets.push_back({0, 4, 6, 5});
+  refused(vertex, "touches itself at 1 vertex (");
+  TetMesh crossing = single_tet();
+  for (const Vec3& p : single_tet().vertices) crossing.vertices.push_back(p + Vec3{0.5, 0.25, 0.125});
+  crossing.tets.push_back({4, 5, 6, 7});
+  refused(crossing, "intersects itself");
+  TetMesh flat = single_tet();  // one without volume on a facet
+  flat.vertices.push_back({4, 4, 0});
+  flat.tets.push_back({0, 2, 1, 4});
+  refused(flat, "intersects itself");
+  refused({}, "no triangles");
 }
 
 TEST(TetrahedraliseErrors, RefusesOptionsThatMakeNoSense) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "bisector/core/parallel.h"
@@ -20,6 +22,8 @@
 
 namespace bisector::cli {
 namespace {
+
+constexpr double kPoorDihedral = 8;  // degrees
 
 struct Input {
   bool solid = false;
@@ -47,13 +51,16 @@ Json input_json(const Input& input) {
           {"tets", input.tets.tets.size()}};
 }
 
-// "FILE" or "FILE:NAME".
+// Path and name in "FILE" or "FILE:NAME".
+std::pair<std::string, std::string> split_sizes(const std::string& word) {
+  const std::size_t colon = word.rfind(':');
+  std::error_code error;
+  if (colon == std::string::npos || colon + 1 == word.size() || std::filesystem::exists(word, error)) return {word, ""};
+  return {word.substr(0, colon), word.substr(colon + 1)};
+}
+
 SizeSamples read_sizes(const std::string& word) {
-  std::string path = word, name;
-  if (const std::size_t colon = word.rfind(':'); colon != std::string::npos && colon + 1 < word.size()) {
-    path = word.substr(0, colon);
-    name = word.substr(colon + 1);
-  }
+  const auto [path, name] = split_sizes(word);
   const TetMesh mesh = read_tet_mesh(path);
   return {mesh.vertices, read_tet_attribute(path, name), mesh.tets};
 }
@@ -138,7 +145,8 @@ Json tet_report(Console& console, const TetCommand& command, const TetResult& re
   report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
   report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length},
                       {"boundary_vertices", result.boundary_vertices}};
-  report["conform"] = {{"delaunay", result.delaunay}, {"steiner_points", result.steiner_points}};
+  report["conform"] = {{"delaunay", result.delaunay}, {"steiner_points", result.steiner_points},
+                       {"refused_sites", result.refused_sites}};
   if (command.options.min_dihedral > 0) report["improved"] = improved_json(result.improved);
   return report;
 }
@@ -182,7 +190,7 @@ void print_summary(Console& console, const TetCommand& command, const TetResult&
   console.print_written({command.output, command.boundary, command.preview, command.common.report});
 }
 
-void warn_of(Console& console, const TetResult& result, const Measures& measures) {
+void warn_of(Console& console, const TetCommand& command, const TetResult& result, const Measures& measures) {
   const FeatureResult& features = result.boundary.features;
   if (features.broken > 0)
     console.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices", features.broken,
@@ -190,10 +198,14 @@ void warn_of(Console& console, const TetResult& result, const Measures& measures
   if (!same_topology(measures.topology.boundary, result.input_topology))
     console.warn(fmt::format("the boundary's topology ({}) is not the input's ({}); ask for more vertices",
                              describe(measures.topology.boundary), describe(result.input_topology)));
+  if (command.options.min_dihedral > kPoorDihedral && measures.tets.dihedral_min < kPoorDihedral)
+    console.warn(fmt::format("a dihedral angle is {:.2f} degrees only: the boundary has acute edges or parts thinner than its "
+                             "edges; ask for more vertices", measures.tets.dihedral_min));
   const std::size_t count = result.mesh.vertices.size();
   if (std::max(count, result.wanted) - std::min(count, result.wanted) > result.wanted / 20)
-    console.warn(fmt::format("{} instead of {}: the boundary's shape and good angles took as many",
-                             counted(count, "vertex", "vertices"), result.wanted));
+    console.warn(fmt::format("{} instead of {}: {}", counted(count, "vertex", "vertices"), result.wanted,
+                             count > result.wanted ? "the boundary's shape and good angles took as many"
+                                                   : "no more fitted inside the boundary"));
 }
 
 }  // namespace
@@ -203,7 +215,7 @@ void run(const TetCommand& command) {
   const std::string& report_path = command.common.report;
   check_outputs({{command.output, kTetFormats}, {command.boundary, kMeshFormats}, {command.preview, {".png"}},
                  report_output(report_path)},
-                {command.input, command.seeds, command.feature_file});
+                {command.input, command.seeds, command.feature_file, split_sizes(command.sizes).first});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
   const Context context = console.context();
@@ -225,7 +237,7 @@ void run(const TetCommand& command) {
   measures.tets = measure_tet_quality(result.mesh);
   measures.boundary = measure_quality(boundary_mesh(result.mesh));
   measures.topology = analyse_tet_topology(result.mesh);
-  warn_of(console, result, measures);
+  warn_of(console, command, result, measures);
   Json report;
   if (!report_path.empty()) {
     TriangleMesh reference = input.surface;

@@ -65,16 +65,15 @@ int run() {
   Request request;
   read_all(&request, sizeof request);
   if (request.magic != kMagic) return kBadRequest;
-  tetgenio surface, inner, result;
-  read_points(surface, request.surface_points);
-  read_points(inner, request.inner_points);
+  tetgenio surface, result;
+  read_points(surface, request.points);
   read_triangles(surface, request.triangles);
 
   // Vertices that are close are not merged (M, T): the surfaces of thin plates would be.
-  char with_points[] = "pYiMT1e-14Q", without[] = "pYMT1e-14Q";
+  char switches[] = "pYMT1e-14Q";
   tetgenbehavior options;
-  if (!options.parse_commandline(request.inner_points > 0 ? with_points : without)) return kBadRequest;
-  tetrahedralize(&options, &surface, &result, request.inner_points > 0 ? &inner : nullptr);
+  if (!options.parse_commandline(switches)) return kBadRequest;
+  tetrahedralize(&options, &surface, &result);
 
   const Reply reply{kMagic, static_cast<std::uint64_t>(result.numberofpoints),
                     static_cast<std::uint64_t>(result.numberoftetrahedra)};

@@ -5,12 +5,12 @@
 
 namespace bisector::tetgen {
 
-inline constexpr std::uint64_t kMagic = 0x3147455442534942;
+inline constexpr std::uint64_t kMagic = 0x3247455442534942;
 
-// Followed by the surface's points and the inner points (3 doubles each), then the triangles (3 int32 each).
+// Followed by the surface's points (3 doubles each), then its triangles (3 int32 each).
 struct Request {
   std::uint64_t magic = kMagic;
-  std::uint64_t surface_points = 0, inner_points = 0, triangles = 0;
+  std::uint64_t points = 0, triangles = 0;
 };
 
 // Followed by the points (3 doubles each), then the tetrahedra (4 int32 each).

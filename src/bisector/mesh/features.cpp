@@ -209,6 +209,7 @@ constexpr double kShortest = 5;              // least length of what is joined t
 constexpr double kRoom = 0.02;                   // area beside what is joined to nothing, of its extent squared ...
 constexpr std::size_t kFewEdges = 60;            // ... if it has fewer edges than this
 constexpr std::size_t kManyTriangles = 500;      // beside it, are room enough
+constexpr double kFlat = 0.1 * kDegree;          // its disorder, if it is of the faces of a plate or a bar, however thin
 constexpr std::size_t kManyEdges = 12;       // ... unless it has as many edges as this
 
 class CreaseFinder {
@@ -344,13 +345,14 @@ class CreaseFinder {
     if (!attached && component.size() < kManyEdges &&
         length * static_cast<double>(around_count) < kShortest * around_length)
       return false;
-    if (!attached && component.size() < kFewEdges && !has_room(component, vertices, length)) return false;
     double disorder = 0;
     if (!around.empty()) {
       const auto middle = around.begin() + static_cast<std::ptrdiff_t>((around.size() - 1) / 2);
       std::nth_element(around.begin(), middle, around.end());
       disorder = *middle;
     }
+    if (!attached && component.size() < kFewEdges && disorder > kFlat && !has_room(component, vertices, length))
+      return false;
     if (inner >= kEnough)
       disorder = std::clamp(change / static_cast<double>(inner), kLeastDisorder * disorder, disorder);
     return fold > length * (kPlainFold + kDisorderWeight * disorder);

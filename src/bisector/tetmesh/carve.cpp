@@ -56,11 +56,9 @@ Carved carve(const std::vector<Tetrahedron>& tets, const std::vector<Triangle>& 
       mark(t, in != kNone ? inside : outside);
     }
   Carved carved;
-  for (Index i = 0; i < boundary.size(); ++i) {
-    if (found[i]) continue;
-    if (carved.missing++ == 0) carved.first_missing = i;
-  }
-  if (carved.missing > 0) return carved;
+  for (Index i = 0; i < boundary.size(); ++i)
+    if (!found[i]) carved.missing.push_back(i);
+  if (!carved.missing.empty()) return carved;
   for (std::size_t head = 0; head < queue.size(); ++head) {
     const Index t = queue[head];
     for (std::size_t k = 0; k < 4; ++k) {

@@ -9,9 +9,7 @@ namespace bisector {
 
 struct Carved {
   std::vector<Tetrahedron> tets;  // those inside, in their order
-  // Triangles of the boundary that are not facets; if there are any, `tets` is empty.
-  std::size_t missing = 0;
-  Index first_missing = kNone;
+  std::vector<Index> missing;     // triangles of the boundary that are not facets; if there are any, `tets` is empty
 };
 
 // `tets`: positive, each facet with at most two. `boundary`: closed, counter-clockwise seen from outside the solid, no

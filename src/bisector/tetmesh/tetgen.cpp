@@ -217,19 +217,17 @@ std::vector<Index> used_vertices(const TriangleMesh& surface) {
   return vertices;
 }
 
-std::string make_request(const TriangleMesh& surface, const std::vector<Index>& used, const std::vector<Vec3>& points) {
+std::string make_request(const TriangleMesh& surface, const std::vector<Index>& used) {
   std::vector<std::int32_t> index(surface.vertices.size(), -1);
   std::string out;
   tetgen::Request request;
-  request.surface_points = used.size();
-  request.inner_points = points.size();
+  request.points = used.size();
   request.triangles = surface.triangles.size();
   append(out, &request, 1);
   for (std::size_t i = 0; i < used.size(); ++i) {
     index[used[i]] = static_cast<std::int32_t>(i);
     append(out, &surface.vertices[used[i]], 1);
   }
-  append(out, points.data(), points.size());
   for (const Triangle& t : surface.triangles) {
     const std::int32_t corners[3] = {index[t[0]], index[t[1]], index[t[2]]};
     append(out, corners, 3);
@@ -356,53 +354,40 @@ std::string find_tetgen() {
   return runs(BISECTOR_TETGEN_PROGRAM) ? BISECTOR_TETGEN_PROGRAM : "";
 }
 
-TetgenResult tetgen_tets(const TriangleMesh& surface, const std::vector<Vec3>& points, const TetgenOptions& options,
-                         const Context& context) {
+TetgenResult tetgen_tets(const TriangleMesh& surface, const TetgenOptions& options, const Context& context) {
   const std::string program = options.program.empty() ? find_tetgen() : options.program;
   if (program.empty())
     throw Error(
         "tetrahedra of a surface need TetGen, and the program bisector-tetgen is nowhere; build with BISECTOR_TETGEN, "
-        "set "
-        "BISECTOR_TETGEN to its path, or give a tetrahedral mesh");
+        "set BISECTOR_TETGEN to its path, or give a tetrahedral mesh");
   const std::vector<Index> used = used_vertices(surface);
-  for (const std::vector<Vec3>* list : {&surface.vertices, &points})
-    for (std::size_t v = 0; v < list->size(); ++v)
-      for (int k = 0; k < 3; ++k)
-        if (!std::isfinite((*list)[v][k]))
-          throw Error(
-              fmt::format("{} {}: a coordinate is not finite; mend it", list == &points ? "point" : "vertex", v));
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v)
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(surface.vertices[v][k]))
+        throw Error(fmt::format("vertex {}: a coordinate is not finite; mend it", v));
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 4;
-  if (surface.triangles.empty() || surface.triangles.size() > kMost || used.size() + points.size() > kMost)
+  if (surface.triangles.empty() || surface.triangles.size() > kMost || used.size() > kMost)
     throw Error(fmt::format("TetGen cannot take {} triangles and {} vertices; simplify the surface",
-                            surface.triangles.size(), used.size() + points.size()));
+                            surface.triangles.size(), used.size()));
 
   Child child(program);
-  const std::string reply = child.talk(make_request(surface, used, points), options.time_limit, context);
+  const std::string reply = child.talk(make_request(surface, used), options.time_limit, context);
   explain(child.wait(), child);
   Tets given = parse_reply(reply);
 
   TetgenResult result;
   std::vector<Vec3> vertices = surface.vertices;
-  vertices.insert(vertices.end(), points.begin(), points.end());
-  std::vector<char> wanted(vertices.size(), 1);
-  std::fill_n(wanted.begin(), surface.vertices.size(), 0);
+  std::vector<char> wanted(vertices.size(), 0);
   for (const Index v : used) wanted[v] = 1;
-  const std::size_t first_steiner = vertices.size();
   const std::vector<Index> index = identify(given.points, vertices, wanted);
   for (Tetrahedron& t : given.tets)
     for (Index& v : t) v = index[v];
   turn_positive(vertices, given.tets, result.zero_volume);
   Carved carved = carve(given.tets, surface.triangles);
-  if (carved.missing > 0)
-    throw Error(fmt::format("TetGen did not keep {} of {} boundary triangles (first: {}); {}", carved.missing,
-                            surface.triangles.size(), carved.first_missing, kSimplify));
-  result.steiner_points = drop_unused(vertices, carved.tets, first_steiner);
-  std::vector<char> reached(vertices.size(), 0);
-  for (const Tetrahedron& t : carved.tets)
-    for (const Index v : t) reached[v] = 1;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    if (!reached[surface.vertices.size() + i])
-      throw Error(fmt::format("TetGen left out point {}; it must lie inside the surface, away from it", i));
+  if (!carved.missing.empty())
+    throw Error(fmt::format("TetGen did not keep {} of {} boundary triangles (first: {}); {}", carved.missing.size(),
+                            surface.triangles.size(), carved.missing.front(), kSimplify));
+  result.steiner_points = drop_unused(vertices, carved.tets, surface.vertices.size());
   if (boundary_facets(carved.tets).size() != surface.triangles.size())
     throw Error(fmt::format("TetGen's tetrahedra have holes; {}", kSimplify));
   result.mesh.regions = number_parts(carved.tets);

@@ -16,7 +16,7 @@ struct TetgenOptions {
 };
 
 struct TetgenResult {
-  // The surface's vertices, then the points, then TetGen's own, all inside; a region number from 1 for each part of the
+  // The surface's vertices, then TetGen's own, all inside; a region number from 1 for each part of the
   // solid if there are several; the surface's triangles, labels and feature edges as marks.
   TetMesh mesh;
   std::size_t steiner_points = 0;
@@ -28,12 +28,11 @@ struct TetgenResult {
 std::string find_tetgen();
 
 // Tetrahedra inside a closed surface, as check_surface gives it, whose boundary facets are exactly the surface's
-// triangles, with no point added on it (TetGen's -pY). With `points`, inside the surface, those are vertices too (-i).
-// Coordinates stay the same bits; vertices that no triangle uses are kept at their index without tetrahedra.
+// triangles, with no point added on it (TetGen's -pY). Coordinates stay the same bits; vertices that no triangle uses
+// are kept at their index without tetrahedra.
 //
 // Throws Cancelled, and Error if the program is missing, crashes, takes longer or more memory than there is, or gives
 // what is not such a mesh; each tells what to do.
-TetgenResult tetgen_tets(const TriangleMesh& surface, const std::vector<Vec3>& points = {},
-                         const TetgenOptions& options = {}, const Context& context = {});
+TetgenResult tetgen_tets(const TriangleMesh& surface, const TetgenOptions& options = {}, const Context& context = {});
 
 }  // namespace bisector

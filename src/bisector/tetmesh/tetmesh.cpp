@@ -23,6 +23,7 @@
 #include "bisector/tetmesh/sample_solid.h"
 #include "bisector/tetmesh/tet_levels.h"
 #include "bisector/tetmesh/tetgen.h"
+#include "bisector/voronoi/hilbert.h"
 #include "bisector/voronoi/tiling.h"
 
 namespace bisector {
@@ -37,6 +38,8 @@ constexpr double kFreeShare = 0.35, kFinestShare = 0.2, kJointShare = 0.2, kInne
 // Of the surface's own optimisation: to spread the sites along features, and before the boundary is extracted.
 constexpr int kLayoutSteps = 10, kBoundarySteps = 30;
 constexpr int kJointRounds = 3;
+// Sites that may come to the boundary, over those that its edge lengths ask for: usually 0.9 to 1.2 of them do.
+constexpr double kCrowded = 1.25;
 constexpr double kGoalBeyond = 5;    // degrees: aiming a little higher raises the mean as well
 constexpr double kOptimising = 0.8;  // of the whole run, about
 constexpr int kPushRounds = 8;
@@ -45,6 +48,30 @@ constexpr double kClear = 0.75;
 constexpr std::size_t kFewest = 8;
 constexpr std::size_t kManyTets = 8;  // for each site, beyond which a stand-in pays
 constexpr int kStandInSteps = 20;     // of its surface's optimisation, per level
+
+// Vertices of an equilateral triangulation of the surface with the edge lengths aimed at.
+double boundary_vertices(const Surface& surface, const SizedSolid& sized) {
+  const TriangleMesh& mesh = surface.mesh;
+  double count = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 a = mesh.vertices[t[0]], b = mesh.vertices[t[1]], c = mesh.vertices[t[2]];
+    double per_area = 0;
+    for (const Index v : t) {
+      const double h = sized.lengths.empty() ? sized.edge_length : sized.lengths[v];
+      per_area += 2 / (3 * std::sqrt(3.0) * h * h);
+    }
+    count += 0.5 * norm(cross(b - a, c - a)) * per_area;
+  }
+  return count;
+}
+
+// So many of the points, evenly along their spatial order.
+std::vector<Vec3> thinned(const std::vector<Vec3>& points, std::size_t count) {
+  const std::vector<Index> order = hilbert_order(points);
+  std::vector<Vec3> kept;
+  for (std::size_t k = 0; k < count; ++k) kept.push_back(points[order[k * points.size() / count]]);
+  return kept;
+}
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -126,7 +153,7 @@ void StandIns::make_coarse(std::size_t vertices) {
   quiet.warning = nullptr;
   const RemeshResult coarse = remesh(boundary_, features_, remeshing, quiet);
   try {
-    domain_ = std::make_unique<Domain>(tetgen_tets(check_surface(coarse.mesh), {}, {}, quiet).mesh, std::vector<double>{},
+    domain_ = std::make_unique<Domain>(tetgen_tets(check_surface(coarse.mesh), {}, quiet).mesh, std::vector<double>{},
                                        options_.compute, context_);
   } catch (const DeviceError&) {
     throw;
@@ -202,10 +229,13 @@ void Pipeline::free_phase() {
       ClippedPolyhedra polyhedra;
       backend.evaluate(state_.seeds, state_.moments, polygons, polyhedra);
       state_.seeds = refine_sites(polyhedra, state_.moments, state_.seeds, counts[level]);
-    } else if (options_.seeds.empty()) {
+    }
+    if (state_.seeds.size() < counts[level]) {  // at first, and where the solid is thin: its cells have few neighbours
       std::vector<double> weight = backend.solid().density;
       for (double& rho : weight) rho = std::pow(rho, 0.6);
-      state_.seeds = sample_solid(backend.solid().mesh, counts.front(), options_.random_seed, weight);
+      const std::vector<Vec3> more = sample_solid(backend.solid().mesh, counts[level] - state_.seeds.size(),
+                                                  options_.random_seed + level, weight);
+      state_.seeds.insert(state_.seeds.end(), more.begin(), more.end());
     }
     state_.places.assign(state_.seeds.size(), {Kind::interior});
     const bool finest = level > 0 && level + 1 == counts.size();
@@ -273,6 +303,10 @@ void Pipeline::joint_phase() {
     (inner ? interior : on_boundary).push_back(inner ? state_.seeds[i] : feet[i]);
   }
   result_.boundary_sites = on_boundary.size();
+  // Where the solid is two cells thick all of them meet the boundary, and nothing would be left inside.
+  if (const double room = boundary_vertices(backend_.surface(), sized_);
+      options_.seeds.empty() && static_cast<double>(on_boundary.size()) > kCrowded * room)
+    on_boundary = thinned(on_boundary, std::max(kFewest, static_cast<std::size_t>(std::llround(room))));
   set_boundary(remesh_boundary(std::move(on_boundary), {}, false), std::move(interior));
   for (int round = 0; round < kJointRounds; ++round) {
     run_steps(backend_, "with the boundary", kJointShare / kJointRounds, true);
@@ -290,7 +324,13 @@ void Pipeline::finish_boundary() {
   }
   std::vector<Vec3> interior = interior_seeds();
   surface_ = remesh_boundary(std::move(seeds), std::move(places), true);
-  if (const std::size_t crossings = count_self_intersections(surface_.mesh); crossings > 0)
+  std::size_t crossings = count_self_intersections(surface_.mesh);
+  // Where sheets meet at a small angle, another pass may mend what one leaves, with more vertices.
+  if (crossings > 0 || !surface_.topology.closed || !surface_.topology.manifold) {
+    surface_ = remesh_boundary(surface_.mesh.vertices, surface_.places, true);
+    crossings = count_self_intersections(surface_.mesh);
+  }
+  if (crossings > 0)
     throw Error(fmt::format("the boundary of the result crosses itself at {} pairs of triangles: parts are thinner than its edges; "
                             "ask for more vertices", crossings));
   if (!surface_.topology.closed || !surface_.topology.manifold)
@@ -383,6 +423,7 @@ void Pipeline::extract() {
   result_.mesh = std::move(tets.mesh);
   result_.delaunay = tets.delaunay;
   result_.steiner_points = tets.steiner_points;
+  result_.refused_sites = tets.refused.size();
   result_.boundary_vertices = count;
   result_.seconds.extract = seconds_since(begin);
   begin = Clock::now();
@@ -471,6 +512,18 @@ void set_regions(const TetMesh& from, TetMesh& mesh) {
   });
 }
 
+// A boundary that no surface of the result could follow.
+void check_boundary(const TetMesh& solid) {
+  TriangleMesh surface;
+  surface.vertices = solid.vertices;
+  try {
+    surface.triangles = boundary_facets(solid.tets);
+    check_surface(surface);
+  } catch (const Error& error) {
+    throw Error(std::string("the tetrahedra's boundary: ") + error.what());
+  }
+}
+
 void check_attribute(const TetOptions& options, std::size_t vertices) {
   const SizingOptions& field = options.sizing.field;
   if (field.kind == DensityKind::attribute && options.sizing.sizes.points.empty() && field.attribute.size() != vertices)
@@ -486,7 +539,7 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
                                                     : SizingTarget{options.seeds.size(), 0};
   SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
   if (sized.vertices < kFewest)
-    throw Error(fmt::format("edges of {} make {} vertices, fewer than {}; ask for shorter ones", options.edge_length,
+    throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones", options.edge_length,
                             sized.vertices, kFewest));
   const FeatureGraph features = split_features(graph, sized.splits);
   const Solid solid(sized.mesh, sized.volume_density());
@@ -528,7 +581,7 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
     }
   std::erase_if(moved.features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
   context.report({"background tetrahedra", 0, 1, 0, 0, 0});
-  TetMesh background = tetgen_tets(surface, {}, {}, context).mesh;
+  TetMesh background = tetgen_tets(surface, {}, context).mesh;
   const double seconds = seconds_since(begin);
   TetResult result = mesh_solid(std::move(background), moved, context);
   result.seconds.background = seconds;
@@ -541,6 +594,7 @@ TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const 
   check_attribute(options, solid.vertices.size());
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
+  check_boundary(solid);
   return mesh_solid(solid, options, context);
 }
 

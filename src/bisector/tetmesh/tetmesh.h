@@ -48,6 +48,7 @@ struct TetResult {
   RemeshResult boundary;          // without its mesh
   bool delaunay = false;          // the tetrahedra were Delaunay before improvement (conform.h)
   std::size_t steiner_points = 0; // vertices that TetGen had to add, where not
+  std::size_t refused_sites = 0;  // sites inside that could not become vertices then
   TetImproveReport improved;
   MeshTopology input_topology;    // of the solid's boundary
   double volume = 0;              // of the solid
@@ -70,8 +71,8 @@ struct TetResult {
 // Cancelled.
 TetResult tetrahedralise(const TriangleMesh& surface, const TetOptions& options, const Context& context = {});
 
-// Meshes the domain of a tetrahedral mesh anew. Each tetrahedron of the result has the region in which its centroid lies;
-// interfaces between regions are not kept otherwise.
+// Meshes the domain of a tetrahedral mesh anew, whose boundary must be a surface as above. Each tetrahedron of the result has
+// the region in which its centroid lies; interfaces between regions are not kept otherwise.
 TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const Context& context = {});
 
 }  // namespace bisector
