@@ -38,8 +38,6 @@ constexpr double kFreeShare = 0.35, kFinestShare = 0.2, kJointShare = 0.2, kInne
 // Of the surface's own optimisation: to spread the sites along features, and before the boundary is extracted.
 constexpr int kLayoutSteps = 10, kBoundarySteps = 30;
 constexpr int kJointRounds = 3;
-// Sites that may come to the boundary, over those that its edge lengths ask for: usually 0.9 to 1.2 of them do.
-constexpr double kCrowded = 1.25;
 constexpr double kGoalBeyond = 5;    // degrees: aiming a little higher raises the mean as well
 constexpr double kOptimising = 0.8;  // of the whole run, about
 constexpr int kPushRounds = 8;
@@ -275,12 +273,17 @@ void Pipeline::set_boundary(const RemeshResult& surface, std::vector<Vec3> inter
   state_.places.resize(state_.seeds.size(), {Kind::interior});
 }
 
-// Sites inside whose cells have come to the boundary go there. True if there are any.
+// Sites inside whose cells have come to the boundary go there, as long as there is room. True if there are any.
 bool Pipeline::promote() {
+  const auto held = std::count_if(state_.places.begin(), state_.places.end(),
+                                  [](const SeedPlace& place) { return place.kind != Kind::interior; });
+  double room = boundary_vertices(backend_.surface(), sized_) - static_cast<double>(held);
   bool any = false;
   for (const Index i : pokers()) {
+    if (room < 1) break;
     state_.places[i] = {};
     any = true;
+    --room;
   }
   return any;
 }
@@ -303,9 +306,10 @@ void Pipeline::joint_phase() {
     (inner ? interior : on_boundary).push_back(inner ? state_.seeds[i] : feet[i]);
   }
   result_.boundary_sites = on_boundary.size();
-  // Where the solid is two cells thick all of them meet the boundary, and nothing would be left inside.
+  // Of a free CVT 0.9 to 1.2 times as many meet the boundary as its edge lengths ask for, and all where the solid is two cells
+  // thick; with no more than that, tetrahedra inside and on the boundary are alike, and something is left inside.
   if (const double room = boundary_vertices(backend_.surface(), sized_);
-      options_.seeds.empty() && static_cast<double>(on_boundary.size()) > kCrowded * room)
+      options_.seeds.empty() && static_cast<double>(on_boundary.size()) > room)
     on_boundary = thinned(on_boundary, std::max(kFewest, static_cast<std::size_t>(std::llround(room))));
   set_boundary(remesh_boundary(std::move(on_boundary), {}, false), std::move(interior));
   for (int round = 0; round < kJointRounds; ++round) {
