@@ -40,6 +40,8 @@ constexpr int kLayoutSteps = 10, kBoundarySteps = 30;
 constexpr int kJointRounds = 3;
 constexpr double kGoalBeyond = 5;    // degrees: aiming a little higher raises the mean as well
 constexpr double kOptimising = 0.8;  // of the whole run, about
+// Cells that meet the boundary, over the sites that its edge lengths ask for, from which on the solid counts as thin.
+constexpr double kThin = 1.25;
 constexpr int kPushRounds = 8;
 // Heights over the boundary, in lengths of its edges, of sites inside that own none of it: a third layer's distance is 0.8.
 constexpr double kClear = 0.75;
@@ -203,6 +205,7 @@ class Pipeline {
   OptimiseTotals totals_;
   RemeshResult surface_;
   TetResult result_;
+  bool thin_ = false;  // the solid, beside the cells
 };
 
 void Pipeline::run_steps(SolidBackend& backend, const std::string& phase, double share, bool constrained) {
@@ -273,17 +276,17 @@ void Pipeline::set_boundary(const RemeshResult& surface, std::vector<Vec3> inter
   state_.places.resize(state_.seeds.size(), {Kind::interior});
 }
 
-// Sites inside whose cells have come to the boundary go there, as long as there is room. True if there are any.
+// Sites inside whose cells have come to the boundary go there, as long as there is room, or where the solid is thin and there is no
+// other place for them. True if there are any.
 bool Pipeline::promote() {
   const auto held = std::count_if(state_.places.begin(), state_.places.end(),
                                   [](const SeedPlace& place) { return place.kind != Kind::interior; });
   double room = boundary_vertices(backend_.surface(), sized_) - static_cast<double>(held);
   bool any = false;
   for (const Index i : pokers()) {
-    if (room < 1) break;
+    if (room-- < 1 && !thin_) break;
     state_.places[i] = {};
     any = true;
-    --room;
   }
   return any;
 }
@@ -308,8 +311,9 @@ void Pipeline::joint_phase() {
   result_.boundary_sites = on_boundary.size();
   // Of a free CVT 0.9 to 1.2 times as many meet the boundary as its edge lengths ask for, and all where the solid is two cells
   // thick; with no more than that, tetrahedra inside and on the boundary are alike, and something is left inside.
-  if (const double room = boundary_vertices(backend_.surface(), sized_);
-      options_.seeds.empty() && static_cast<double>(on_boundary.size()) > room)
+  const double room = boundary_vertices(backend_.surface(), sized_), met = static_cast<double>(on_boundary.size());
+  thin_ = met > kThin * room;
+  if (options_.seeds.empty() && met > room)
     on_boundary = thinned(on_boundary, std::max(kFewest, static_cast<std::size_t>(std::llround(room))));
   set_boundary(remesh_boundary(std::move(on_boundary), {}, false), std::move(interior));
   for (int round = 0; round < kJointRounds; ++round) {
