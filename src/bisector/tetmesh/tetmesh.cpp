@@ -42,6 +42,7 @@ constexpr double kGoalBeyond = 5;    // degrees: aiming a little higher raises t
 constexpr double kOptimising = 0.8;  // of the whole run, about
 // Cells that meet the boundary, over the sites that its edge lengths ask for, from which on the solid counts as thin.
 constexpr double kThin = 1.25;
+constexpr double kEnough = 0.97;     // of the sites asked for
 constexpr int kPushRounds = 8;
 // Heights over the boundary, in lengths of its edges, of sites inside that own none of it: a third layer's distance is 0.8.
 constexpr double kClear = 0.75;
@@ -312,7 +313,7 @@ void Pipeline::joint_phase() {
   // Of a free CVT 0.9 to 1.2 times as many meet the boundary as its edge lengths ask for, and all where the solid is two cells
   // thick; with no more than that, tetrahedra inside and on the boundary are alike, and something is left inside.
   const double room = boundary_vertices(backend_.surface(), sized_), met = static_cast<double>(on_boundary.size());
-  thin_ = met > kThin * room;
+  thin_ = thin_ || met > kThin * room;
   if (options_.seeds.empty() && met > room)
     on_boundary = thinned(on_boundary, std::max(kFewest, static_cast<std::size_t>(std::llround(room))));
   set_boundary(remesh_boundary(std::move(on_boundary), {}, false), std::move(interior));
@@ -455,9 +456,20 @@ TetResult Pipeline::run() {
   const TriangleMesh& surface = backend_.surface().mesh;
   result_.input_topology = analyse_topology(surface.triangles, surface.vertices.size());
   free_phase();
+  const std::vector<Vec3> free = state_.seeds;
   joint_phase();
   finish_boundary();
   inner_phase();
+  if (static_cast<double>(state_.seeds.size()) < kEnough * static_cast<double>(result_.wanted) && !thin_) {
+    // There is no room inside for what the boundary did not take.
+    thin_ = true;
+    state_.seeds = free;
+    state_.places.assign(free.size(), {Kind::interior});
+    step_.done -= kOptimising * (kJointShare + kInnerShare);
+    joint_phase();
+    finish_boundary();
+    inner_phase();
+  }
   extract();
   result_.boundary = std::move(surface_);
   result_.boundary.mesh = {};
