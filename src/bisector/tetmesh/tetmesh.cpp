@@ -206,7 +206,8 @@ class Pipeline {
   OptimiseTotals totals_;
   RemeshResult surface_;
   TetResult result_;
-  bool thin_ = false;  // the solid, beside the cells
+  bool thin_ = false;   // the solid, beside the cells
+  double surplus_ = 0;  // sites that the boundary takes beyond those that its edge lengths ask for
 };
 
 void Pipeline::run_steps(SolidBackend& backend, const std::string& phase, double share, bool constrained) {
@@ -282,7 +283,7 @@ void Pipeline::set_boundary(const RemeshResult& surface, std::vector<Vec3> inter
 bool Pipeline::promote() {
   const auto held = std::count_if(state_.places.begin(), state_.places.end(),
                                   [](const SeedPlace& place) { return place.kind != Kind::interior; });
-  double room = boundary_vertices(backend_.surface(), sized_) - static_cast<double>(held);
+  double room = boundary_vertices(backend_.surface(), sized_) + surplus_ - static_cast<double>(held);
   bool any = false;
   for (const Index i : pokers()) {
     if (room-- < 1 && !thin_) break;
@@ -312,7 +313,7 @@ void Pipeline::joint_phase() {
   result_.boundary_sites = on_boundary.size();
   // Of a free CVT 0.9 to 1.2 times as many meet the boundary as its edge lengths ask for, and all where the solid is two cells
   // thick; with no more than that, tetrahedra inside and on the boundary are alike, and something is left inside.
-  const double room = boundary_vertices(backend_.surface(), sized_), met = static_cast<double>(on_boundary.size());
+  const double room = boundary_vertices(backend_.surface(), sized_) + surplus_, met = static_cast<double>(on_boundary.size());
   thin_ = thin_ || met > kThin * room;
   if (options_.seeds.empty() && met > room)
     on_boundary = thinned(on_boundary, std::max(kFewest, static_cast<std::size_t>(std::llround(room))));
@@ -463,6 +464,7 @@ TetResult Pipeline::run() {
   if (static_cast<double>(state_.seeds.size()) < kEnough * static_cast<double>(result_.wanted) && !thin_) {
     // There is no room inside for what the boundary did not take.
     thin_ = true;
+    surplus_ = static_cast<double>(result_.wanted) - static_cast<double>(state_.seeds.size());
     state_.seeds = free;
     state_.places.assign(free.size(), {Kind::interior});
     step_.done -= kOptimising * (kJointShare + kInnerShare);
