@@ -147,6 +147,37 @@ void add_random_seed(CLI::App* app, std::uint64_t& random_seed) {
       ->type_name("N")->check(whole_number(0, UINT64_MAX))->group("Seeds");
 }
 
+void add_edge_length(CLI::App* app, double& length, double& relative) {
+  app->add_option("--edge-length", length,
+                  "mean edge length of the result, in the mesh's unit,\n"
+                  "instead of -n")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-length-relative", relative,
+                  "the same as a share of the bounding box's diagonal")
+      ->type_name("R")->check(number_above_zero())->group("Size");
+}
+
+void add_edge_bounds(CLI::App* app, SizingOptions& sizing) {
+  app->add_option("--edge-min", sizing.min_edge, "edges aimed at are no shorter, in the mesh's unit")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-max", sizing.max_edge, "and no longer")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+}
+
+void add_feature_file(CLI::App* app, std::string& path) {
+  add_file(app, "--feature-file", path, "FILE",
+           "also keep these edges: lines of two vertex numbers,\n"
+           "counted from 0 in the input")
+      ->group("Features");
+}
+
+void add_weld(CLI::App* app, double& tolerance) {
+  app->add_option("--weld", tolerance,
+                  "join borders that are no farther apart, in the mesh's\n"
+                  "unit; default: only what lies at the same point")
+      ->type_name("T")->check(number_below(1e100))->group("Features");
+}
+
 CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer) {
   CLI::App* app = program.add_subcommand(name, about);
   app->group("Commands")->footer(footer);
@@ -174,13 +205,7 @@ CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
            "-n is then not needed")
       ->group("Seeds");
   add_random_seed(app, command.options.random_seed);
-  app->add_option("--edge-length", command.options.edge_length,
-                  "mean edge length of the result, in the mesh's unit,\n"
-                  "instead of -n")
-      ->type_name("L")->check(number_above_zero())->group("Size");
-  app->add_option("--edge-length-relative", command.edge_length_relative,
-                  "the same as a share of the bounding box's diagonal")
-      ->type_name("R")->check(number_above_zero())->group("Size");
+  add_edge_length(app, command.options.edge_length, command.edge_length_relative);
   app->add_option("--density", command.density,
                   "where triangles are smaller: uniform (default),\n"
                   "lfs[:EXP] (local feature size to the power -EXP,\n"
@@ -192,28 +217,19 @@ CLI::App* add_remesh(CLI::App& program, RemeshCommand& command) {
                   "edge lengths change by at most so much per length;\n"
                   "0: no bound; default 0.2. Not for uniform density")
       ->type_name("G")->check(number_below(10))->group("Size");
-  app->add_option("--edge-min", command.options.sizing.min_edge, "edges aimed at are no shorter, in the mesh's unit")
-      ->type_name("L")->check(number_above_zero())->group("Size");
-  app->add_option("--edge-max", command.options.sizing.max_edge, "and no longer")
-      ->type_name("L")->check(number_above_zero())->group("Size");
+  add_edge_bounds(app, command.options.sizing);
   app->add_option("--features", command.features,
                   "sharp edges to keep: auto (default), none, or all with a\n"
                   "dihedral deviation of so many degrees. Borders and\n"
                   "non-manifold edges are always kept, edges between face\n"
                   "labels unless none")
       ->type_name("WORD")->check(parsed_by(parse_features))->group("Features");
-  add_file(app, "--feature-file", command.feature_file, "FILE",
-           "also keep these edges: lines of two vertex numbers,\n"
-           "counted from 0 in the input")
-      ->group("Features");
+  add_feature_file(app, command.feature_file);
   add_file(app, "--feature-output", command.feature_output, "FILE",
            "write the result's feature edges likewise; .ply and .obj\n"
            "outputs hold them too")
       ->group("Features");
-  app->add_option("--weld", command.weld,
-                  "join borders that are no farther apart, in the mesh's\n"
-                  "unit; default: only what lies at the same point")
-      ->type_name("T")->check(number_below(1e100))->group("Features");
+  add_weld(app, command.weld);
   app->add_option("--topology", command.topology,
                   "where the result's topology is not the input's:\n"
                   "enforce (mend it; default), check (warn) or off")
@@ -294,13 +310,7 @@ CLI::App* add_tet(CLI::App& program, TetCommand& command) {
            "solid; -n is then not needed")
       ->group("Seeds");
   add_random_seed(app, command.options.random_seed);
-  app->add_option("--edge-length", command.options.edge_length,
-                  "mean edge length of the result, in the mesh's unit,\n"
-                  "instead of -n")
-      ->type_name("L")->check(number_above_zero())->group("Size");
-  app->add_option("--edge-length-relative", command.edge_length_relative,
-                  "the same as a share of the bounding box's diagonal")
-      ->type_name("R")->check(number_above_zero())->group("Size");
+  add_edge_length(app, command.options.edge_length, command.edge_length_relative);
   app->add_option("--density", command.density,
                   "where tetrahedra are smaller: uniform (default),\n"
                   "lfs[:EXP] or curvature[:EXP] of the boundary, with the\n"
@@ -317,23 +327,14 @@ CLI::App* add_tet(CLI::App& program, TetCommand& command) {
                   "edge lengths grow by at most so much per length into\n"
                   "the solid; default 0.2. Not for uniform density")
       ->type_name("G")->check(number_below(10))->group("Size");
-  app->add_option("--edge-min", command.options.sizing.field.min_edge, "edges aimed at are no shorter, in the mesh's unit")
-      ->type_name("L")->check(number_above_zero())->group("Size");
-  app->add_option("--edge-max", command.options.sizing.field.max_edge, "and no longer")
-      ->type_name("L")->check(number_above_zero())->group("Size");
+  add_edge_bounds(app, command.options.sizing.field);
   app->add_option("--features", command.features,
                   "sharp edges to keep: auto (default), none, or all with a\n"
                   "dihedral deviation of so many degrees. Edges between face\n"
                   "labels are kept unless none")
       ->type_name("WORD")->check(parsed_by(parse_features))->group("Features");
-  add_file(app, "--feature-file", command.feature_file, "FILE",
-           "also keep these edges: lines of two vertex numbers,\n"
-           "counted from 0 in the input")
-      ->group("Features");
-  app->add_option("--weld", command.weld,
-                  "join borders that are no farther apart, in the mesh's\n"
-                  "unit; default: only what lies at the same point")
-      ->type_name("T")->check(number_below(1e100))->group("Features");
+  add_feature_file(app, command.feature_file);
+  add_weld(app, command.weld);
   app->add_option("--min-angle", command.options.min_angle,
                   "degrees that all angles of the boundary's triangles\n"
                   "should exceed; 0: as they are; default 40")
@@ -342,7 +343,7 @@ CLI::App* add_tet(CLI::App& program, TetCommand& command) {
                   "degrees that all dihedral angles should exceed; 0: keep\n"
                   "slivers; default 30")
       ->type_name("A")->check(number_below(55))->group("Optimisation");
-  app->add_option("--iterations", command.options.iterations, "at most so many; default 100")
+  app->add_option("--iterations", command.options.iterations, "steps, of which each phase may make a share; default 100")
       ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
   app->add_option("--tolerance", command.options.tolerance,
                   "end a phase when the energy falls by less than this\n"

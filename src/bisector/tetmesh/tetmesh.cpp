@@ -190,6 +190,7 @@ class Pipeline {
   std::vector<Vec3> interior_seeds() const;
   std::vector<Index> pokers() const;
   void push_inside();
+  void remove(const std::vector<char>& removed);
   void match_count();
   void run_steps(SolidBackend& backend, const std::string& phase, double share, bool constrained);
 
@@ -349,12 +350,23 @@ void Pipeline::finish_boundary() {
   for (std::size_t i = 0; i < surface_.mesh.vertices.size(); ++i) state_.places[i].kind = Kind::fixed;
 }
 
-// Removes sites inside that are nearest to the boundary's, or adds some where cells are large, to meet the count.
+void Pipeline::remove(const std::vector<char>& removed) {
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < state_.seeds.size(); ++i) {
+    if (removed[i]) continue;
+    state_.seeds[n] = state_.seeds[i];
+    state_.places[n++] = state_.places[i];
+  }
+  state_.seeds.resize(n);
+  state_.places.resize(n);
+}
+
+// Removes the most crowded sites inside, or adds some where cells are large, to meet the count.
 void Pipeline::match_count() {
   const std::size_t boundary = surface_.mesh.vertices.size(), wanted = result_.wanted;
   std::size_t surplus = state_.seeds.size() > wanted ? state_.seeds.size() - wanted : 0;
-  backend_.evaluate(state_.seeds, state_.moments);
   if (surplus > 0) {
+    backend_.evaluate(state_.seeds, state_.moments);
     // Crowded cells are those of least energy.
     std::vector<Index> order;
     for (auto i = static_cast<Index>(boundary); i < state_.seeds.size(); ++i) order.push_back(i);
@@ -364,14 +376,7 @@ void Pipeline::match_count() {
     });
     std::vector<char> removed(state_.seeds.size(), 0);
     for (std::size_t k = 0; k < surplus; ++k) removed[order[k]] = 1;
-    std::size_t n = 0;
-    for (std::size_t i = 0; i < state_.seeds.size(); ++i) {
-      if (removed[i]) continue;
-      state_.seeds[n] = state_.seeds[i];
-      state_.places[n++] = state_.places[i];
-    }
-    state_.seeds.resize(n);
-    state_.places.resize(n);
+    remove(removed);
   } else if (state_.seeds.size() < wanted) {
     RestrictedPolygons polygons;
     ClippedPolyhedra polyhedra;
@@ -394,14 +399,7 @@ void Pipeline::push_inside() {
     if (round == kPushRounds) {
       std::vector<char> removed(state_.seeds.size(), 0);
       for (Index i : near) removed[i] = 1;
-      std::size_t n = 0;
-      for (std::size_t i = 0; i < state_.seeds.size(); ++i) {
-        if (removed[i]) continue;
-        state_.seeds[n] = state_.seeds[i];
-        state_.places[n++] = state_.places[i];
-      }
-      state_.seeds.resize(n);
-      state_.places.resize(n);
+      remove(removed);
       backend_.evaluate(state_.seeds, state_.moments);
       return;
     }

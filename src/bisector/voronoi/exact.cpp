@@ -1,24 +1,14 @@
 #include "bisector/voronoi/exact.h"
 
-#include <CGAL/Mpzf.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "bisector/voronoi/exact_arithmetic.h"
 
 namespace bisector {
 namespace {
 
-using Exact = CGAL::Mpzf;
 using Row = std::array<Exact, 3>;
-
-int sign(const Exact& x) { return static_cast<int>(CGAL::sign(x)); }
-
-Exact difference_of_squares(const Vec3& q, const Vec3& x_i, const Vec3& x_j) {
-  Exact sum = 0;
-  for (int k = 0; k < 3; ++k)
-    sum = sum + (Exact(x_j[k]) - Exact(x_i[k])) * (Exact(x_j[k]) + Exact(x_i[k]) - Exact(2.0) * Exact(q[k]));
-  return sum;
-}
 
 Row row_of(const ExactFrame& frame, const ExactLine& line) {
   Row row{Exact(0), Exact(0), Exact(0)};

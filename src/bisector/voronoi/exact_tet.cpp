@@ -1,25 +1,15 @@
 #include "bisector/voronoi/exact_tet.h"
 
-#include <CGAL/Mpzf.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "bisector/voronoi/exact_arithmetic.h"
+
 namespace bisector {
 namespace {
 
-using Exact = CGAL::Mpzf;
 using Row = std::array<Exact, 4>;
-
-int sign(const Exact& x) { return static_cast<int>(CGAL::sign(x)); }
-
-Exact sum_of_squares_difference(const Vec3& q, const Vec3& x_i, const Vec3& x_j) {
-  Exact sum = 0;
-  for (int k = 0; k < 3; ++k)
-    sum = sum + (Exact(x_j[k]) - Exact(x_i[k])) * (Exact(x_j[k]) + Exact(x_i[k]) - Exact(2.0) * Exact(q[k]));
-  return sum;
-}
 
 // The generalised cross product: dot(d, cross(a, b, c)) = det(d, a, b, c).
 Row cross(const Row& a, const Row& b, const Row& c) {
@@ -49,7 +39,7 @@ struct Basis {
         row[3] = row[3] + d * d;
       }
     } else {
-      for (std::size_t m = 0; m < 4; ++m) row[m] = sum_of_squares_difference(frame.corners[m], frame.seed, plane.seed);
+      for (std::size_t m = 0; m < 4; ++m) row[m] = difference_of_squares(frame.corners[m], frame.seed, plane.seed);
     }
     return row;
   }
