@@ -136,7 +136,8 @@ Json timeless(Json report) {
 
 TEST_F(Cli, HelpAndVersion) {
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"--help"}, {"remesh", "--help"}, {"tet", "--help"}, {"rvd", "--help"}, {"quality", "-h"}, {"check", "--help"}, {"--version"}}) {
+           {"--help"}, {"remesh", "--help"}, {"tet", "--help"}, {"rvd", "--help"},
+           {"segment", "--help"}, {"quality", "-h"}, {"check", "--help"}, {"--version"}}) {
     const Result result = run(arguments);
     EXPECT_EQ(result.code, 0);
     EXPECT_NE(result.out.find(arguments.size() > 1 ? arguments[0] : "isector"), std::string::npos);
@@ -1222,6 +1223,173 @@ TEST_F(CliTet, InterruptLeavesNothing) {
   const Result result = finish(process);
   EXPECT_EQ(result.code, 130);
   EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.err, "bisector: cancelled\n");
+  EXPECT_EQ(files(), before);
+}
+
+class CliSegment : public Cli {
+ protected:
+  CliSegment() { write_mesh(in("box.ply"), test::box(4)); }
+
+  std::vector<std::string> segment(std::vector<std::string> more) const {
+    more.insert(more.begin(), {"segment", in("box.ply"), "-o", in("out.ply")});
+    return more;
+  }
+};
+
+TEST_F(CliSegment, FindsTheSidesOfABox) {
+  const Result result = run(segment({"--proxies", "6", "--report", in("r.json"), "--preview", in("out.png"), "--verbose"}));
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  EXPECT_NE(result.out.find("6 planes"), std::string::npos);
+  EXPECT_NE(result.out.find("out.ply"), std::string::npos);
+  EXPECT_EQ(files(), (std::set<std::string>{"sphere.off", "box.ply", "out.ply", "out.png", "r.json"}));
+
+  const TriangleMesh input = read_mesh(in("box.ply")), mesh = read_mesh(in("out.ply"));
+  EXPECT_EQ(mesh.vertices, input.vertices);
+  EXPECT_EQ(mesh.triangles, input.triangles);
+  ASSERT_EQ(mesh.labels.size(), 192u);
+  std::map<std::int32_t, Vec3> normals;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3 n = cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a]);
+    EXPECT_EQ(normals.try_emplace(mesh.labels[t], n).first->second, n) << "triangle " << t;
+  }
+  EXPECT_EQ(normals.size(), 6u);
+
+  const Json report = Json::parse(read_text(in("r.json")));
+  EXPECT_EQ(report["command"], "segment");
+  EXPECT_EQ(report["input"]["faces"], 192);
+  EXPECT_EQ(report["output"]["faces"], 192);
+  EXPECT_FALSE(report.contains("quality"));
+  for (const char* key : {"total", "start", "lloyd", "improve", "classify", "smooth", "project", "segment", "quality",
+                          "preview", "io"})
+    EXPECT_GE(report["seconds"].value(key, -1.0), 0) << key;
+  const Json& segmentation = report["segmentation"];
+  for (const char* key : {"iterations", "insertions", "merges", "teleportations", "deletions", "evaluations", "energies"})
+    EXPECT_TRUE(segmentation.contains(key)) << key;
+  EXPECT_NEAR(segmentation["border_before"].get<double>(), 12, 1e-12);
+  EXPECT_NEAR(segmentation["border_after"].get<double>(), 12, 1e-12);
+  for (const char* key : {"rms", "rms_percent", "rms_before"})
+    EXPECT_NEAR(segmentation[key].get<double>(), 0, 1e-9) << key;
+  ASSERT_EQ(segmentation["regions"].size(), 6u);
+  for (const Json& region : segmentation["regions"]) {
+    EXPECT_EQ(region["type"], "plane");
+    EXPECT_EQ(region["triangles"], 32);
+    EXPECT_NEAR(region["area"].get<double>(), 1, 1e-12);
+    EXPECT_NEAR(region["max"].get<double>(), 0, 1e-9);
+    const auto normal = region["normal"].get<std::vector<double>>();
+    EXPECT_NEAR(std::max({std::abs(normal[0]), std::abs(normal[1]), std::abs(normal[2])}), 1, 1e-9);
+    const double offset = std::abs(region["offset"].get<double>());
+    EXPECT_NEAR(std::min(offset, std::abs(1 - offset)), 0, 1e-9);
+    EXPECT_EQ(region["coefficients"].size(), 10u);
+    for (const char* key : {"radius", "axis", "angle", "axes"}) EXPECT_FALSE(region.contains(key)) << key;
+  }
+}
+
+TEST_F(CliSegment, EveryFormatHoldsTheSameRegions) {
+  TriangleMesh box = test::box(4);
+  box.feature_edges = {{box.triangles[0][0], box.triangles[0][1]}};
+  if (box.feature_edges[0][0] > box.feature_edges[0][1]) std::swap(box.feature_edges[0][0], box.feature_edges[0][1]);
+  write_mesh(in("box.ply"), box);
+  for (const char* name : {"out.ply", "out.obj"})
+    ASSERT_EQ(run({"segment", in("box.ply"), "-o", in(name), "--proxies", "6", "--quiet"}).code, 0);
+  const TriangleMesh ply = read_mesh(in("out.ply")), obj = read_mesh(in("out.obj"));
+  EXPECT_EQ(obj.labels, ply.labels);
+  EXPECT_EQ(obj.triangles, ply.triangles);
+  EXPECT_EQ(obj.feature_edges, box.feature_edges);
+  EXPECT_EQ(ply.feature_edges, box.feature_edges);
+  EXPECT_NE(read_text(in("out.obj")).find("g region_3_plane\n"), std::string::npos);
+  EXPECT_NE(read_text(in("out.ply")).find("property uchar red\n"), std::string::npos);
+  for (const char* name : {"out.off", "out.stl"}) {
+    const Result result = run({"segment", in("box.ply"), "-o", in(name), "--proxies", "6", "--quiet"});
+    EXPECT_EQ(result.code, 0);
+    const Result loud = run({"segment", in("box.ply"), "-o", in(name), "--proxies", "6"});
+    EXPECT_NE(loud.err.find("warning"), std::string::npos);
+    EXPECT_EQ(std::count(loud.err.begin(), loud.err.end(), '\n'), 1);
+  }
+}
+
+TEST_F(CliSegment, ProjectsOntoTheSurfaces) {
+  TriangleMesh ball = test::icosphere(3);
+  test::SplitMix64 random(1);
+  for (Vec3& v : ball.vertices) v *= random.range(0.999, 1.001);
+  write_mesh(in("ball.ply"), ball);
+  const Json report = report_of({"segment", in("ball.ply"), "-o", in("out.ply"), "--proxies", "1", "--project",
+                                 "--report", "-", "--quiet"});
+  const Json& region = report["segmentation"]["regions"][0];
+  ASSERT_EQ(region["type"], "sphere");
+  EXPECT_NEAR(region["radius"].get<double>(), 1, 1e-3);
+  const double radius = region["radius"].get<double>();
+  const auto centre = region["centre"].get<std::vector<double>>();
+  for (const Vec3& v : read_mesh(in("out.ply")).vertices)
+    EXPECT_NEAR(norm(v - Vec3{centre[0], centre[1], centre[2]}), radius, 1e-9);
+  EXPECT_GT(report["quality"]["distance_rms"].get<double>(), 0);
+  EXPECT_LT(report["quality"]["distance_max"].get<double>(), 0.1);
+}
+
+TEST_F(CliSegment, PolygonsAreDivided) {
+  write_text("cube.off",
+             "OFF\n8 6 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
+             "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  const Json report = report_of({"segment", in("cube.off"), "-o", in("out.ply"), "--proxies", "6", "--report", "-"});
+  EXPECT_EQ(report["input"]["faces"], 6);
+  EXPECT_EQ(report["output"]["faces"], 12);
+  const std::vector<std::int32_t> labels = read_mesh(in("out.ply")).labels;
+  EXPECT_EQ(std::set(labels.begin(), labels.end()).size(), 6u);
+}
+
+TEST_F(CliSegment, OutputDoesNotDependOnThreads) {
+  std::vector<std::string> files;
+  std::vector<Json> reports;
+  for (const char* threads : {"1", "2"}) {
+    reports.push_back(timeless(report_of({"segment", in("sphere.off"), "-o", in("out.ply"), "--proxies", "5", "--surfaces",
+                                          "quadrics", "--start", "insertion", "--threads", threads, "--report", "-",
+                                          "--preview", in("out.png"), "--project"})));
+    files.push_back(read_text(in("out.ply")) + read_text(in("out.png")));
+  }
+  EXPECT_EQ(reports[0], reports[1]);
+  EXPECT_TRUE(files[0] == files[1]);
+}
+
+TEST_F(CliSegment, BadUsage) {
+  for (const char* n : {"0", "-1", "x", "1.5", ""}) expect_failure(2, segment({"--proxies", n}), "--proxies");
+  for (const char* e : {"0", "-1", "nan", "inf", "x", ""}) expect_failure(2, segment({"--error", e}), "--error");
+  for (const char* option : {"--surfaces", "--start", "--iterations", "--smooth", "--fuzzy-rings", "--threads"})
+    for (const char* value : {"nonsense", "-1", "nan", ""}) expect_failure(2, segment({option, value}), option);
+  expect_failure(2, segment({"--fuzzy-rings", "0"}), "--fuzzy-rings");
+  expect_failure(2, segment({"--proxies", "6", "--error", "1"}), "--error");
+  expect_failure(2, segment({"--random-seed", "3"}), "--random-seed");
+  expect_failure(2, segment({"--random-seed", "-3", "--start", "insertion"}), "--random-seed");
+  expect_failure(2, segment({"--smooth", "0", "--fuzzy-rings", "2"}), "--fuzzy-rings");
+  expect_failure(2, {"segment", in("box.ply")}, "-o");
+  expect_failure(2, {"segment"}, "IN");
+}
+
+TEST_F(CliSegment, BadInputIsOneLine) {
+  write_text("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
+  write_mesh(in("two.off"), test::two_spheres());
+  expect_failure(1, segment({"--proxies", "193"}), "192 triangles");
+  expect_failure(1, {"segment", in("two.off"), "-o", in("out.ply"), "--proxies", "1"}, "2 components");
+  expect_failure(1, {"segment", in("flat.off"), "-o", in("out.ply"), "--quiet"}, "area");
+  expect_failure(1, {"segment", in("missing.off"), "-o", in("out.ply")}, "missing.off");
+  expect_failure(1, {"segment", in("box.ply"), "-o", in("out.msh")}, "format");
+  expect_failure(1, segment({"--preview", in("out.jpg")}), "format");
+  expect_failure(1, segment({"--report", in("out.ply")}), "two outputs");
+}
+
+TEST_F(CliSegment, InterruptLeavesNothing) {
+  write_mesh(in("large.ply"), test::icosphere(6));
+  const std::set<std::string> before = files();
+  const pid_t process = start({"segment", in("large.ply"), "-o", in("out.ply"), "--proxies", "500", "--start",
+                               "insertion", "--report", in("r.json")});
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (!catches_interrupts(process) && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // into the loop
+  kill(process, SIGINT);
+  const Result result = finish(process);
+  EXPECT_EQ(result.code, 130);
   EXPECT_EQ(result.err, "bisector: cancelled\n");
   EXPECT_EQ(files(), before);
 }

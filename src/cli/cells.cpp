@@ -27,23 +27,24 @@ std::vector<std::array<Index, 2>> adjacent_cells(const RestrictedPolygons& polyg
   return edges;
 }
 
-// Greedy in the order of seeds: a random colour of those that no neighbour has yet.
-std::vector<unsigned char> colour_cells(const RestrictedPolygons& polygons, std::size_t seeds) {
-  std::vector<unsigned char> colour(seeds);
-  const auto edges = adjacent_cells(polygons);
-  std::size_t k = 0;
-  for (Index cell = 0; cell < seeds; ++cell) {
-    unsigned free = (1u << kPalette.size()) - 1;
-    for (; k < edges.size() && edges[k][0] == cell; ++k) free &= ~(1u << colour[edges[k][1]]);
-    if (free == 0) free = (1u << kPalette.size()) - 1;
-    auto skip = Random(0, cell).bits() % static_cast<unsigned>(std::popcount(free));
-    for (; skip > 0; --skip) free &= free - 1;
-    colour[cell] = static_cast<unsigned char>(std::countr_zero(free));
-  }
-  return colour;
-}
-
 }  // namespace
+
+// Greedy in ascending order: a random colour of those that no neighbour has yet.
+std::vector<Colour> contrasting_colours(const std::vector<std::array<Index, 2>>& neighbours, std::size_t count) {
+  std::vector<unsigned char> chosen(count);
+  std::vector<Colour> colours(count);
+  std::size_t k = 0;
+  for (Index i = 0; i < count; ++i) {
+    unsigned free = (1u << kPalette.size()) - 1;
+    for (; k < neighbours.size() && neighbours[k][0] == i; ++k) free &= ~(1u << chosen[neighbours[k][1]]);
+    if (free == 0) free = (1u << kPalette.size()) - 1;
+    auto skip = Random(0, i).bits() % static_cast<unsigned>(std::popcount(free));
+    for (; skip > 0; --skip) free &= free - 1;
+    chosen[i] = static_cast<unsigned char>(std::countr_zero(free));
+    colours[i] = kPalette[chosen[i]];
+  }
+  return colours;
+}
 
 PolygonMesh coloured_cells(const RestrictedPolygons& polygons, std::size_t seeds) {
   PolygonMesh mesh;
@@ -51,10 +52,10 @@ PolygonMesh coloured_cells(const RestrictedPolygons& polygons, std::size_t seeds
   mesh.polygons.offsets = polygons.offsets;
   mesh.polygons.values.resize(polygons.vertices.size());
   std::iota(mesh.polygons.values.begin(), mesh.polygons.values.end(), Index{0});
-  const std::vector<unsigned char> colour = colour_cells(polygons, seeds);
+  const std::vector<Colour> colours = contrasting_colours(adjacent_cells(polygons), seeds);
   for (const RestrictedPolygons::Pair& pair : polygons.pairs) {
     mesh.labels.push_back(pair.cell);
-    mesh.colours.push_back(kPalette[colour[pair.cell]]);
+    mesh.colours.push_back(colours[pair.cell]);
   }
   return mesh;
 }

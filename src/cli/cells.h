@@ -1,15 +1,21 @@
-// Restricted Voronoi cells as coloured polygons.
+// Colours for patches of a surface, and restricted Voronoi cells as coloured polygons.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <vector>
 
 #include "bisector/mesh/io.h"
 #include "bisector/voronoi/restricted.h"
 
 namespace bisector::cli {
 
-// One polygon per pair of cell and triangle, labelled by its seed. Cells that share an edge of the diagram differ in
-// colour, up to eleven neighbours of lower index.
+// A colour for each of `count` patches, given those that meet: pairs, the higher first, ascending. Neighbours differ, up
+// to eleven neighbours of lower index.
+std::vector<std::array<unsigned char, 3>> contrasting_colours(const std::vector<std::array<Index, 2>>& neighbours,
+                                                              std::size_t count);
+
+// One polygon per pair of cell and triangle, labelled by its seed, in contrasting colours.
 PolygonMesh coloured_cells(const RestrictedPolygons& polygons, std::size_t seeds);
 
 }  // namespace bisector::cli

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bisector/remesh/remesh.h"
+#include "bisector/segment/segment.h"
 #include "bisector/tetmesh/tetmesh.h"
 
 namespace bisector::cli {
@@ -64,6 +65,13 @@ struct TetCommand {
   CommonOptions common;
 };
 
+struct SegmentCommand {
+  std::string input, output, preview;
+  std::string surfaces = "all", start = "merging";
+  SegmentOptions options;
+  CommonOptions common;
+};
+
 struct QualityCommand {
   std::string mesh, reference;
   CommonOptions common;
@@ -82,6 +90,7 @@ struct CheckCommand {
 void run(const RemeshCommand& command);
 void run(const RvdCommand& command);
 void run(const TetCommand& command);
+void run(const SegmentCommand& command);
 void run(const QualityCommand& command);
 void run(const DevicesCommand& command);
 void run(const CheckCommand& command);

@@ -356,6 +356,57 @@ CLI::App* add_tet(CLI::App& program, TetCommand& command) {
   return app;
 }
 
+CLI::App* add_segment(CLI::App& program, SegmentCommand& command) {
+  CLI::App* app = add_command(
+      program, "segment", "Divide a surface into planes, quadrics and tori.",
+      "bisector segment IN -o OUT [--proxies N|--error E] [options]",
+      "Examples:\n"
+      "  bisector segment part.stl -o regions.ply --proxies 22 --preview regions.png\n"
+      "  bisector segment part.stl -o regions.obj --error 0.05 --report regions.json\n"
+      "  bisector segment bunny.off -o regions.ply --proxies 28 --smooth 5 --fuzzy-rings 2\n\n"
+      ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C stops the run; nothing is\n"
+      "written.");
+  bisector::SegmentOptions& options = command.options;
+  add_file(app, "IN", command.input, "FILE", "surface: .off, .obj, .ply or .stl")->required();
+  add_file(app, "-o", command.output, "FILE", "mesh to write, with the region of each triangle")
+      ->required()->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the regions")->group("Output");
+  app->add_flag("--project", options.project, "move the vertices onto the surfaces found")->group("Output");
+  app->add_option("--proxies", options.proxies, "so many regions")
+      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Regions");
+  app->add_option("--error", options.error,
+                  "as few regions as keep the root mean square distance to\n"
+                  "their surfaces below E percent of the bounding box's\n"
+                  "diagonal; default 0.1")
+      ->type_name("E")->check(number_above_zero())->group("Regions");
+  app->add_option("--surfaces", command.surfaces,
+                  "what a region may be: planes, quadrics (planes too), or\n"
+                  "all (tori too; default)")
+      ->type_name("WORD")->check(one_of({"planes", "quadrics", "all"}))->group("Regions");
+  app->add_option("--start", command.start,
+                  "merging (of small pieces, the cheapest first; default) or\n"
+                  "insertion (of regions at random triangles and where the\n"
+                  "error is largest)")
+      ->type_name("WORD")->check(one_of({"merging", "insertion", "random"}))->group("Regions");
+  app->add_option("--random-seed", options.random_seed, "another number, another random start; default 1")
+      ->type_name("N")->check(whole_number(0, UINT64_MAX))->group("Regions");
+  app->add_option("--iterations", options.iterations, "Lloyd steps at most, each time; default 30")
+      ->type_name("N")->check(whole_number(0, 100'000))->group("Regions");
+  app->add_option("--smooth", options.smooth,
+                  "weight of the borders' length against distances; 0:\n"
+                  "borders are left as they are; default 1, up to 10 for\n"
+                  "free forms")
+      ->type_name("LAMBDA")->check(number_below(1e6))->group("Borders");
+  app->add_option("--fuzzy-rings", options.fuzzy_rings,
+                  "triangles up to so many steps from a border may change\n"
+                  "sides; default 1, 2 or 3 for free forms")
+      ->type_name("K")->check(whole_number(1, 1000))->group("Borders");
+  add_common_options(app, command.common,
+                     "write a JSON report with type, parameters and error of\n"
+                     "each region; - for stdout");
+  return app;
+}
+
 CLI::App* add_quality(CLI::App& program, QualityCommand& command) {
   CLI::App* app = add_command(
       program, "quality", "Measure angles, topology and distance to another mesh.",
@@ -456,6 +507,15 @@ void check_usage(const RvdCommand& command, const CLI::App& app) {
     throw CLI::ValidationError("--random-seed: seeds from a file are not random; leave one of the two out");
 }
 
+void check_usage(const SegmentCommand& command, const CLI::App& app) {
+  if (app.count("--proxies") && app.count("--error"))
+    throw CLI::ValidationError("--proxies and --error: give one of them");
+  if (command.start != "random" && app.count("--random-seed"))
+    throw CLI::ValidationError("--random-seed: only --start random is; add that or leave it out");
+  if (command.options.smooth == 0 && app.count("--fuzzy-rings"))
+    throw CLI::ValidationError("--fuzzy-rings: borders are not smoothed with --smooth 0; leave one of the two out");
+}
+
 int fail_usage(const std::string& message, const CLI::App* command) {
   const std::string help = command ? "bisector " + command->get_name() + " --help" : "bisector --help";
   print_error(message + "; see " + help);
@@ -490,6 +550,7 @@ int main(int argc, char** argv) {
       "Start with:\n"
       "  bisector remesh IN.off -o OUT.obj -n 10000     remesh with 10,000 vertices\n"
       "  bisector tet IN.off -o OUT.msh -n 10000        fill it with tetrahedra\n"
+      "  bisector segment IN.off -o OUT.ply             find its planes, cylinders, ...\n"
       "  bisector quality OUT.obj --reference IN.off    see how good the result is\n"
       "  bisector remesh --help                         all options of a command\n\n"
       "Exit codes: 0 success, 1 bad input or a failed run, 2 bad usage, 130 cancelled. If not 0, nothing is written.");
@@ -500,12 +561,14 @@ int main(int argc, char** argv) {
   RemeshCommand remesh;
   RvdCommand rvd;
   TetCommand tet;
+  SegmentCommand segment;
   QualityCommand quality;
   DevicesCommand devices;
   CheckCommand check;
   CLI::App* const remesh_app = add_remesh(program, remesh);
   CLI::App* const rvd_app = add_rvd(program, rvd);
   CLI::App* const tet_app = add_tet(program, tet);
+  CLI::App* const segment_app = add_segment(program, segment);
   CLI::App* const quality_app = add_quality(program, quality);
   CLI::App* const devices_app = add_devices(program, devices);
   CLI::App* const check_app = add_check(program, check);
@@ -519,6 +582,7 @@ int main(int argc, char** argv) {
     if (remesh_app->parsed()) check_usage(remesh, *remesh_app);
     if (rvd_app->parsed()) check_usage(rvd, *rvd_app);
     if (tet_app->parsed()) check_usage(tet, *tet_app);
+    if (segment_app->parsed()) check_usage(segment, *segment_app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);
     return fail_usage(error.what(), chosen());
@@ -533,6 +597,7 @@ int main(int argc, char** argv) {
     if (remesh_app->parsed()) run(remesh);
     if (rvd_app->parsed()) run(rvd);
     if (tet_app->parsed()) run(tet);
+    if (segment_app->parsed()) run(segment);
     if (quality_app->parsed()) run(quality);
     if (devices_app->parsed()) run(devices);
     if (check_app->parsed()) run(check);

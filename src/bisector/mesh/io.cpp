@@ -244,19 +244,22 @@ TriangleMesh read_mesh(const std::string& path, const Context& context) {
   return to_triangles(path, read(path, bytes), context);
 }
 
-void write_mesh(const std::string& path, const TriangleMesh& mesh) {
+void write_mesh(const std::string& path, const TriangleMesh& mesh, const std::vector<std::string>& label_names) {
   const std::string extension = lower_extension(path);
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
     check_face(path, i, mesh.triangles[i].data(), mesh.triangles[i].data() + 3, mesh.vertices.size());
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.triangles.size())
     fail(path, fmt::format("{} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
+  for (const std::int32_t label : mesh.labels)
+    if (!label_names.empty() && (label < 0 || static_cast<std::size_t>(label) >= label_names.size()))
+      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, label_names.size()));
   for (const Edge& e : mesh.feature_edges)
     if (std::max(e[0], e[1]) >= mesh.vertices.size())
       fail(path, fmt::format("feature edge {} {} is out of range, the mesh has {} vertices; nothing was written", e[0],
                              e[1], mesh.vertices.size()));
   if (extension == ".off") write_file(path, format_off(mesh));
-  else if (extension == ".obj") write_file(path, format_obj(mesh));
+  else if (extension == ".obj") write_file(path, format_obj(mesh, label_names));
   else if (extension == ".ply") write_file(path, format_ply(mesh));
   else if (extension == ".stl") write_file(path, format_stl(path, mesh));
   else fail_extension(path, extension);

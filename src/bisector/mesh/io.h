@@ -25,10 +25,11 @@ TriangleMesh read_mesh(const std::string& path, const Context& context = {});
 
 // Writes a mesh by extension, with as many of 17 significant digits as it takes to read back the same bits (STL is
 // binary and float, as the format demands; PLY binary and double). Labels become the face property `int label` in PLY
-// and groups `label_K` in OBJ, feature edges the element `edge` in PLY and lines `l` in OBJ; OFF and STL hold neither.
-// The file appears under its name only when complete. Throws Error, also for coordinates that are not finite or beyond
-// the format's range, indices out of range and labels that are not one per triangle.
-void write_mesh(const std::string& path, const TriangleMesh& mesh);
+// and groups `label_K` in OBJ, or `region_K_NAME` where names of the labels 0, 1, ... are given; feature edges the
+// element `edge` in PLY and lines `l` in OBJ; OFF and STL hold neither. The file appears under its name only when
+// complete. Throws Error, also for coordinates that are not finite or beyond the format's range, indices out of range,
+// labels that are not one per triangle and labels without a name among those given.
+void write_mesh(const std::string& path, const TriangleMesh& mesh, const std::vector<std::string>& label_names = {});
 
 // A coloured polygon mesh as binary PLY (double coordinates; one colour and one integer label per face).
 struct PolygonMesh {
@@ -36,6 +37,7 @@ struct PolygonMesh {
   Csr<Index> polygons;
   std::vector<Index> labels;                       // one per polygon, or empty; property "label"
   std::vector<std::array<unsigned char, 3>> colours;  // one per polygon, or empty: red, green, blue
+  std::vector<std::array<Index, 2>> feature_edges = {};  // element "edge", or empty
 };
 void write_polygons(const std::string& path, const PolygonMesh& mesh);
 

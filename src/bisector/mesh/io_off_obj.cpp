@@ -37,14 +37,16 @@ Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t verti
   return static_cast<Index>(index);
 }
 
-constexpr std::string_view kLabelPrefix = "label_";
+constexpr std::string_view kLabelPrefix = "label_", kNamedPrefix = "region_";
 
 // The label that a group's name tells, if format_obj may have written it.
 bool parse_label(std::string_view name, std::int32_t& label) {
-  if (!name.starts_with(kLabelPrefix)) return false;
+  const bool named = name.starts_with(kNamedPrefix);
+  if (!named && !name.starts_with(kLabelPrefix)) return false;
+  name.remove_prefix((named ? kNamedPrefix : kLabelPrefix).size());
   const char* end = name.data() + name.size();
-  const auto [stop, error] = std::from_chars(name.data() + kLabelPrefix.size(), end, label);
-  return error == std::errc{} && stop == end;
+  const auto [stop, error] = std::from_chars(name.data(), end, label);
+  return error == std::errc{} && (named ? stop != end && *stop == '_' : stop == end);
 }
 
 // The labels of an OBJ file's faces: one for each pair of group and material.
@@ -63,7 +65,7 @@ class ObjGroups {
     const bool all_named = std::all_of(numbers_.begin(), numbers_.end(), [&](const auto& entry) {
       return entry.first.second.empty() && parse_label(entry.first.first, named[static_cast<Index>(entry.second)]);
     });
-    if (all_named) {
+    if (all_named && all_different(named)) {
       for (std::int32_t& label : labels_) label = named[static_cast<Index>(label)];
       return std::move(labels_);
     }
@@ -71,6 +73,10 @@ class ObjGroups {
   }
 
  private:
+  static bool all_different(std::vector<std::int32_t> labels) {
+    std::sort(labels.begin(), labels.end());
+    return std::adjacent_find(labels.begin(), labels.end()) == labels.end();
+  }
   void set(std::string& name, TextReader& in) {
     name.clear();
     for (std::string_view word = in.word(); !word.empty(); word = in.word()) {
@@ -180,15 +186,18 @@ std::string format_off(const TriangleMesh& mesh) {
   return out;
 }
 
-std::string format_obj(const TriangleMesh& mesh) {
+std::string format_obj(const TriangleMesh& mesh, const std::vector<std::string>& label_names) {
   std::string out;
   for (const Vec3& p : mesh.vertices) {
     out += "v ";
     append_point(out, p);
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1]))
-      out += fmt::format("g {}{}\n", kLabelPrefix, mesh.labels[i]);
+    if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1])) {
+      const std::int32_t label = mesh.labels[i];
+      if (label_names.empty()) out += fmt::format("g {}{}\n", kLabelPrefix, label);
+      else out += fmt::format("g {}{}_{}\n", kNamedPrefix, label, label_names[static_cast<std::size_t>(label)]);
+    }
     out += 'f';
     for (const Index v : mesh.triangles[i]) {
       out += ' ';

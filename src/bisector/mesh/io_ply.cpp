@@ -380,6 +380,17 @@ void append_ply_vertices(std::string& out, const std::vector<Vec3>& vertices) {
     for (int k = 0; k < 3; ++k) append_bytes(out, p[k]);
 }
 
+std::string ply_edge_header(const std::vector<std::array<Index, 2>>& edges, std::size_t vertices) {
+  if (edges.empty()) return {};
+  const char* type = vertices >> 31 ? "uint" : "int";
+  return fmt::format("element edge {}\nproperty {} vertex1\nproperty {} vertex2\n", edges.size(), type, type);
+}
+
+void append_ply_edges(std::string& out, const std::vector<std::array<Index, 2>>& edges) {
+  for (const std::array<Index, 2>& e : edges)
+    for (const Index v : e) append_bytes(out, v);
+}
+
 }  // namespace
 
 Soup read_ply(const std::string& path, std::string_view bytes) {
@@ -423,12 +434,7 @@ std::vector<double> read_ply_attribute(const std::string& path, std::string_view
 std::string format_ply(const TriangleMesh& mesh) {
   std::string out = ply_header(mesh.vertices.size(), mesh.triangles.size(), 3);
   if (!mesh.labels.empty()) out += "property int label\n";
-  if (!mesh.feature_edges.empty()) {
-    const char* type = mesh.vertices.size() >> 31 ? "uint" : "int";
-    out += fmt::format("element edge {}\nproperty {} vertex1\nproperty {} vertex2\n", mesh.feature_edges.size(), type,
-                       type);
-  }
-  out += "end_header\n";
+  out += ply_edge_header(mesh.feature_edges, mesh.vertices.size()) + "end_header\n";
   out.reserve(out.size() + 24 * mesh.vertices.size() + 17 * mesh.triangles.size() + 8 * mesh.feature_edges.size());
   append_ply_vertices(out, mesh.vertices);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -436,8 +442,7 @@ std::string format_ply(const TriangleMesh& mesh) {
     for (const Index v : mesh.triangles[i]) append_bytes(out, v);
     if (!mesh.labels.empty()) append_bytes(out, mesh.labels[i]);
   }
-  for (const std::array<Index, 2>& e : mesh.feature_edges)
-    for (const Index v : e) append_bytes(out, v);
+  append_ply_edges(out, mesh.feature_edges);
   return out;
 }
 
@@ -448,7 +453,7 @@ std::string format_ply(const PolygonMesh& mesh) {
   std::string out = ply_header(mesh.vertices.size(), faces, largest_degree);
   if (!mesh.labels.empty()) out += "property uint label\n";
   if (!mesh.colours.empty()) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  out += "end_header\n";
+  out += ply_edge_header(mesh.feature_edges, mesh.vertices.size()) + "end_header\n";
   append_ply_vertices(out, mesh.vertices);
   for (std::size_t i = 0; i < faces; ++i) {
     if (largest_degree > 255) append_bytes(out, static_cast<std::uint32_t>(mesh.polygons.size(i)));
@@ -458,6 +463,7 @@ std::string format_ply(const PolygonMesh& mesh) {
     if (!mesh.colours.empty())
       for (const unsigned char channel : mesh.colours[i]) append_bytes(out, channel);
   }
+  append_ply_edges(out, mesh.feature_edges);
   return out;
 }
 

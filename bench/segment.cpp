@@ -1,0 +1,236 @@
+// Segmentations of surfaces: seconds, errors, their spread over random starts, and CGAL's planar regions beside them.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "bisector/core/error.h"
+#include "bisector/core/parallel.h"
+#include "bisector/core/random.h"
+#include "bisector/mesh/distance.h"
+#include "bisector/mesh/io.h"
+#include "bisector/segment/proxy.h"
+#include "bisector/segment/quadric_fit.h"
+#include "bisector/segment/segment.h"
+#include "bisector/segment/segment_domain.h"
+#include "common.h"
+#include "vsa.h"
+
+namespace {
+
+using namespace bisector;
+using namespace bisector::bench;
+
+struct Options {
+  std::vector<std::string> models;
+  std::vector<std::size_t> proxies{22};
+  std::string surfaces = "all", start = "merging", csv, json;
+  SegmentOptions segment;
+  std::size_t repeat = 3, spread = 0, peer_iterations = 100;
+  unsigned threads = 1;
+  bool peers = false;
+};
+
+std::string percent(double length, double diagonal) { return fmt::format("{:.5f}", 100 * length / diagonal); }
+
+double diagonal_of(const TriangleMesh& mesh) { return bounding_box(mesh.vertices).diagonal(); }
+
+// Root mean square distance of the regions to their best planes, integrated exactly.
+double planar_rms(const TriangleMesh& mesh, const std::vector<Index>& labels) {
+  std::map<Index, SurfaceMoments> regions;
+  const Vec3 origin = mesh.vertices[mesh.triangles[0][0]];
+  for (std::size_t t = 0; t < labels.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const SurfaceMoments moments = triangle_moments(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], origin);
+    const auto [at, is_new] = regions.try_emplace(labels[t], moments);
+    if (!is_new) at->second = merged(at->second, moments);
+  }
+  double sum = 0, area = 0;
+  for (const auto& [label, moments] : regions) {
+    sum += fit_plane(moments).squared_distance;
+    area += moments.area();
+  }
+  return std::sqrt(std::max(0.0, sum / area));
+}
+
+// Seconds that one evaluation of a triangle's distance to a quadric takes.
+double evaluation_seconds(const TriangleMesh& mesh) {
+  const SegmentDomain domain = make_segment_domain(mesh);
+  Quadric quadric;
+  quadric.c = {-0.1, 0.3, -0.2, 0.5, 1, 0.1, 0.2, 0.8, -0.1, 0.6};
+  const Proxy proxy = Proxy::of(quadric);
+  const std::size_t n = mesh.triangles.size(), rounds = 1 + 2'000'000 / n;
+  double sum = 0;
+  const Stopwatch watch;
+  for (std::size_t round = 0; round < rounds; ++round)
+    for (Index t = 0; t < n; ++t) sum += distance_to(domain, t, proxy);
+  const double seconds = watch.seconds();
+  if (!(sum >= 0)) throw Error("the sum of distances is not a number");
+  return seconds / static_cast<double>(rounds * n);
+}
+
+// The same mesh to a segmentation: triangles in another order, corners turned, rigidly moved.
+TriangleMesh shuffled(const TriangleMesh& mesh, std::uint64_t seed) {
+  Random random(seed);
+  TriangleMesh result = mesh;
+  const double angle = 2 * std::numbers::pi * random.uniform();
+  Vec3 axis{random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5};
+  axis *= 1 / norm(axis);
+  const Vec3 shift = diagonal_of(mesh) * Vec3{random.uniform(), random.uniform(), random.uniform()};
+  for (Vec3& p : result.vertices)
+    p = std::cos(angle) * p + std::sin(angle) * cross(axis, p) + (1 - std::cos(angle)) * dot(axis, p) * axis + shift;
+  for (std::size_t i = result.triangles.size(); i > 1; --i)
+    std::swap(result.triangles[i - 1], result.triangles[static_cast<std::size_t>(random.uniform() * static_cast<double>(i))]);
+  for (Triangle& t : result.triangles)
+    std::rotate(t.begin(), t.begin() + static_cast<int>(3 * random.uniform()), t.end());
+  result.face_of_triangle.clear();
+  result.labels.clear();
+  result.feature_edges.clear();
+  return result;
+}
+
+SegmentOptions options_of(const Options& options, std::size_t proxies) {
+  SegmentOptions segment = options.segment;
+  segment.proxies = proxies;
+  segment.surfaces = options.surfaces == "planes"     ? SegmentSurfaces::planes
+                     : options.surfaces == "quadrics" ? SegmentSurfaces::quadrics
+                                                      : SegmentSurfaces::all;
+  segment.start = options.start == "insertion" ? SegmentStart::insertion
+                  : options.start == "random"  ? SegmentStart::random
+                                               : SegmentStart::merging;
+  return segment;
+}
+
+void add_run(Table& table, const Options& options, const std::string& name, const TriangleMesh& mesh,
+             std::size_t proxies) {
+  SegmentOptions wanted = options_of(options, proxies);
+  wanted.project = true;
+  std::vector<double> totals;
+  SegmentResult result;
+  for (std::size_t r = 0; r < options.repeat; ++r) {
+    result = segment(mesh, wanted);
+    totals.push_back(result.seconds.total);
+  }
+  const double diagonal = diagonal_of(mesh), total = median(totals);
+  TriangleMesh projected{result.projected, mesh.triangles};
+  const double share = evaluation_seconds(mesh) * static_cast<double>(result.evaluations) / total;
+  const SegmentSeconds& s = result.seconds;
+  table.rows.push_back({name, std::to_string(mesh.triangles.size()), options.surfaces, options.start,
+                        std::to_string(result.regions.size()), fmt::format("{:.2f}", total),
+                        fmt::format("{:.2f}", s.start), fmt::format("{:.2f}", s.lloyd + s.improve),
+                        fmt::format("{:.3f}", s.smooth + s.classify + s.project), percent(result.rms_before, diagonal),
+                        percent(result.rms, diagonal), fmt::format("{:.4f}", measure_distance(projected, mesh).rms),
+                        options.surfaces == "planes" ? percent(planar_rms(mesh, result.labels), diagonal) : "",
+                        fmt::format("{:.2f}", result.border_after / result.border_before),
+                        std::to_string(result.iterations), fmt::format("{:.2f}", share)});
+}
+
+void add_peers(Table& table, const Options& options, const std::string& name, const TriangleMesh& mesh,
+               std::size_t proxies) {
+  for (const bool l21 : {false, true}) {
+    std::vector<double> totals;
+    std::vector<Index> labels;
+    for (std::size_t r = 0; r < options.repeat; ++r) {
+      const Stopwatch watch;
+      labels = cgal_regions(mesh, proxies, options.peer_iterations, l21);
+      totals.push_back(watch.seconds());
+    }
+    std::vector<std::string> row(table.columns.size());
+    row[0] = name;
+    row[1] = std::to_string(mesh.triangles.size());
+    row[2] = "planes";
+    row[3] = l21 ? "CGAL L2,1" : "CGAL L2";
+    row[4] = std::to_string(1 + *std::max_element(labels.begin(), labels.end()));
+    row[5] = fmt::format("{:.2f}", median(totals));
+    row[12] = percent(planar_rms(mesh, labels), diagonal_of(mesh));
+    row[14] = std::to_string(options.peer_iterations);
+    table.rows.push_back(std::move(row));
+  }
+}
+
+// Least, middle and largest error over random starts, or over equal meshes.
+void add_spread(Table& table, const Options& options, const std::string& name, const TriangleMesh& mesh,
+                std::size_t proxies) {
+  SegmentOptions wanted = options_of(options, proxies);
+  std::vector<double> errors, totals, regions;
+  for (std::size_t k = 0; k < options.spread; ++k) {
+    wanted.random_seed = k + 1;
+    const SegmentResult result = wanted.start == SegmentStart::random ? segment(mesh, wanted)
+                                                                        : segment(shuffled(mesh, k + 1), wanted);
+    errors.push_back(result.rms);
+    totals.push_back(result.seconds.total);
+    std::fprintf(stderr, "%s, %s: %zu of %zu\n", name.c_str(), options.start.c_str(), k + 1, options.spread);
+  }
+  const double diagonal = diagonal_of(mesh);
+  table.rows.push_back({name, options.surfaces, options.start, std::to_string(proxies), std::to_string(options.spread),
+                        percent(*std::min_element(errors.begin(), errors.end()), diagonal),
+                        percent(median(errors), diagonal),
+                        percent(*std::max_element(errors.begin(), errors.end()), diagonal),
+                        fmt::format("{:.2f}", median(totals))});
+}
+
+void run(const Options& options) {
+  const ThreadLimit limit(options.threads);
+  fmt::print("{}\nthreads: {}; times in s, lengths in % of the diagonal\n\n", describe_machine(), options.threads);
+  Table table;
+  if (options.spread > 0)
+    table.columns = {"model", "surfaces", "start", "proxies", "runs", "rms least", "rms median", "rms most", "total"};
+  else
+    table.columns = {"model", "triangles", "surfaces", "start", "regions", "total", "starting", "Lloyd", "post",
+                     "rms unsmoothed", "rms", "projected", "to planes", "border", "iterations", "evaluation share"};
+  for (std::size_t k = 0; k < options.models.size(); ++k) {
+    const TriangleMesh mesh = read_mesh(options.models[k]);
+    const std::string name = std::filesystem::path(options.models[k]).stem();
+    const std::size_t proxies = options.proxies[std::min(k, options.proxies.size() - 1)];
+    if (options.spread > 0) {
+      add_spread(table, options, name, mesh, proxies);
+      continue;
+    }
+    add_run(table, options, name, mesh, proxies);
+    if (options.peers) add_peers(table, options, name, mesh, proxies);
+  }
+  fmt::print("{}", table.markdown());
+  if (!options.csv.empty()) write_file(options.csv, table.csv());
+  if (!options.json.empty()) write_file(options.json, table.json());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.models = {BISECTOR_DEFAULT_MODEL};
+  CLI::App app{"Times segmentations and measures their errors."};
+  app.add_option("MESH", options.models, "surfaces; default: examples/smooth.off");
+  app.add_option("--proxies", options.proxies, "regions, of each mesh or of all; default 22")->delimiter(',');
+  app.add_option("--surfaces", options.surfaces, "planes, quadrics or all")->check(CLI::IsMember({"planes", "quadrics", "all"}));
+  app.add_option("--start", options.start, "merging, insertion or random")->check(CLI::IsMember({"merging", "insertion", "random"}));
+  app.add_option("--iterations", options.segment.iterations, "Lloyd steps at most")->check(CLI::Range(0, 100'000));
+  app.add_option("--smooth", options.segment.smooth, "weight of the borders' length")->check(CLI::Range(0.0, 1e6));
+  app.add_option("--fuzzy-rings", options.segment.fuzzy_rings, "width of the strip")->check(CLI::Range(1, 1000));
+  app.add_option("--repeat", options.repeat, "runs of each; times are medians")->check(CLI::Range(1, 1000));
+  app.add_flag("--peers", options.peers, "also CGAL's planar regions, L2 and L2,1; for edge-manifold meshes");
+  app.add_option("--peer-iterations", options.peer_iterations, "of CGAL's")->check(CLI::Range(1, 100'000));
+  app.add_option("--spread", options.spread,
+                 "instead: errors over so many random seeds (random), or renumbered and moved meshes (merging)")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--threads", options.threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app.add_option("--csv", options.csv, "also write the table to this file");
+  app.add_option("--json", options.json, "the same as JSON");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(options);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_segment: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,265 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "bisector/core/parallel.h"
+#include "bisector/mesh/io.h"
+#include "bisector/mesh/preview.h"
+#include "bisector/segment/dual_graph.h"
+#include "bisector/segment/segment.h"
+#include "cells.h"
+#include "commands.h"
+#include "common.h"
+#include "console.h"
+#include "outputs.h"
+#include "report.h"
+
+namespace bisector::cli {
+namespace {
+
+using Colour = std::array<unsigned char, 3>;
+
+SegmentOptions segment_options(const SegmentCommand& command) {
+  SegmentOptions options = command.options;
+  options.surfaces = command.surfaces == "planes"     ? SegmentSurfaces::planes
+                     : command.surfaces == "quadrics" ? SegmentSurfaces::quadrics
+                                                      : SegmentSurfaces::all;
+  options.start = command.start == "insertion" ? SegmentStart::insertion
+                  : command.start == "random"  ? SegmentStart::random
+                                               : SegmentStart::merging;
+  return options;
+}
+
+void warn_of_format(Console& console, const std::string& output) {
+  const std::string extension = extension_of(output);
+  if (extension == ".ply" || extension == ".obj") return;
+  console.warn(fmt::format("{}: {} files hold no face labels, the regions are lost; write .ply or .obj", output,
+                           extension));
+}
+
+// The input's triangles, labelled by region and moved where that was asked for.
+TriangleMesh labelled_mesh(const TriangleMesh& input, const SegmentResult& result) {
+  TriangleMesh mesh{result.projected.empty() ? input.vertices : result.projected, input.triangles};
+  mesh.labels.assign(result.labels.begin(), result.labels.end());
+  mesh.feature_edges = input.feature_edges;
+  return mesh;
+}
+
+// Of each triangle.
+std::vector<Colour> region_colours(const TriangleMesh& mesh, const SegmentResult& result) {
+  const DualGraph graph = dual_graph(mesh);
+  std::vector<std::array<Index, 2>> meeting;
+  for (std::size_t t = 0; t < result.labels.size(); ++t)
+    for (const Index* u = graph.neighbours.begin(t); u != graph.neighbours.end(t); ++u)
+      if (result.labels[*u] < result.labels[t]) meeting.push_back({result.labels[t], result.labels[*u]});
+  std::sort(meeting.begin(), meeting.end());
+  meeting.erase(std::unique(meeting.begin(), meeting.end()), meeting.end());
+  const std::vector<Colour> of_region = contrasting_colours(meeting, result.regions.size());
+  std::vector<Colour> colours;
+  for (const Index label : result.labels) colours.push_back(of_region[label]);
+  return colours;
+}
+
+std::vector<std::string> region_names(const SegmentResult& result) {
+  std::vector<std::string> names;
+  for (const SegmentRegion& region : result.regions) names.push_back(name_of(region.proxy.type));
+  return names;
+}
+
+void write_regions(const std::string& path, const TriangleMesh& mesh, const SegmentResult& result,
+                   const std::vector<Colour>& colours) {
+  if (extension_of(path) != ".ply") return write_mesh(path, mesh, region_names(result));
+  PolygonMesh polygons;
+  polygons.vertices = mesh.vertices;
+  for (const Triangle& t : mesh.triangles) {
+    polygons.polygons.values.insert(polygons.polygons.values.end(), t.begin(), t.end());
+    polygons.polygons.offsets.push_back(polygons.polygons.values.size());
+  }
+  polygons.labels = result.labels;
+  polygons.colours = colours;
+  polygons.feature_edges = mesh.feature_edges;
+  write_polygons(path, polygons);
+}
+
+// "plane" to "planes", "plane_pair" to "plane pairs", "torus" to "tori".
+std::string counted_type(std::size_t n, const std::string& type) {
+  std::string one = type;
+  std::replace(one.begin(), one.end(), '_', ' ');
+  const std::string many = one == "torus" ? "tori" : one + "s";
+  return counted(n, one.c_str(), many.c_str());
+}
+
+// "22: 10 planes, 5 cylinders, ...", the most frequent first.
+std::string describe_regions(const SegmentResult& result) {
+  std::map<std::string, std::size_t> counts;
+  for (const SegmentRegion& region : result.regions) ++counts[name_of(region.proxy.type)];
+  std::vector<std::pair<std::string, std::size_t>> types(counts.begin(), counts.end());
+  std::stable_sort(types.begin(), types.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::string text = fmt::format("{}: ", result.regions.size());
+  for (const auto& [type, n] : types) text += (&type == &types.front().first ? "" : ", ") + counted_type(n, type);
+  return text;
+}
+
+void add_parameters(Json& json, const Primitive& p) {
+  const auto symmetry = [&] {
+    json["centre"] = point_json(p.centre);
+    json["axes"] = {point_json(p.axes[0]), point_json(p.axes[1]), point_json(p.axes[2])};
+    json["lengths"] = p.lengths;
+  };
+  switch (p.type) {
+    case SurfaceType::plane:
+      json["normal"] = point_json(p.axis);
+      json["offset"] = dot(p.axis, p.centre);
+      return;
+    case SurfaceType::sphere:
+      json["centre"] = point_json(p.centre);
+      json["radius"] = p.radius;
+      return;
+    case SurfaceType::cylinder:
+      json["centre"] = point_json(p.centre);
+      json["axis"] = point_json(p.axis);
+      json["radius"] = p.radius;
+      return;
+    case SurfaceType::cone:
+      json["centre"] = point_json(p.centre);
+      json["axis"] = point_json(p.axis);
+      json["angle"] = 180 / std::numbers::pi * p.angle;
+      return;
+    case SurfaceType::torus:
+      json["centre"] = point_json(p.centre);
+      json["axis"] = point_json(p.axis);
+      json["radius"] = p.radius;
+      json["minor_radius"] = p.minor_radius;
+      return;
+    default: symmetry();
+  }
+}
+
+Json region_json(const SegmentRegion& region) {
+  const Primitive& p = region.proxy;
+  Json json{{"type", name_of(p.type)}, {"triangles", region.triangles}, {"area", region.area},
+            {"rms", region.rms},       {"max", region.max}};
+  json["coefficients"] = p.type == SurfaceType::torus ? Json(nullptr) : Json(p.quadric.c);
+  add_parameters(json, p);
+  return json;
+}
+
+Json segmentation_json(const SegmentResult& result, double diagonal) {
+  Json json{{"rms", result.rms},
+            {"rms_percent", 100 * result.rms / diagonal},
+            {"rms_before", result.rms_before},
+            {"smooth", result.smooth},
+            {"border_before", result.border_before},
+            {"border_after", result.border_after},
+            {"iterations", result.iterations},
+            {"insertions", result.insertions},
+            {"merges", result.merges},
+            {"teleportations", result.teleportations},
+            {"deletions", result.deletions},
+            {"evaluations", result.evaluations},
+            {"energies", result.energies}};
+  json["regions"] = Json::array();
+  for (const SegmentRegion& region : result.regions) json["regions"].push_back(region_json(region));
+  return json;
+}
+
+Json segment_report(Console& console, const SegmentResult& result, const TriangleMesh& mesh, const TriangleMesh& input,
+                    double diagonal) {
+  Json report = start_report("segment");
+  report["input"] = input_json(input);
+  report["output"] = output_json(mesh);
+  report["segmentation"] = segmentation_json(result, diagonal);
+  if (!result.projected.empty()) {
+    console.phase("measuring the distance to the input");
+    Json quality = quality_json(measure_quality(mesh));
+    add_distance(quality, measure_distance(mesh, input));
+    report["quality"] = std::move(quality);
+  }
+  return report;
+}
+
+Json segment_seconds(const SegmentSeconds& seconds) {
+  return {{"total", seconds.total},   {"start", seconds.start},       {"lloyd", seconds.lloyd},
+          {"improve", seconds.improve}, {"classify", seconds.classify}, {"smooth", seconds.smooth},
+          {"project", seconds.project}, {"segment", seconds.total}};
+}
+
+void print_summary(Console& console, const SegmentCommand& command, const SegmentResult& result,
+                   const TriangleMesh& input, double diagonal, const Json& seconds) {
+  const auto worst = std::max_element(result.regions.begin(), result.regions.end(),
+                                      [](const auto& a, const auto& b) { return a.max < b.max; });
+  console.print(fmt::format("input      {}: {}", command.input, size_of(input_json(input))));
+  console.print(fmt::format("regions    {}", describe_regions(result)));
+  console.print(fmt::format("distance   rms {:.4g} % of the diagonal, at most {:.3g} % (region {}, {})",
+                            100 * result.rms / diagonal, 100 * worst->max / diagonal, worst - result.regions.begin(),
+                            name_of(worst->proxy.type)));
+  if (command.options.smooth > 0)
+    console.print(fmt::format("borders    {:.6g} long, {:.6g} before smoothing", result.border_after,
+                              result.border_before));
+  console.print(fmt::format("steps      {}, {}, {}, {}", counted(result.iterations, "iteration", "iterations"),
+                            counted(result.insertions, "insertion", "insertions"),
+                            counted(result.merges, "merge", "merges"),
+                            counted(result.teleportations, "teleportation", "teleportations")));
+  console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
+  if (command.common.verbose) print_seconds(console, seconds);
+  console.print_written({command.output, command.preview, command.common.report});
+}
+
+}  // namespace
+
+void run(const SegmentCommand& command) {
+  const Stopwatch total;
+  const std::string& report_path = command.common.report;
+  check_outputs({{command.output, kMeshFormats}, {command.preview, {".png"}}, report_output(report_path)},
+                {command.input});
+  const ThreadLimit limit(command.common.threads);
+  Console console(command.common.quiet, report_path == "-");
+  const Context context = console.context();
+
+  console.phase("reading " + command.input);
+  const Stopwatch reading;
+  const TriangleMesh input = read_mesh(command.input, context);
+  warn_of_format(console, command.output);
+  double io = reading.seconds();
+
+  console.phase("segmenting");
+  const SegmentResult result = segment(input, segment_options(command), context);
+  const TriangleMesh mesh = labelled_mesh(input, result);
+  const std::vector<Colour> colours = region_colours(mesh, result);
+  const double diagonal = bounding_box(input.vertices).diagonal();
+
+  const Stopwatch measuring;
+  Json report;
+  if (!report_path.empty()) report = segment_report(console, result, mesh, input, diagonal);
+  Json seconds = segment_seconds(result.seconds);
+  seconds["quality"] = measuring.seconds();
+
+  console.phase("writing " + command.output);
+  stop_watching_interrupts();
+  const Stopwatch writing;
+  write_regions(command.output, mesh, result, colours);
+  io += writing.seconds();
+  const Stopwatch drawing;
+  if (!command.preview.empty()) {
+    PreviewOptions picture;
+    picture.edges = false;
+    picture.outlines = true;
+    picture.colours = colours;
+    write_preview(command.preview, mesh, picture);
+  }
+  seconds["preview"] = drawing.seconds();
+  seconds["io"] = io;
+  seconds["total"] = total.seconds();
+  if (!report_path.empty()) {
+    report["seconds"] = seconds;
+    write_report(report_path, report);
+  }
+  print_summary(console, command, result, input, diagonal, seconds);
+}
+
+}  // namespace bisector::cli
