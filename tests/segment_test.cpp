@@ -93,11 +93,10 @@ TEST(Segment, MeetsTheErrorAskedFor) {
   for (const double error : {0.05, 0.2, 1.0}) {
     SegmentOptions options;
     options.error = error;
-    options.smooth = 0;
     const SegmentResult result = segment(model.mesh, options);
     expect_sound(model.mesh, result);
     expect_falling(result);
-    EXPECT_LE(result.rms, error / 100 * diagonal * 1.05);
+    EXPECT_LE(result.rms, error / 100 * diagonal);
     EXPECT_LE(result.regions.size(), before);
     before = result.regions.size();
   }

@@ -202,7 +202,7 @@ class RegionSurface {
                          type == SurfaceType::cone || type == SurfaceType::torus;
     const auto fit = special ? refine_primitive(candidate.primitive, vertices_)
                              : std::optional(refine_quadric(candidate.primitive, vertices_));
-    if (!fit) return candidate.primitive;
+    if (!fit || fit->primitive.type == SurfaceType::plane_pair) return candidate.primitive;
     const Candidate better = measured(fit->primitive);
     const bool exact = better.vertices <= weight() * kExact * kExact && better.tilt <= kMuchWorse * candidate.tilt;
     return is_sound(better) && (exact || better.energy <= kHardlyWorse * candidate.energy) ? better.primitive : candidate.primitive;

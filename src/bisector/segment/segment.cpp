@@ -139,15 +139,13 @@ Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptio
   }
   seconds.lloyd = clock.lap();
 
-  if (merging) {
-    report(context, "moving regions", 0.6, partition.energy());
-    constexpr double kAnyEnergy = std::numeric_limits<double>::infinity();
-    while (wanted > 0 && partition.regions.size() > wanted && editor.remove_cheapest(partition, kAnyEnergy)) context.check();
-    editor.teleport(partition);
-    if (wanted == 0)
-      while (editor.remove_cheapest(partition, allowed)) report(context, "removing regions", 0.7, partition.energy());
-    lloyd.iterate(partition, options.iterations);
-  }
+  report(context, "moving regions", 0.6, partition.energy());
+  constexpr double kAnyEnergy = std::numeric_limits<double>::infinity();
+  while (wanted > 0 && partition.regions.size() > wanted && editor.remove_cheapest(partition, kAnyEnergy)) context.check();
+  editor.teleport(partition);
+  if (wanted == 0)
+    while (editor.remove_cheapest(partition, allowed)) report(context, "removing regions", 0.7, partition.energy());
+  lloyd.iterate(partition, options.iterations);
   seconds.improve = clock.lap();
   return partition;
 }
@@ -260,13 +258,9 @@ std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDoma
   return result;
 }
 
-}  // namespace
-
-SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
-  Clock total, clock;
-  check_options(options);
-  const SegmentDomain domain = make_segment_domain(mesh);
-  check_count(domain, options.proxies);
+SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& domain, const SegmentOptions& options,
+                             const Context& context) {
+  Clock clock;
   SegmentResult result;
   Lloyd lloyd(domain, options.surfaces, context);
   PartitionEditor editor(lloyd, options.iterations);
@@ -308,7 +302,27 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   result.merges = editor.merges;
   result.deletions = editor.deletions;
   result.teleportations = editor.teleportations;
-  result.seconds.total = total.lap();
+  return result;
+}
+
+}  // namespace
+
+SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
+  Clock clock;
+  check_options(options);
+  const SegmentDomain domain = make_segment_domain(mesh);
+  check_count(domain, options.proxies);
+  // Types and smooth borders cost some of the error; where they take more than was left, less is aimed at.
+  constexpr int kAttempts = 4;
+  const double most = options.error / 100 * domain.scale * bounding_box(domain.vertices).diagonal();
+  SegmentOptions aimed = options;
+  SegmentResult result;
+  for (int k = 0; k < kAttempts; ++k) {
+    result = segment_domain(mesh, domain, aimed, context);
+    if (options.proxies > 0 || result.rms <= most) break;
+    aimed.error *= 0.97 * most / result.rms;
+  }
+  result.seconds.total = clock.lap();
   return result;
 }
 
