@@ -33,6 +33,7 @@
 #include "bisector/tetmesh/tetgen.h"
 #include "models.h"
 #include "solids.h"
+#include "tree_model.h"
 
 namespace bisector {
 namespace {
@@ -1512,6 +1513,89 @@ TEST_F(Cli, InterruptLeavesNothing) {
     EXPECT_EQ(result.err, "bisector: cancelled\n");
     EXPECT_EQ(files(), before);
   }
+}
+
+// ---- tree
+
+class CliTree : public Cli {
+ protected:
+  CliTree() {
+    points_ = test::make_tree({.points = 6'000, .boughs = 3, .random_seed = 1}).points;
+    std::string text = "# a tree\n";
+    for (const Vec3& p : points_) text += std::to_string(p.x) + ' ' + std::to_string(p.y) + ' ' + std::to_string(p.z) + " 9 9\n";
+    write_text("tree.xyz", text);
+  }
+  std::vector<Vec3> points_;
+};
+
+TEST_F(CliTree, WritesWhatItSays) {
+  const Result result = run({"tree", in("tree.xyz"), "-o", in("out.obj"), "--skeleton", in("s.ply"), "--labels", in("l.ply"),
+                             "--preview", in("p.png"), "--report", in("r.json")});
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("points"), std::string::npos);
+  const Json report = Json::parse(read_text(in("r.json")));
+  EXPECT_EQ(report["input"]["points"], points_.size());
+  EXPECT_EQ(report["input"]["unassigned_points"], 0);
+  EXPECT_EQ(report["tree"]["trunks"], 1);
+  const std::size_t branches = report["tree"]["branches"];
+  ASSERT_EQ(report["branches"].size(), branches);
+  EXPECT_TRUE(report["branches"][0]["parent"].is_null());
+  double length = 0, volume = 0;
+  std::size_t points = 0;
+  for (const Json& branch : report["branches"]) {
+    length += branch["length"].get<double>();
+    volume += branch["volume"].get<double>();
+    points += branch["points"].get<std::size_t>();
+  }
+  EXPECT_NEAR(report["tree"]["length"], length, 1e-9 * length);
+  EXPECT_NEAR(report["tree"]["volume"], volume, 1e-9 * volume);
+  EXPECT_EQ(points, points_.size());
+  EXPECT_GT(report["coverage"]["within_1_percent_of_height"], 0.9);
+  EXPECT_GE(report["coverage"]["within_2_radii"], report["coverage"]["within_1_radius"].get<double>());
+  for (const char* phase : {"graph", "clusters", "skeleton", "refine", "surfaces", "tree", "mesh", "quality", "io", "total"})
+    EXPECT_GE(report["seconds"][phase], 0) << phase;
+  const TriangleMesh mesh = read_mesh(in("out.obj"));
+  EXPECT_EQ(std::set<std::int32_t>(mesh.labels.begin(), mesh.labels.end()).size(), branches);
+  EXPECT_EQ(read_points(in("l.ply")).size(), points_.size());
+  EXPECT_EQ(read_points(in("s.ply")).size(), report["tree"]["nodes"]);
+  EXPECT_TRUE(read_text(in("p.png")).starts_with("\x89PNG"));
+}
+
+TEST_F(CliTree, ReadsPlyAndWritesIges) {
+  ASSERT_EQ(run({"tree", in("tree.xyz"), "-o", in("a.ply"), "--labels", in("l.ply"), "--quiet"}).code, 0);
+  ASSERT_EQ(run({"tree", in("l.ply"), "-o", in("b.ply"), "--threads", "1", "--quiet"}).code, 0);
+  EXPECT_EQ(read_text(in("a.ply")), read_text(in("b.ply")));
+  ASSERT_EQ(run({"tree", in("l.ply"), "-o", in("t.igs"), "--unit", "mm", "--quiet"}).code, 0);
+  EXPECT_NE(read_text(in("t.igs")).find("branch_0"), std::string::npos);
+}
+
+TEST_F(CliTree, LeavesOutTheGround) {
+  double low = points_[0].z, high = low;
+  for (const Vec3& p : points_) {
+    low = std::min(low, p.z);
+    high = std::max(high, p.z);
+  }
+  const double ground = low + 0.1 * (high - low);
+  ASSERT_EQ(run({"tree", in("tree.xyz"), "-o", in("t.obj"), "--ground", std::to_string(ground), "--report", in("r.json"), "--quiet"}).code, 0);
+  EXPECT_GT(Json::parse(read_text(in("r.json")))["input"]["ground_points"], 0);
+}
+
+TEST_F(CliTree, BadUsageAndInput) {
+  const std::string tree = in("tree.xyz"), out = in("t.obj");
+  expect_failure(2, {"tree", tree}, "-o is required");
+  expect_failure(2, {"tree", tree, "-o", out, "--components", "some"}, "none of bridge, separate");
+  expect_failure(2, {"tree", tree, "-o", out, "--unit", "mm"}, "only .igs");
+  expect_failure(2, {"tree", tree, "-o", out, "--clusters", "0"}, "whole number");
+  expect_failure(2, {"tree", tree, "-o", out, "--max-cluster-points", "3"}, "whole number");
+  expect_failure(1, {"tree", tree, "-o", out, "--delta", "2"}, "delta");
+  expect_failure(1, {"tree", tree, "-o", in("t.msh")}, "t.msh");
+  expect_failure(1, {"tree", tree, "-o", out, "--skeleton", in("s.obj")}, "s.obj");
+  expect_failure(1, {"tree", tree, "-o", out, "--ground", "1e9"}, "below the ground");
+  expect_failure(1, {"tree", in("none.xyz"), "-o", out}, "none.xyz");
+  write_text("few.xyz", "1 2 3\n4 5 6\n");
+  expect_failure(1, {"tree", in("few.xyz"), "-o", out}, "too few");
+  write_text("nan.xyz", "1 2 3\n4 nan 6\n");
+  expect_failure(1, {"tree", in("nan.xyz"), "-o", out}, "nan.xyz");
 }
 
 }  // namespace

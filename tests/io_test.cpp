@@ -634,10 +634,10 @@ TEST_F(Io, LabelsAndFeatureEdgesRoundTrip) {
     }
   one.labels = {1, 0};
   for (const char* name : {"a.ply", "a.obj"}) {
-    write_mesh(path(name), one, {"plane", "plane_pair"});
+    write_mesh(path(name), one, {"region", {"plane", "plane_pair"}});
     expect_same(read_mesh(path(name)), one);
-    EXPECT_THROW(write_mesh(path(name), one, {"plane"}), Error);
-    EXPECT_THROW(write_mesh(path(name), several, {"a", "b", "c"}), Error);
+    EXPECT_THROW(write_mesh(path(name), one, {"region", {"plane"}}), Error);
+    EXPECT_THROW(write_mesh(path(name), several, {"region", {"a", "b", "c"}}), Error);
   }
   for (const char* name : {"a.off", "a.stl"}) {
     write_mesh(path(name), marked_square());
@@ -699,7 +699,7 @@ TEST_F(Io, ReadsGroupsAndLinesOfObj) {
   EXPECT_EQ(labels("g label_5\nf 1 2 3\ng label_99999999999\nf 1 3 4\n"), (Labels{0, 1}));
   EXPECT_EQ(labels("g region_5_plane\nf 1 2 3\ng region_2_plane_pair\nf 1 3 4\n"), (Labels{5, 2}));
   EXPECT_EQ(labels("g region_5_plane\nf 1 2 3\ng region_5_cone\nf 1 3 4\n"), (Labels{0, 1}));
-  EXPECT_EQ(labels("g region_5\nf 1 2 3\ng region_6_cone\nf 1 3 4\n"), (Labels{0, 1}));
+  EXPECT_EQ(labels("g region_5\nf 1 2 3\ng region_6_cone\nf 1 3 4\n"), (Labels{5, 6}));
   // Lines of several vertices, from the end, before the vertices, with texture coordinates, closed, off the surface.
   EXPECT_EQ(read("a.obj", "l 4/1 1/2 2/\n" + vertices + "f 1 2 3 4\nl -2 -1\nl 2 1 \\\n3\nl 2 4 4\n").feature_edges,
             (Edges{{0, 1}, {0, 2}, {0, 3}, {2, 3}}));

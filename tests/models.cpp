@@ -170,6 +170,12 @@ std::string shared_model(const char* name) {
   return std::filesystem::exists(path, ignored) ? path.string() : std::string();
 }
 
+std::string shared_scan(const char* name) {
+  const std::filesystem::path path = std::filesystem::path(BISECTOR_SOURCE_DIR) / ".." / "shared" / "data" / "trees" / name;
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored) ? path.string() : std::string();
+}
+
 std::vector<Vec3> random_seeds(const TriangleMesh& mesh, std::size_t count, std::uint64_t random_seed) {
   SplitMix64 random(random_seed);
   std::vector<double> area_below;

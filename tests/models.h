@@ -43,6 +43,7 @@ TriangleMesh collinear_among_good();                             // 1 is exactly
 
 // Path of a model in the shared data folder beside the sources, empty where there is none.
 std::string shared_model(const char* name);
+std::string shared_scan(const char* name);  // the same for the points of a tree
 
 // Seeds.
 std::vector<Vec3> random_seeds(const TriangleMesh& mesh, std::size_t count, std::uint64_t random_seed);

@@ -8,6 +8,7 @@
 #include "bisector/remesh/remesh.h"
 #include "bisector/segment/segment.h"
 #include "bisector/tetmesh/tetmesh.h"
+#include "bisector/tree/tree.h"
 
 namespace bisector::cli {
 
@@ -72,6 +73,13 @@ struct SegmentCommand {
   CommonOptions common;
 };
 
+struct TreeCommand {
+  std::string input, output, skeleton, labels, preview;
+  std::string components = "bridge", unit = "m";
+  TreeOptions options;
+  CommonOptions common;
+};
+
 struct QualityCommand {
   std::string mesh, reference;
   CommonOptions common;
@@ -91,6 +99,7 @@ void run(const RemeshCommand& command);
 void run(const RvdCommand& command);
 void run(const TetCommand& command);
 void run(const SegmentCommand& command);
+void run(const TreeCommand& command);
 void run(const QualityCommand& command);
 void run(const DevicesCommand& command);
 void run(const CheckCommand& command);

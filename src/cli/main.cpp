@@ -407,6 +407,42 @@ CLI::App* add_segment(CLI::App& program, SegmentCommand& command) {
   return app;
 }
 
+CLI::App* add_tree(CLI::App& program, TreeCommand& command) {
+  CLI::App* app = add_command(
+      program, "tree", "Reconstruct the branches of a leafless tree from a laser scan.",
+      "bisector tree POINTS -o OUT [options]",
+      "Examples:\n"
+      "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
+      "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
+      "POINTS is a .ply file or \"x y z\" lines, z up, without leaves. Ctrl-C stops the run; nothing is written.");
+  add_file(app, "POINTS", command.input, "FILE", "points of a tree's surface")->required();
+  add_file(app, "-o", command.output, "FILE", "surfaces to write: .obj, .ply, .off, .stl, or as B-splines\n.igs")
+      ->required()->group("Output");
+  add_file(app, "--skeleton", command.skeleton, "FILE.ply", "also write the branches' axes with radii")->group("Output");
+  add_file(app, "--labels", command.labels, "FILE.ply", "also write the points with the branch that each is of")
+      ->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw points and surfaces side by side")->group("Output");
+  app->add_option("--unit", command.unit, "of the points, for .igs: mm, cm, m (default) or in")
+      ->type_name("WORD")->check(one_of({"mm", "cm", "m", "in"}))->group("Output");
+  app->add_option("--ground", command.options.ground, "leave out points with z below this")->type_name("Z")->group("Scan");
+  app->add_option("--components", command.components,
+                  "parts of the scan that are apart: bridge (join them over\n"
+                  "their gaps; default) or separate (a tree each)")
+      ->type_name("WORD")->check(one_of({"bridge", "separate"}))->group("Scan");
+  app->add_option("--clusters", command.options.clusters, "at most so many; default: as many as it takes")
+      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Clusters");
+  app->add_option("--delta", command.options.delta,
+                  "split clusters whose points are farther, rms, from a\n"
+                  "cylinder, in the largest extent; default 0.004")
+      ->type_name("D")->check(number_above_zero())->group("Clusters");
+  app->add_option("--max-cluster-points", command.options.max_cluster_points, "split clusters of more points too")
+      ->type_name("M")->check(whole_number(24, kMostSeeds))->group("Clusters");
+  add_common_options(app, command.common,
+                     "write a JSON report with branches, volume, distances of\n"
+                     "the points and timings; - for stdout");
+  return app;
+}
+
 CLI::App* add_quality(CLI::App& program, QualityCommand& command) {
   CLI::App* app = add_command(
       program, "quality", "Measure angles, topology and distance to another mesh.",
@@ -500,6 +536,12 @@ void check_usage(const TetCommand& command, const CLI::App& app) {
       refuse(option, "a uniform density has edges of one length; choose another --density");
 }
 
+void check_usage(const TreeCommand& command, const CLI::App& app) {
+  const std::string extension = command.output.substr(std::min(command.output.size(), command.output.rfind('.')));
+  if (app.count("--unit") > 0 && extension != ".igs" && extension != ".iges")
+    throw CLI::ValidationError("--unit: only .igs files tell a unit; leave it out");
+}
+
 void check_usage(const RvdCommand& command, const CLI::App& app) {
   if (command.seeds.empty() && command.count == 0)
     throw CLI::ValidationError("which seeds? give --seeds FILE.xyz or -n N");
@@ -543,7 +585,7 @@ int run_guarded(const std::function<void()>& command) {
 int main(int argc, char** argv) {
   CLI::App program{
       "Bisector makes high-quality triangle meshes of surfaces and tetrahedral meshes of solids by optimising certified\n"
-      "Voronoi diagrams."};
+      "Voronoi diagrams, and reconstructs trees from laser scans."};
   program.name("bisector");
   program.formatter(std::make_shared<Help>("bisector COMMAND ..."));
   program.footer(
@@ -551,6 +593,7 @@ int main(int argc, char** argv) {
       "  bisector remesh IN.off -o OUT.obj -n 10000     remesh with 10,000 vertices\n"
       "  bisector tet IN.off -o OUT.msh -n 10000        fill it with tetrahedra\n"
       "  bisector segment IN.off -o OUT.ply             find its planes, cylinders, ...\n"
+      "  bisector tree SCAN.xyz -o OUT.obj              reconstruct a tree from a laser scan\n"
       "  bisector quality OUT.obj --reference IN.off    see how good the result is\n"
       "  bisector remesh --help                         all options of a command\n\n"
       "Exit codes: 0 success, 1 bad input or a failed run, 2 bad usage, 130 cancelled. If not 0, nothing is written.");
@@ -562,6 +605,7 @@ int main(int argc, char** argv) {
   RvdCommand rvd;
   TetCommand tet;
   SegmentCommand segment;
+  TreeCommand tree;
   QualityCommand quality;
   DevicesCommand devices;
   CheckCommand check;
@@ -569,6 +613,7 @@ int main(int argc, char** argv) {
   CLI::App* const rvd_app = add_rvd(program, rvd);
   CLI::App* const tet_app = add_tet(program, tet);
   CLI::App* const segment_app = add_segment(program, segment);
+  CLI::App* const tree_app = add_tree(program, tree);
   CLI::App* const quality_app = add_quality(program, quality);
   CLI::App* const devices_app = add_devices(program, devices);
   CLI::App* const check_app = add_check(program, check);
@@ -583,6 +628,7 @@ int main(int argc, char** argv) {
     if (rvd_app->parsed()) check_usage(rvd, *rvd_app);
     if (tet_app->parsed()) check_usage(tet, *tet_app);
     if (segment_app->parsed()) check_usage(segment, *segment_app);
+    if (tree_app->parsed()) check_usage(tree, *tree_app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);
     return fail_usage(error.what(), chosen());
@@ -598,6 +644,7 @@ int main(int argc, char** argv) {
     if (rvd_app->parsed()) run(rvd);
     if (tet_app->parsed()) run(tet);
     if (segment_app->parsed()) run(segment);
+    if (tree_app->parsed()) run(tree);
     if (quality_app->parsed()) run(quality);
     if (devices_app->parsed()) run(devices);
     if (check_app->parsed()) run(check);

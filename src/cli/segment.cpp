@@ -73,7 +73,7 @@ std::vector<std::string> region_names(const SegmentResult& result) {
 
 void write_regions(const std::string& path, const TriangleMesh& mesh, const SegmentResult& result,
                    const std::vector<Colour>& colours) {
-  if (extension_of(path) != ".ply") return write_mesh(path, mesh, region_names(result));
+  if (extension_of(path) != ".ply") return write_mesh(path, mesh, {"region", region_names(result)});
   PolygonMesh polygons;
   polygons.vertices = mesh.vertices;
   for (const Triangle& t : mesh.triangles) {

@@ -244,7 +244,7 @@ TriangleMesh read_mesh(const std::string& path, const Context& context) {
   return to_triangles(path, read(path, bytes), context);
 }
 
-void write_mesh(const std::string& path, const TriangleMesh& mesh, const std::vector<std::string>& label_names) {
+void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups) {
   const std::string extension = lower_extension(path);
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
@@ -252,14 +252,14 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const std::ve
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.triangles.size())
     fail(path, fmt::format("{} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
   for (const std::int32_t label : mesh.labels)
-    if (!label_names.empty() && (label < 0 || static_cast<std::size_t>(label) >= label_names.size()))
-      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, label_names.size()));
+    if (!groups.names.empty() && (label < 0 || static_cast<std::size_t>(label) >= groups.names.size()))
+      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, groups.names.size()));
   for (const Edge& e : mesh.feature_edges)
     if (std::max(e[0], e[1]) >= mesh.vertices.size())
       fail(path, fmt::format("feature edge {} {} is out of range, the mesh has {} vertices; nothing was written", e[0],
                              e[1], mesh.vertices.size()));
   if (extension == ".off") write_file(path, format_off(mesh));
-  else if (extension == ".obj") write_file(path, format_obj(mesh, label_names));
+  else if (extension == ".obj") write_file(path, format_obj(mesh, groups));
   else if (extension == ".ply") write_file(path, format_ply(mesh));
   else if (extension == ".stl") write_file(path, format_stl(path, mesh));
   else fail_extension(path, extension);
@@ -279,6 +279,7 @@ void write_polygons(const std::string& path, const PolygonMesh& mesh) {
 
 std::vector<Vec3> read_points(const std::string& path) {
   const std::string bytes = read_bytes(path);
+  if (lower_extension(path) == ".ply") return read_ply_points(path, bytes);
   TextReader in(path, bytes, '#');
   std::vector<Vec3> points;
   while (in.next_line()) points.push_back(in.point());

@@ -23,13 +23,19 @@ namespace bisector {
 // all. Memory is bounded by the file's size, not by its counts.
 TriangleMesh read_mesh(const std::string& path, const Context& context = {});
 
+// How an OBJ file's groups are called: PREFIX_K, K being the label, or PREFIX_K_NAME where the labels 0, 1, ... have names.
+struct GroupNames {
+  std::string prefix = "label";  // label, region or branch; others are not read back as labels
+  std::vector<std::string> names = {};
+};
+
 // Writes a mesh by extension, with as many of 17 significant digits as it takes to read back the same bits (STL is
 // binary and float, as the format demands; PLY binary and double). Labels become the face property `int label` in PLY
-// and groups `label_K` in OBJ, or `region_K_NAME` where names of the labels 0, 1, ... are given; feature edges the
+// and groups `label_K` in OBJ, or `PREFIX_K` or `PREFIX_K_NAME` as `groups` says; feature edges the
 // element `edge` in PLY and lines `l` in OBJ; OFF and STL hold neither. The file appears under its name only when
 // complete. Throws Error, also for coordinates that are not finite or beyond the format's range, indices out of range,
 // labels that are not one per triangle and labels without a name among those given.
-void write_mesh(const std::string& path, const TriangleMesh& mesh, const std::vector<std::string>& label_names = {});
+void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups = {});
 
 // A coloured polygon mesh as binary PLY (double coordinates; one colour and one integer label per face).
 struct PolygonMesh {
@@ -41,7 +47,8 @@ struct PolygonMesh {
 };
 void write_polygons(const std::string& path, const PolygonMesh& mesh);
 
-// Reads "x y z" lines; '#' starts a comment, further columns are ignored. Throws Error as read_mesh does.
+// Reads the vertices of a .ply file, with or without faces, and any other as "x y z" lines; '#' starts a comment, further
+// columns are ignored. Throws Error as read_mesh does.
 std::vector<Vec3> read_points(const std::string& path);
 
 // Reads a number for each vertex from a scalar property of a PLY file's element `vertex`. Throws Error, listing the

@@ -60,11 +60,12 @@ Soup read_off(const std::string& path, std::string_view bytes);
 Soup read_obj(const std::string& path, std::string_view bytes);
 Soup read_ply(const std::string& path, std::string_view bytes);
 Soup read_stl(const std::string& path, std::string_view bytes);
+std::vector<Vec3> read_ply_points(const std::string& path, std::string_view bytes);
 std::vector<double> read_ply_attribute(const std::string& path, std::string_view bytes, const std::string& name);
 
 // The bytes of a file. Coordinates must be finite and indices in range; STL throws for what is beyond a float.
 std::string format_off(const TriangleMesh& mesh);
-std::string format_obj(const TriangleMesh& mesh, const std::vector<std::string>& label_names);
+std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups);
 std::string format_ply(const TriangleMesh& mesh);
 std::string format_ply(const PolygonMesh& mesh);
 std::string format_stl(const std::string& path, const TriangleMesh& mesh);

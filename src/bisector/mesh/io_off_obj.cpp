@@ -37,16 +37,15 @@ Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t verti
   return static_cast<Index>(index);
 }
 
-constexpr std::string_view kLabelPrefix = "label_", kNamedPrefix = "region_";
-
 // The label that a group's name tells, if format_obj may have written it.
 bool parse_label(std::string_view name, std::int32_t& label) {
-  const bool named = name.starts_with(kNamedPrefix);
-  if (!named && !name.starts_with(kLabelPrefix)) return false;
-  name.remove_prefix((named ? kNamedPrefix : kLabelPrefix).size());
-  const char* end = name.data() + name.size();
-  const auto [stop, error] = std::from_chars(name.data(), end, label);
-  return error == std::errc{} && (named ? stop != end && *stop == '_' : stop == end);
+  for (const std::string_view prefix : {"label_", "region_", "branch_"}) {
+    if (!name.starts_with(prefix)) continue;
+    const char *begin = name.data() + prefix.size(), *end = name.data() + name.size();
+    const auto [stop, error] = std::from_chars(begin, end, label);
+    return error == std::errc{} && (stop == end || *stop == '_');
+  }
+  return false;
 }
 
 // The labels of an OBJ file's faces: one for each pair of group and material.
@@ -186,7 +185,7 @@ std::string format_off(const TriangleMesh& mesh) {
   return out;
 }
 
-std::string format_obj(const TriangleMesh& mesh, const std::vector<std::string>& label_names) {
+std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups) {
   std::string out;
   for (const Vec3& p : mesh.vertices) {
     out += "v ";
@@ -195,8 +194,9 @@ std::string format_obj(const TriangleMesh& mesh, const std::vector<std::string>&
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1])) {
       const std::int32_t label = mesh.labels[i];
-      if (label_names.empty()) out += fmt::format("g {}{}\n", kLabelPrefix, label);
-      else out += fmt::format("g {}{}_{}\n", kNamedPrefix, label, label_names[static_cast<std::size_t>(label)]);
+      out += fmt::format("g {}_{}", groups.prefix, label);
+      if (!groups.names.empty()) out += '_' + groups.names[static_cast<std::size_t>(label)];
+      out += '\n';
     }
     out += 'f';
     for (const Index v : mesh.triangles[i]) {

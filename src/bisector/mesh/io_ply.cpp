@@ -323,21 +323,40 @@ void read_ply_body(Source& source, const PlyHeader& header, Soup& soup) {
   soup.ignored = source.ignored();
 }
 
-void check_ply_elements(const TextReader& in, const PlyHeader& header) {
+void check_ply_vertices(const TextReader& in, const PlyHeader& header) {
   const PlyElement* vertex = header.find("vertex");
-  const PlyElement* face = header.find("face");
   if (!vertex) in.fail(std::string("the header has no element 'vertex'; ") + kExportAgain);
-  if (!face) in.fail("the header has no element 'face'; export as triangles");
   for (const char* axis : {"x", "y", "z"})
     if (std::count_if(vertex->properties.begin(), vertex->properties.end(),
                       [&](const PlyProperty& p) { return p.name == axis && !p.list; }) != 1 ||
         std::count_if(vertex->properties.begin(), vertex->properties.end(),
                       [&](const PlyProperty& p) { return p.name == axis; }) != 1)
       in.fail(fmt::format("element 'vertex' needs one property '{}'; {}", axis, kExportAgain));
+}
+
+void check_ply_elements(const TextReader& in, const PlyHeader& header) {
+  check_ply_vertices(in, header);
+  const PlyElement* face = header.find("face");
+  if (!face) in.fail("the header has no element 'face'; export as triangles");
   if (std::count_if(face->properties.begin(), face->properties.end(), is_index_list) != 1)
     in.fail("element 'face' needs one list 'vertex_indices'; export as triangles");
   if (std::count_if(face->properties.begin(), face->properties.end(), is_label) > 1)
     in.fail(std::string("element 'face' has several properties 'label'; ") + kExportAgain);
+}
+
+// What comes after the vertices is not read.
+template <class Source>
+std::vector<Vec3> read_ply_positions(Source& source, const PlyHeader& header) {
+  Soup soup;
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty()) continue;
+    if (element.name == "vertex") {
+      read_ply_vertices(source, element, soup);
+      break;
+    }
+    skip_ply_items(source, element);
+  }
+  return std::move(soup.vertices);
 }
 
 template <class Source>
@@ -408,10 +427,23 @@ Soup read_ply(const std::string& path, std::string_view bytes) {
   return soup;
 }
 
+std::vector<Vec3> read_ply_points(const std::string& path, std::string_view bytes) {
+  TextReader in(path, bytes, 0);
+  const PlyHeader header = read_ply_header(in);
+  check_ply_vertices(in, header);
+  if (header.find("vertex")->count == 0) fail(path, "there is no point at all; export the file with points");
+  if (header.text) {
+    PlyText source(in);
+    return read_ply_positions(source, header);
+  }
+  PlyBinary source(path, in.after_line(), header.big_endian);
+  return read_ply_positions(source, header);
+}
+
 std::vector<double> read_ply_attribute(const std::string& path, std::string_view bytes, const std::string& name) {
   TextReader in(path, bytes, 0);
   const PlyHeader header = read_ply_header(in);
-  check_ply_elements(in, header);
+  check_ply_vertices(in, header);
   const PlyProperty* wanted = nullptr;
   std::string known;
   for (const PlyProperty& p : header.find("vertex")->properties) {
