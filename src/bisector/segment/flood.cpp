@@ -73,7 +73,8 @@ void flood(const SegmentDomain& domain, const std::vector<Proxy>& proxies, const
       ++evaluations;
     }
   };
-  for (const FloodSeed& seed : seeds) take(seed.triangle, seed.region, distance_to(domain, seed.triangle, proxies[seed.region]));
+  for (const FloodSeed& seed : seeds)
+    take(seed.triangle, seed.region, distance_to(domain, seed.triangle, proxies[seed.region]));
   for (const FloodSeed& seed : seeds) offer_neighbours(seed.triangle, seed.region);
   evaluations += seeds.size();
   while (!queue.empty()) {

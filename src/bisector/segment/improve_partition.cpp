@@ -193,7 +193,9 @@ double PartitionEditor::merging_cost(const Partition& partition, Index a, Index 
   both.insert(both.end(), partition.triangles.begin(b), partition.triangles.end(b));
   std::sort(both.begin(), both.end());
   std::vector<double> distances(partition.labels.size());
-  at->second = lloyd_.refit(both.data(), both.data() + both.size(), merged(x.moments, y.moments), nullptr, distances).energy - x.energy - y.energy;
+  const SurfaceMoments moments = merged(x.moments, y.moments);
+  const RegionProxy fit = lloyd_.refit(both.data(), both.data() + both.size(), moments, nullptr, distances);
+  at->second = fit.energy - x.energy - y.energy;
   return at->second;
 }
 

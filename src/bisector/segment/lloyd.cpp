@@ -91,8 +91,8 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
     } else if (!fit.plane) {
       best.invalid = true;
       const QuadricFit oriented = fit_oriented_quadric(moments);
-      if (oriented.valid && !is_invalid(oriented.quadric, moments) && is_one_sided(domain_, begin, end, Proxy::of(oriented.quadric)))
-        consider(Proxy::of(oriented.quadric));
+      const Proxy proxy = Proxy::of(oriented.quadric);
+      if (oriented.valid && !is_invalid(oriented.quadric, moments) && is_one_sided(domain_, begin, end, proxy)) consider(proxy);
     }
     if (tori && best.energy > enough && surfaces_ == SegmentSurfaces::all && count >= kLeastForTorus) {
       const SurfaceSamples samples = sample_triangles(domain_, {begin, end}, kTorusSamples);
@@ -193,7 +193,8 @@ bool Lloyd::step(Partition& partition, bool flooding) {
     if (!next.changed[r]) continue;
     const SurfaceMoments moments = changed_moments(domain_, partition.regions[r].moments, partition.triangles.begin(r),
                                                    partition.triangles.end(r), begin, end);
-    next.regions[r] = refit(begin, end, moments, &partition.regions[r], next.distances, tori || partition.regions[r].proxy.torus);
+    const RegionProxy& old = partition.regions[r];
+    next.regions[r] = refit(begin, end, moments, &old, next.distances, tori || old.proxy.torus);
   }
   const double after = next.energy();
   if (!(after < before)) return false;

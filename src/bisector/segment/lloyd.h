@@ -46,8 +46,8 @@ class Lloyd {
 
   // Regions and proxies for labels 0 .. count - 1. Regions of the same triangles as one of `known` take its proxy.
   Partition fit(std::vector<Index> labels, std::size_t count, const Partition* known = nullptr);
-  // The best proxy for some triangles, of which these are the moments; `old`, where there is one, if there is none of less energy than its own. `distances`,
-  // of all triangles, are read for `old` and written. `tori`: whether to try those, which are dear.
+  // The best proxy for some triangles, of which these are the moments; `old`, where there is one, if none has less energy.
+  // `distances`, of all triangles, are read for `old` and written. `tori`: whether to try those, which are dear.
   RegionProxy refit(const Index* begin, const Index* end, const SurfaceMoments& moments, const RegionProxy* old,
                     std::vector<double>& distances, bool tori = true);
   // Flooding and fitting, at most so many times, as long as the energy falls. It falls at each step: a flooding that would

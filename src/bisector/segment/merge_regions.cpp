@@ -168,7 +168,9 @@ class SurfaceMerging {
 
   double total() const { return total_; }
   void allow_tori() { tori_ = surfaces_ == SegmentSurfaces::all; }
-  double cost(Index a, Index b) const { return union_distance(a, b) - regions_[a].squared_distance - regions_[b].squared_distance; }
+  double cost(Index a, Index b) const {
+    return union_distance(a, b) - regions_[a].squared_distance - regions_[b].squared_distance;
+  }
   void merge(Index a, Index b, double cost) {
     Region &into = regions_[a], &from = regions_[b];
     into.squared_distance += from.squared_distance + cost;

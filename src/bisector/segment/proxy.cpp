@@ -71,7 +71,8 @@ bool is_invalid(const Quadric& quadric, const SurfaceMoments& moments) {
   Eigen::Matrix3d a;
   a << c[4], c[5] / 2, c[6] / 2, c[5] / 2, c[7], c[8] / 2, c[6] / 2, c[8] / 2, c[9];
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(a);
-  const Eigen::Vector3d lambda = solver.eigenvalues(), b = solver.eigenvectors().transpose() * Eigen::Vector3d(c[1], c[2], c[3]);
+  const Eigen::Vector3d lambda = solver.eigenvalues();
+  const Eigen::Vector3d b = solver.eigenvectors().transpose() * Eigen::Vector3d(c[1], c[2], c[3]);
   const double largest = lambda.cwiseAbs().maxCoeff();
   if (largest <= 1e-9 * b.norm()) return false;
 

@@ -205,7 +205,8 @@ class RegionSurface {
     if (!fit || fit->primitive.type == SurfaceType::plane_pair) return candidate.primitive;
     const Candidate better = measured(fit->primitive);
     const bool exact = better.vertices <= weight() * kExact * kExact && better.tilt <= kMuchWorse * candidate.tilt;
-    return is_sound(better) && (exact || better.energy <= kHardlyWorse * candidate.energy) ? better.primitive : candidate.primitive;
+    const bool kept = is_sound(better) && (exact || better.energy <= kHardlyWorse * candidate.energy);
+    return kept ? better.primitive : candidate.primitive;
   }
 
  private:
@@ -229,13 +230,14 @@ Primitive primitive_of(const SegmentDomain& domain, const Index* begin, const In
     const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
     if (candidate) candidates.push_back(*candidate);
   }
-  if (proxy.torus) candidates.push_back(region.measured(make_torus(proxy.centre, proxy.axis, proxy.radius, proxy.minor_radius)));
+  if (proxy.torus)
+    candidates.push_back(region.measured(make_torus(proxy.centre, proxy.axis, proxy.radius, proxy.minor_radius)));
   // The proxy, or the quadric nearest to what it covers.
   const Quadric quadric = proxy.torus ? fit_proxy(moments, surfaces).proxy.quadric : proxy.quadric;
   const Primitive start = classify(quadric, moments.centroid(), std::sqrt(moments.area()), kExact);
   candidates.push_back(region.measured(start));
-  if (const auto refined = region.best([&](const SurfaceSamples& samples) { return std::optional(refine_quadric(start, samples)); }))
-    candidates.push_back(*refined);
+  const auto refined = region.best([&](const SurfaceSamples& samples) { return std::optional(refine_quadric(start, samples)); });
+  if (refined) candidates.push_back(*refined);
 
   // What passes through all vertices and is no more tilted than others may be as far off between them as tessellation makes it.
   const double exact = kExact * kExact, weight = region.weight();

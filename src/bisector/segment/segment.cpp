@@ -73,7 +73,8 @@ Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double a
   }
   // So many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to all pairs.
   constexpr std::size_t kFewest = 200, kMost = 1000;
-  const std::size_t pieces = std::min(n, std::max({10 * options.proxies, std::clamp(n / 40, kFewest, kMost), domain.component_count}));
+  const std::size_t enough = std::max(10 * options.proxies, std::clamp(n / 40, kFewest, kMost));
+  const std::size_t pieces = std::min(n, std::max(enough, domain.component_count));
   Lloyd planar(domain, SegmentSurfaces::planes, lloyd.context());
   std::vector<Index> labels = merge_into_planes(domain, pieces, lloyd.context());
   Partition small = planar.fit(labels, 1 + *std::max_element(labels.begin(), labels.end()));
@@ -126,8 +127,9 @@ Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptio
   Clock clock;
   report(context, "start", 0);
   const bool merging = options.start == SegmentStart::merging;
+  const std::size_t at_random = options.start == SegmentStart::random ? wanted : 1;
   Partition partition = merging ? start_by_merging(lloyd, options, allowed)
-                                : start_at_random(lloyd, options.start == SegmentStart::random ? wanted : 1, options.random_seed);
+                                : start_at_random(lloyd, at_random, options.random_seed);
   seconds.start = clock.lap();
 
   report(context, "Lloyd", 0.2, partition.energy());

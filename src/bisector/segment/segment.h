@@ -24,7 +24,8 @@ enum class SegmentStart {
 
 struct SegmentOptions {
   std::size_t proxies = 0;  // regions wanted, or 0: as many as `error` takes
-  double error = 0.1;       // without `proxies`: root mean square distance to the proxies, percent of the bounding box's diagonal
+  double error = 0.1;       // without `proxies`: root mean square distance to the proxies at most, percent of the diagonal of
+                            // the vertices' bounding box
   SegmentSurfaces surfaces = SegmentSurfaces::all;
   SegmentStart start = SegmentStart::merging;
   int iterations = 30;      // Lloyd steps at most, each time
