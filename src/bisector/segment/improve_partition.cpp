@@ -339,7 +339,7 @@ void PartitionEditor::teleport(Partition& partition) {
       for (Index d = 0; d < partition.regions.size(); ++d) {
         if (d == r.region || d == r.into) continue;
         const double divided = division(partition, d).gain, gain = divided - r.cost;
-        if (divided < kLeastShare * r.cost || divided < kWorthwhile * partition.energy()) continue;
+        if (!(divided > 0) || divided < kLeastShare * r.cost || divided < kWorthwhile * partition.energy()) continue;
         if (gain > best && !refused.count({version(r.region), version(r.into), version(d)})) {
           best = gain;
           removal = &r;
