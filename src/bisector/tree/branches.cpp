@@ -4,16 +4,13 @@
 #include <cmath>
 #include <queue>
 
+#include "bisector/tree/polyline.h"
+
 namespace bisector {
 namespace {
 
 constexpr double kSimilar = 0.85;  // of the longest path's length: direction and radius decide
 constexpr double kReach = 3;      // radii that directions at a fork look ahead and back
-
-Vec3 unit(const Vec3& v) {
-  const double length = norm(v);
-  return length > 0 ? (1 / length) * v : Vec3{};
-}
 
 class Forks {
  public:

@@ -1,4 +1,4 @@
-// Distances along and from polylines.
+// Distances along and from polylines, and what else the fits of branches share.
 #pragma once
 
 #include <algorithm>
@@ -47,6 +47,20 @@ inline double polyline_length(const std::vector<Vec3>& line) {
 // Linear interpolation of values at a polyline's points.
 inline double value_at(const std::vector<double>& values, const PolylineFoot& foot) {
   return (1 - foot.t) * values[foot.segment] + foot.t * values[foot.segment + 1];
+}
+
+// The direction of a vector; zero of the zero vector.
+inline Vec3 unit(const Vec3& v) {
+  const double length = norm(v);
+  return length > 0 ? (1 / length) * v : Vec3{};
+}
+
+// The value that a share of them is not above; 0 if there are none.
+inline double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
 // `count` points (at least 2), evenly along the line.

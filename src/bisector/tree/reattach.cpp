@@ -20,11 +20,6 @@ constexpr double kTangent = 6;          // length in radii that tells a directio
 constexpr double kSwapScore = 0.5;      // by which a child goes on straighter and thicker than its parent
 constexpr double kSwapLength = 0.6;     // of what it replaces
 
-Vec3 unit(const Vec3& v) {
-  const double length = norm(v);
-  return length > 0 ? (1 / length) * v : Vec3{};
-}
-
 double median(std::vector<double>::const_iterator begin, std::vector<double>::const_iterator end) {
   std::vector<double> values(begin, end);
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

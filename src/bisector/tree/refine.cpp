@@ -28,23 +28,17 @@ constexpr double kTwinShare = 0.6;          // of a branch's points on another's
 constexpr std::size_t kTwinSamples = 64;
 constexpr double kLeastRadius = 0.3;       // of the noisy surface's: what noise can feign at most
 
-Vec3 unit(const Vec3& v) {
-  const double length = norm(v);
-  return length > 0 ? (1 / length) * v : Vec3{};
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 class Refinement {
  public:
   Refinement(const std::vector<Vec3>& points, const Csr<Index>& neighbours, std::vector<Limb> limbs,
              const RefineOptions& options)
-      : points_(points), neighbours_(neighbours), limbs_(std::move(limbs)), options_(options), merged_(limbs_.size(), 0), support_(limbs_.size()), deviation_(limbs_.size(), 0) {}
+      : points_(points),
+        neighbours_(neighbours),
+        limbs_(std::move(limbs)),
+        options_(options),
+        merged_(limbs_.size(), 0),
+        support_(limbs_.size()),
+        deviation_(limbs_.size(), 0) {}
 
   void fit_all() {
     parallel_each(limbs_.size(), [&](std::size_t b) { fit(b); }, 1);

@@ -31,18 +31,6 @@ constexpr double kLeastCentring = 0.001, kMostCentring = 1;
 constexpr double kLargestRing = 1.9, kLargestCloud = 1.15;
 constexpr double kRing = 0.2, kCloud = 0.35;  // rms distance from the surface, in the spread
 
-Vec3 unit(const Vec3& v) {
-  const double length = norm(v);
-  return length > 0 ? (1 / length) * v : Vec3{};
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 // Sums of squares of linear forms of few unknowns, as the normal equations of least squares.
 class NormalEquations {
  public:
