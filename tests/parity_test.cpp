@@ -279,7 +279,11 @@ TEST_P(Diagrams, AreTheCpus) {
 std::vector<DiagramCase> diagram_cases() {
   std::vector<DiagramCase> cases;
   for (const Model& model : models())
-    for (const Setup& setup : setups()) cases.push_back({setup, model});
+    for (const Setup& setup : setups()) {
+      // The largest takes a minute of lavapipe for each source; both are tried on all others.
+      if (model.name == "igea.ply" && setup.source == NeighbourSource::delaunay) continue;
+      cases.push_back({setup, model});
+    }
   return cases;
 }
 
