@@ -384,9 +384,9 @@ CLI::App* add_segment(CLI::App& program, SegmentCommand& command) {
                   "all (tori too; default)")
       ->type_name("WORD")->check(one_of({"planes", "quadrics", "all"}))->group("Regions");
   app->add_option("--start", command.start,
-                  "merging (of small pieces, the cheapest first; default) or\n"
-                  "insertion (of regions at random triangles and where the\n"
-                  "error is largest)")
+                  "merging (of small pieces, the cheapest first; default),\n"
+                  "insertion (of one region after the other where the error\n"
+                  "is largest) or random (all regions at random triangles)")
       ->type_name("WORD")->check(one_of({"merging", "insertion", "random"}))->group("Regions");
   app->add_option("--random-seed", options.random_seed, "another number, another random start; default 1")
       ->type_name("N")->check(whole_number(0, UINT64_MAX))->group("Regions");

@@ -31,7 +31,6 @@ struct Proxy {
     const double r = norm(radial);
     return r > 0 ? v - (radius / r) * radial : Vec3{};
   }
-
 };
 
 // The thesis' d(t, P), Eq. 2.3: from squared approximate distances (2.2.2) of the corners and the barycentre, times the area;

@@ -197,9 +197,7 @@ class RegionSurface {
 
   // Fitted to all vertices, if that is no worse.
   Primitive refined(const Candidate& candidate) const {
-    const SurfaceType type = candidate.primitive.type;
-    const bool special = type == SurfaceType::plane || type == SurfaceType::sphere || type == SurfaceType::cylinder ||
-                         type == SurfaceType::cone || type == SurfaceType::torus;
+    const bool special = free_parameters(candidate.primitive.type) < kQuadricParameters;
     const auto fit = special ? refine_primitive(candidate.primitive, vertices_)
                              : std::optional(refine_quadric(candidate.primitive, vertices_));
     if (!fit || fit->primitive.type == SurfaceType::plane_pair) return candidate.primitive;
@@ -242,12 +240,13 @@ Primitive primitive_of(const SegmentDomain& domain, const Index* begin, const In
   // What passes through all vertices and is no more tilted than others may be as far off between them as tessellation makes it.
   const double exact = kExact * kExact, weight = region.weight();
   const auto through_vertices = [&](const Candidate& c) { return c.vertices <= weight * exact; };
-  if (std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) { return RegionSurface::is_sound(c); }))
-    std::erase_if(candidates, [&](const Candidate& c) { return !RegionSurface::is_sound(c); });
+  // The plane is left by the first of these, and something by the second.
   std::erase_if(candidates, [&](const Candidate& c) {
     const bool general = free_parameters(c.primitive.type) == kQuadricParameters;
     return c.primitive.type == SurfaceType::plane_pair || (general && is_invalid(c.primitive.quadric, moments));
   });
+  if (std::any_of(candidates.begin(), candidates.end(), RegionSurface::is_sound))
+    std::erase_if(candidates, [](const Candidate& c) { return !RegionSurface::is_sound(c); });
   Candidate least{{}, kInfinity, kInfinity, kInfinity, 1};
   for (const Candidate& c : candidates) {
     least.energy = std::min(least.energy, c.energy);

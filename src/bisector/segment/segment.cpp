@@ -58,34 +58,35 @@ void check_count(const SegmentDomain& domain, std::size_t proxies) {
                             proxies, domain.component_count));
 }
 
-// Squared distances in all that SegmentOptions::error allows, in the unit-sized model.
-double allowed_energy(const SegmentDomain& domain, double percent) {
-  const double rms = percent / 100 * bounding_box(domain.vertices).diagonal();
-  return rms * rms * domain.area;
+// The root mean square distance that SegmentOptions::error allows, in the unit-sized model.
+double allowed_rms(const SegmentDomain& domain, double percent) {
+  return percent / 100 * bounding_box(domain.vertices).diagonal();
+}
+
+Partition fit_all(Lloyd& lloyd, std::vector<Index> labels) {
+  const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
+  return lloyd.fit(std::move(labels), count);
 }
 
 Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double allowed) {
   const SegmentDomain& domain = lloyd.domain();
   const std::size_t n = domain.triangles.size();
-  if (options.surfaces == SegmentSurfaces::planes && options.proxies > 0) {
-    std::vector<Index> labels = merge_into_planes(domain, options.proxies, lloyd.context());
-    return lloyd.fit(std::move(labels), 1 + *std::max_element(labels.begin(), labels.end()));
-  }
+  if (options.surfaces == SegmentSurfaces::planes && options.proxies > 0)
+    return fit_all(lloyd, merge_into_planes(domain, options.proxies, lloyd.context()));
   // So many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to all pairs.
   constexpr std::size_t kFewest = 200, kMost = 1000;
   const std::size_t enough = std::max(10 * options.proxies, std::clamp(n / 40, kFewest, kMost));
   const std::size_t pieces = std::min(n, std::max(enough, domain.component_count));
   Lloyd planar(domain, SegmentSurfaces::planes, lloyd.context());
-  std::vector<Index> labels = merge_into_planes(domain, pieces, lloyd.context());
-  Partition small = planar.fit(labels, 1 + *std::max_element(labels.begin(), labels.end()));
+  Partition small = fit_all(planar, merge_into_planes(domain, pieces, lloyd.context()));
   constexpr int kPlanarSteps = 4;
   planar.iterate(small, std::min(kPlanarSteps, options.iterations));
   lloyd.counts.evaluations += planar.counts.evaluations;
   lloyd.counts.iterations += planar.counts.iterations;
   // Some more than wanted: which of them can be spared shows better after Lloyd's iteration.
   const std::size_t count = options.proxies > 0 ? std::min(options.proxies + options.proxies / 5 + 1, pieces) : 0;
-  labels = merge_regions(domain, std::move(small.labels), {count, allowed, options.surfaces}, lloyd.context());
-  return lloyd.fit(labels, 1 + *std::max_element(labels.begin(), labels.end()));
+  const RegionMerging merging{count, allowed, options.surfaces};
+  return fit_all(lloyd, merge_regions(domain, std::move(small.labels), merging, lloyd.context()));
 }
 
 // Around random triangles, at least one of each component, the others all over the mesh.
@@ -122,7 +123,8 @@ void report(const Context& context, const char* phase, double fraction, double e
 Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& options, SegmentSeconds& seconds) {
   const Context& context = lloyd.context();
   const std::size_t wanted = options.proxies;
-  const double allowed = wanted > 0 ? 0 : allowed_energy(lloyd.domain(), options.error);
+  const double most_rms = wanted > 0 ? 0 : allowed_rms(lloyd.domain(), options.error);
+  const double allowed = most_rms * most_rms * lloyd.domain().area;
   const auto enough = [&](const Partition& p) { return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed; };
   Clock clock;
   report(context, "start", 0);
@@ -316,7 +318,7 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   check_count(domain, options.proxies);
   // Types and smooth borders cost some of the error; where they take more than was left, less is aimed at.
   constexpr int kAttempts = 4;
-  const double most = options.error / 100 * domain.scale * bounding_box(domain.vertices).diagonal();
+  const double most = domain.scale * allowed_rms(domain, options.error);
   SegmentOptions aimed = options;
   SegmentResult result;
   for (int k = 0; k < kAttempts; ++k) {
@@ -324,6 +326,9 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
     if (options.proxies > 0 || result.rms <= most) break;
     aimed.error *= 0.97 * most / result.rms;
   }
+  if (options.proxies == 0 && result.rms > most)
+    context.warn(fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
+                             "a number of proxies", result.rms, most));
   result.seconds.total = clock.lap();
   return result;
 }
