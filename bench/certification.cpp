@@ -16,9 +16,9 @@
 #include <utility>
 #include <vector>
 
-#include "bisector/core/error.h"
-#include "bisector/cvt/cpu_backend.h"
-#include "bisector/mesh/io.h"
+#include "bisector/error.h"
+#include "backend/cpu_backend.h"
+#include "io/mesh_io.h"
 #include "common.h"
 
 namespace {

@@ -12,14 +12,14 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/error.h"
-#include "bisector/core/parallel.h"
-#include "bisector/core/random.h"
-#include "bisector/cvt/solid_backend.h"
-#include "bisector/mesh/io.h"
-#include "bisector/mesh/tet_io.h"
-#include "bisector/tetmesh/check_surface.h"
-#include "bisector/tetmesh/tetgen.h"
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "compute/compute.h"
+#include "io/mesh_io.h"
+#include "io/tet_io.h"
+#include "tetmesh/check_surface.h"
+#include "tetmesh/tetgen.h"
 #include "common.h"
 #include "delaunay_time.h"
 

@@ -9,9 +9,9 @@
 #include <map>
 #include <thread>
 
-#include "bisector/cvt/cpu_backend.h"
-#include "bisector/mesh/sampling.h"
-#include "host/vulkan_backend.h"
+#include "backend/cpu_backend.h"
+#include "mesh/sampling.h"
+#include "host/passes/vulkan_backend.h"
 
 namespace bisector::bench {
 

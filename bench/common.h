@@ -8,8 +8,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "bisector/core/types.h"
-#include "bisector/cvt/compute.h"
+#include "core/geometry.h"
+#include "compute/compute.h"
 
 namespace bisector::bench {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "bisector/core/types.h"
+#include "core/geometry.h"
 
 namespace bisector::bench {
 

@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/error.h"
-#include "bisector/core/parallel.h"
-#include "bisector/mesh/io.h"
-#include "bisector/cvt/backend.h"
-#include "bisector/voronoi/restricted.h"
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "io/mesh_io.h"
+#include "backend/backend.h"
+#include "voronoi/restricted.h"
 #include "common.h"
 #include "delaunay_time.h"
 

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/error.h"
-#include "bisector/core/parallel.h"
-#include "bisector/mesh/distance.h"
-#include "bisector/mesh/io.h"
-#include "bisector/mesh/quality.h"
-#include "bisector/remesh/remesh.h"
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "mesh/distance.h"
+#include "io/mesh_io.h"
+#include "mesh/quality.h"
+#include "remesh/remesh.h"
 #include "common.h"
 #include "delaunay_time.h"
 

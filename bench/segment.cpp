@@ -13,15 +13,15 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/error.h"
-#include "bisector/core/parallel.h"
-#include "bisector/core/random.h"
-#include "bisector/mesh/distance.h"
-#include "bisector/mesh/io.h"
-#include "bisector/segment/proxy.h"
-#include "bisector/segment/quadric_fit.h"
-#include "bisector/segment/segment.h"
-#include "bisector/segment/segment_domain.h"
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "mesh/distance.h"
+#include "io/mesh_io.h"
+#include "segment/proxy.h"
+#include "segment/quadric_fit.h"
+#include "segment/segment.h"
+#include "segment/segment_domain.h"
 #include "common.h"
 #include "vsa.h"
 

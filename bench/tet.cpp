@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/error.h"
-#include "bisector/core/parallel.h"
-#include "bisector/mesh/distance.h"
-#include "bisector/mesh/io.h"
-#include "bisector/mesh/quality.h"
-#include "bisector/mesh/tet_quality.h"
-#include "bisector/mesh/tet_topology.h"
-#include "bisector/remesh/remesh.h"
-#include "bisector/tetmesh/check_surface.h"
-#include "bisector/tetmesh/tetmesh.h"
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "mesh/distance.h"
+#include "io/mesh_io.h"
+#include "mesh/quality.h"
+#include "mesh/tet_quality.h"
+#include "mesh/tet_topology.h"
+#include "remesh/remesh.h"
+#include "tetmesh/check_surface.h"
+#include "tetmesh/tetmesh.h"
 #include "common.h"
 #include "mesh3.h"
 #if BISECTOR_TETGEN

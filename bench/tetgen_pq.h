@@ -1,7 +1,7 @@
 // The yardstick for tetrahedral meshes that keep their boundary's vertices: TetGen's refinement.
 #pragma once
 
-#include "bisector/core/types.h"
+#include "core/geometry.h"
 
 namespace bisector::bench {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/parallel.h"
-#include "bisector/mesh/io.h"
-#include "bisector/tree/tree.h"
+#include "core/parallel.h"
+#include "io/mesh_io.h"
+#include "tree/tree.h"
 
 namespace {
 

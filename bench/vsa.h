@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "bisector/core/types.h"
+#include "core/geometry.h"
 
 namespace bisector::bench {
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/types.h"
-#include "bisector/mesh/io.h"
+#include "core/geometry.h"
+#include "io/mesh_io.h"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <bit>
 #include <numeric>
 
-#include "bisector/core/random.h"
+#include "core/random.h"
 
 namespace bisector::cli {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "bisector/mesh/io.h"
-#include "bisector/voronoi/restricted.h"
+#include "io/mesh_io.h"
+#include "voronoi/restricted.h"
 
 namespace bisector::cli {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "bisector/core/parallel.h"
-#include "bisector/cvt/device_check.h"
+#include "core/parallel.h"
+#include "check/device_check.h"
 #include "commands.h"
 #include "console.h"
 #include "outputs.h"

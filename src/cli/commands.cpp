@@ -9,14 +9,14 @@
 #include <memory>
 #include <utility>
 
-#include "bisector/core/parallel.h"
-#include "bisector/cvt/compute.h"
-#include "bisector/mesh/io.h"
-#include "bisector/mesh/preview.h"
-#include "bisector/mesh/sampling.h"
-#include "bisector/mesh/tet_io.h"
-#include "bisector/voronoi/dual.h"
-#include "bisector/voronoi/tiling.h"
+#include "core/parallel.h"
+#include "compute/compute.h"
+#include "io/mesh_io.h"
+#include "preview/preview.h"
+#include "mesh/sampling.h"
+#include "io/tet_io.h"
+#include "voronoi/dual.h"
+#include "voronoi/tiling.h"
 #include "cells.h"
 #include "common.h"
 #include "console.h"

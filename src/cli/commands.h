@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <string>
 
-#include "bisector/remesh/remesh.h"
-#include "bisector/segment/segment.h"
-#include "bisector/tetmesh/tetmesh.h"
-#include "bisector/tree/tree.h"
+#include "remesh/remesh.h"
+#include "segment/segment.h"
+#include "tetmesh/tetmesh.h"
+#include "tree/tree.h"
 
 namespace bisector::cli {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "bisector/mesh/io.h"
+#include "io/mesh_io.h"
 
 namespace bisector::cli {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bisector/cvt/compute.h"
-#include "bisector/remesh/remesh.h"
+#include "compute/compute.h"
+#include "remesh/remesh.h"
 #include "commands.h"
 #include "console.h"
 #include "report.h"

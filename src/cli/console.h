@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bisector/core/context.h"
+#include "bisector/context.h"
 
 namespace bisector::cli {
 

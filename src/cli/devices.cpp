@@ -2,9 +2,9 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
-#include "bisector/core/parallel.h"
-#include "bisector/core/processor.h"
-#include "bisector/cvt/compute.h"
+#include "core/parallel.h"
+#include "core/processor.h"
+#include "compute/compute.h"
 #include "commands.h"
 #include "console.h"
 #include "outputs.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/error.h"
+#include "bisector/error.h"
 #include "commands.h"
 #include "console.h"
 

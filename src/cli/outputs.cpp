@@ -10,7 +10,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "bisector/core/error.h"
+#include "bisector/error.h"
 
 namespace bisector::cli {
 namespace {

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <utility>
 
-#include "bisector/core/error.h"
-#include "bisector/mesh/io.h"
+#include "bisector/error.h"
+#include "io/mesh_io.h"
 
 namespace bisector::cli {
 namespace {

@@ -5,12 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "bisector/core/types.h"
-#include "bisector/mesh/distance.h"
-#include "bisector/mesh/quality.h"
-#include "bisector/mesh/tet_quality.h"
-#include "bisector/mesh/tet_topology.h"
-#include "bisector/remesh/remesh.h"
+#include "core/geometry.h"
+#include "mesh/distance.h"
+#include "mesh/quality.h"
+#include "mesh/tet_quality.h"
+#include "mesh/tet_topology.h"
+#include "remesh/remesh.h"
 
 namespace bisector::cli {
 

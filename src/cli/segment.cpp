@@ -7,11 +7,11 @@
 #include <numeric>
 #include <utility>
 
-#include "bisector/core/parallel.h"
-#include "bisector/mesh/io.h"
-#include "bisector/mesh/preview.h"
-#include "bisector/segment/dual_graph.h"
-#include "bisector/segment/segment.h"
+#include "core/parallel.h"
+#include "io/mesh_io.h"
+#include "preview/preview.h"
+#include "segment/dual_graph.h"
+#include "segment/segment.h"
 #include "cells.h"
 #include "commands.h"
 #include "common.h"

@@ -6,14 +6,14 @@
 #include <system_error>
 #include <utility>
 
-#include "bisector/core/parallel.h"
-#include "bisector/mesh/distance.h"
-#include "bisector/mesh/io.h"
-#include "bisector/mesh/tet_preview.h"
-#include "bisector/mesh/tet_io.h"
-#include "bisector/mesh/tet_quality.h"
-#include "bisector/mesh/tet_topology.h"
-#include "bisector/tetmesh/tetmesh.h"
+#include "core/parallel.h"
+#include "mesh/distance.h"
+#include "io/mesh_io.h"
+#include "preview/tet_preview.h"
+#include "io/tet_io.h"
+#include "mesh/tet_quality.h"
+#include "mesh/tet_topology.h"
+#include "tetmesh/tetmesh.h"
 #include "commands.h"
 #include "common.h"
 #include "console.h"

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "bisector/core/parallel.h"
-#include "bisector/mesh/io.h"
-#include "bisector/tree/coverage.h"
-#include "bisector/tree/tree.h"
-#include "bisector/tree/tree_io.h"
+#include "core/parallel.h"
+#include "io/mesh_io.h"
+#include "tree/coverage.h"
+#include "tree/tree.h"
+#include "tree/tree_io.h"
 #include "commands.h"
 #include "common.h"
 #include "console.h"

@@ -1,0 +1,33 @@
+#include "host/device/buffer.h"
+
+#include <algorithm>
+
+#include "host/device/buffer_impl.h"
+#include "host/device/device_impl.h"
+
+namespace bisector::host {
+
+Buffer::Buffer(Device& device) : impl_(new Impl{device.impl(), {}}) {}
+Buffer::~Buffer() = default;
+Buffer::Buffer(Buffer&&) noexcept = default;
+Buffer& Buffer::operator=(Buffer&&) noexcept = default;
+
+std::size_t Buffer::size() const { return impl_->allocation.bytes; }
+
+void Buffer::reserve(std::size_t bytes) {
+  constexpr std::size_t kUnit = 16;
+  const std::size_t least = std::max(kUnit, (bytes + kUnit - 1) / kUnit * kUnit);
+  if (least <= size()) return;
+  const Candidate& about = impl_->device.about;
+  // Both limits are rounded down so that what is asked for stays a multiple of the unit.
+  const std::size_t most = std::min<std::size_t>(about.limits.storage_range, about.allocation) / kUnit * kUnit;
+  if (least > most) {
+    throw DeviceError(about.description.name + ": a buffer of " + bytes_text(bytes) + " is more than the device can bind (" +
+                      bytes_text(most) + "); use --device cpu");
+  }
+  const std::size_t grown = std::clamp((size() + size() / 2) / kUnit * kUnit, least, most);
+  impl_->allocation = {};
+  impl_->allocation = allocate_local(impl_->device, grown);
+}
+
+}  // namespace bisector::host

@@ -1,0 +1,234 @@
+#include "host/device/commands.h"
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include "host/device/buffer_impl.h"
+#include "host/device/descriptors.h"
+#include "host/device/device_impl.h"
+#include "host/device/hazards.h"
+#include "host/device/staging.h"
+#include "host/device/timestamps.h"
+
+namespace bisector::host {
+namespace {
+
+using Stage = vk::PipelineStageFlagBits;
+using AccessBit = vk::AccessFlagBits;
+
+constexpr std::uint64_t kTimeout = 600'000'000'000;  // nanoseconds
+
+void check_range(const Buffer& buffer, std::size_t offset, std::size_t bytes) {
+  if (offset > buffer.size() || bytes > buffer.size() - offset) throw std::logic_error("a transfer is out of its buffer");
+}
+
+}  // namespace
+
+struct Commands::Impl {
+  explicit Impl(Device::Impl& owner)
+      : device(owner),
+        pool(device.attempt("vkCreateCommandPool",
+                            [&] {
+                              return vk::raii::CommandPool(device.device, {{}, device.about.queue_family});
+                            })),
+        commands(device.attempt("vkAllocateCommandBuffers",
+                                [&] {
+                                  const vk::CommandBufferAllocateInfo info(*pool, vk::CommandBufferLevel::ePrimary, 1);
+                                  return std::move(vk::raii::CommandBuffers(device.device, info).front());
+                                })),
+        fence(device.attempt("vkCreateFence", [&] { return vk::raii::Fence(device.device, vk::FenceCreateInfo()); })),
+        staging(device),
+        descriptors(device),
+        timestamps(device) {}
+
+  struct Readback {
+    const std::byte* from;
+    void* to;
+    std::size_t bytes;
+  };
+
+  Device::Impl& device;
+  vk::raii::CommandPool pool;
+  vk::raii::CommandBuffer commands;
+  vk::raii::Fence fence;
+  Staging staging;
+  Descriptors descriptors;
+  Timestamps timestamps;
+  Hazards hazards;
+  std::vector<Readback> readbacks;
+  Phase phase = Phase::transfer;
+  bool recording = false;
+
+  void use(const Buffer& buffer, vk::PipelineStageFlags stages, vk::AccessFlags reads, vk::AccessFlags writes) {
+    if (!buffer.size()) throw std::logic_error("a buffer is used that has no memory");
+    hazards.use(*buffer.impl().allocation.buffer, stages, reads, writes);
+  }
+
+  // Before each command: starts the recording if there is none, and puts the barrier for the uses.
+  void prepare() {
+    if (!recording) {
+      device.attempt("vkBeginCommandBuffer", [&] {
+        commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
+      });
+      recording = true;
+    }
+    timestamps.mark(commands, phase);
+    hazards.record_barrier(commands);
+  }
+
+  // Staging memory; what was recorded is run first if there is none left.
+  Staging::Span stage(std::size_t bytes) {
+    Staging::Span span = staging.take(bytes);
+    if (!span.bytes) {
+      submit();
+      span = staging.take(bytes);
+    }
+    return span;
+  }
+
+  void submit() {
+    if (!recording) return;
+    if (!readbacks.empty()) {
+      commands.pipelineBarrier(Stage::eTransfer, Stage::eHost, {},
+                               vk::MemoryBarrier(AccessBit::eTransferWrite, AccessBit::eHostRead), {}, {});
+    }
+    timestamps.finish(commands);
+    device.attempt("vkEndCommandBuffer", [&] { commands.end(); });
+    recording = false;
+    try {
+      device.attempt("vkQueueSubmit",
+                     [&] { device.queue.submit(vk::SubmitInfo({}, {}, *commands), *fence); });
+      const vk::Result result = device.attempt(
+          "vkWaitForFences", [&] { return device.device.waitForFences(*fence, true, kTimeout); });
+      if (result == vk::Result::eTimeout) {
+        throw DeviceError(device.about.description.name + ": no answer for 10 minutes; use --device cpu");
+      }
+    } catch (const DeviceError&) {
+      settle();
+      throw;
+    }
+    timestamps.collect();
+    for (const Readback& readback : readbacks) std::memcpy(readback.to, readback.from, readback.bytes);
+    readbacks.clear();
+    hazards.reset();
+    descriptors.reset();
+    staging.reset();
+    device.attempt("vkResetFences", [&] { device.device.resetFences(*fence); });
+    device.attempt("vkResetCommandPool", [&] { pool.reset(); });
+  }
+
+  // After a failure the device may still be at work with what is about to be destroyed.
+  void settle() const noexcept {
+    try {
+      device.device.waitIdle();
+    } catch (const vk::SystemError&) {
+      // It was lost: nothing runs any more.
+    }
+  }
+
+  const Pipeline& bind(const Kernel& kernel, std::initializer_list<Binding> bindings, const void* push,
+                       std::size_t push_bytes) {
+    const Pipeline& pipeline = device.pipelines->get(kernel, bindings.size(), push_bytes);
+    std::vector<vk::DescriptorBufferInfo> buffers;
+    for (const Binding& binding : bindings) {
+      const vk::AccessFlags reads = binding.access == Access::write ? vk::AccessFlags() : AccessBit::eShaderRead;
+      const vk::AccessFlags writes = binding.access == Access::read ? vk::AccessFlags() : AccessBit::eShaderWrite;
+      use(*binding.buffer, Stage::eComputeShader, reads, writes);
+      buffers.emplace_back(*binding.buffer->impl().allocation.buffer, 0, binding.buffer->size());
+    }
+    prepare();
+    const vk::DescriptorSet set = descriptors.bind(*pipeline.set_layout, buffers);
+    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, set, {});
+    const vk::ArrayProxy<const std::byte> values(static_cast<std::uint32_t>(push_bytes),
+                                                 static_cast<const std::byte*>(push));
+    commands.pushConstants<std::byte>(*pipeline.layout, vk::ShaderStageFlagBits::eCompute, 0, values);
+    return pipeline;
+  }
+};
+
+Commands::Commands(Device& device) : impl_(std::make_unique<Impl>(device.impl())) {}
+Commands::~Commands() = default;
+
+void Commands::phase(Phase phase) { impl_->phase = phase; }
+
+void Commands::upload(const Buffer& buffer, std::size_t offset, const void* data, std::size_t bytes) {
+  check_range(buffer, offset, bytes);
+  const std::byte* from = static_cast<const std::byte*>(data);
+  while (bytes) {
+    const Staging::Span span = impl_->stage(bytes);
+    std::memcpy(span.mapped, from, span.bytes);
+    impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+    impl_->prepare();
+    impl_->commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer,
+                               vk::BufferCopy(span.offset, offset, span.bytes));
+    from += span.bytes;
+    offset += span.bytes;
+    bytes -= span.bytes;
+  }
+}
+
+void Commands::download(const Buffer& buffer, std::size_t offset, void* to, std::size_t bytes) {
+  check_range(buffer, offset, bytes);
+  std::byte* target = static_cast<std::byte*>(to);
+  while (bytes) {
+    const Staging::Span span = impl_->stage(bytes);
+    impl_->use(buffer, Stage::eTransfer, AccessBit::eTransferRead, {});
+    impl_->prepare();
+    impl_->commands.copyBuffer(*buffer.impl().allocation.buffer, span.buffer,
+                               vk::BufferCopy(offset, span.offset, span.bytes));
+    impl_->readbacks.push_back({span.mapped, target, span.bytes});
+    target += span.bytes;
+    offset += span.bytes;
+    bytes -= span.bytes;
+  }
+}
+
+void Commands::copy(const Buffer& from, std::size_t from_offset, const Buffer& to, std::size_t to_offset,
+                    std::size_t bytes) {
+  check_range(from, from_offset, bytes);
+  check_range(to, to_offset, bytes);
+  if (!bytes) return;
+  impl_->use(from, Stage::eTransfer, AccessBit::eTransferRead, {});
+  impl_->use(to, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+  impl_->prepare();
+  impl_->commands.copyBuffer(*from.impl().allocation.buffer, *to.impl().allocation.buffer,
+                             vk::BufferCopy(from_offset, to_offset, bytes));
+}
+
+void Commands::fill(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::uint32_t word) {
+  check_range(buffer, offset, bytes);
+  if (offset % 4 || bytes % 4) throw std::logic_error("fill is by whole words");
+  if (!bytes) return;
+  impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+  impl_->prepare();
+  impl_->commands.fillBuffer(*buffer.impl().allocation.buffer, offset, bytes, word);
+}
+
+void Commands::dispatch(const Kernel& kernel, std::initializer_list<Binding> bindings, const void* push,
+                        std::size_t push_bytes, std::size_t items) {
+  if (!items) return;
+  const std::size_t groups = (items + kGroupSize - 1) / kGroupSize;
+  const std::size_t most = impl_->device.about.limits.groups;
+  const std::size_t x = std::min(groups, most);
+  const std::size_t y = (groups + x - 1) / x;
+  if (y > most) throw std::logic_error("kernel " + kernel.name + " has too many items");
+  impl_->bind(kernel, bindings, push, push_bytes);
+  impl_->commands.dispatch(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), 1);
+}
+
+void Commands::dispatch_indirect(const Kernel& kernel, std::initializer_list<Binding> bindings, const void* push,
+                                 std::size_t push_bytes, const Buffer& arguments, std::size_t offset) {
+  check_range(arguments, offset, 12);
+  impl_->use(arguments, Stage::eDrawIndirect, AccessBit::eIndirectCommandRead, {});
+  impl_->bind(kernel, bindings, push, push_bytes);
+  impl_->commands.dispatchIndirect(*arguments.impl().allocation.buffer, offset);
+}
+
+void Commands::run() { impl_->submit(); }
+
+std::array<double, kPhases> Commands::take_seconds() { return impl_->timestamps.take(); }
+
+}  // namespace bisector::host

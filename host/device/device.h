@@ -1,0 +1,45 @@
+// A Vulkan 1.2 device, opened through a loader that is found at run time. No Vulkan types are visible outside host/*.cpp.
+//
+// Environment variables: BISECTOR_CACHE names a file or folder to keep compiled pipelines in (nothing is kept without it);
+// BISECTOR_VULKAN_VALIDATION=1 or 2 enables the validation layers; BISECTOR_VULKAN_LOADER names another loader than
+// libvulkan.so.1.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bisector/error.h"
+#include "bisector/device.h"
+
+namespace bisector::host {
+
+struct DeviceLimits {
+  std::size_t storage_range = 0;      // bytes of one storage buffer binding
+  std::size_t storage_alignment = 0;  // of a binding's offset
+  std::uint32_t groups = 0;           // workgroups in one dimension
+};
+
+// One queue of one device, with its pipelines (made on demand and kept) and pools. Not to be shared between threads.
+// Everything that may fail throws DeviceError with one line; after that the object is only good for destruction.
+class Device {
+ public:
+  // `request` is "vulkan", "vulkan:INDEX" or "vulkan:UUID"; throws Error if it is none of these, and DeviceError that says which
+  // devices there are.
+  static std::unique_ptr<Device> open(const std::string& request);
+  ~Device();
+
+  const DeviceDescription& description() const;
+  const DeviceLimits& limits() const;
+
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  explicit Device(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace bisector::host

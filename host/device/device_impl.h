@@ -1,0 +1,37 @@
+// What a Device consists of.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "host/device/attempt.h"
+#include "host/device/candidates.h"
+#include "host/device/device.h"
+#include "host/device/instance.h"
+#include "host/device/pipelines.h"
+
+namespace bisector::host {
+
+struct Device::Impl {
+  // Throws DeviceError.
+  Impl(std::shared_ptr<const Instance> instance, const Candidate& candidate);
+
+  // A device that has gone through the self-tests: description().rejected says if it failed. Throws DeviceError.
+  static std::unique_ptr<Device> make(std::shared_ptr<const Instance> instance, const Candidate& candidate);
+
+  // One fallible call.
+  template <class Function>
+  decltype(auto) attempt(std::string_view call, Function&& function) const {
+    return host::attempt(about.description.name, call, std::forward<Function>(function));
+  }
+
+  std::shared_ptr<const Instance> instance;
+  Candidate about;
+  vk::PhysicalDeviceMemoryProperties memory;
+  vk::raii::Device device;
+  vk::raii::Queue queue;
+  std::optional<Pipelines> pipelines;
+};
+
+}  // namespace bisector::host

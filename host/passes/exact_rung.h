@@ -1,0 +1,39 @@
+// The last rung: what a device could not certify, in exact arithmetic on the CPU.
+#pragma once
+
+#include <vector>
+
+#include "core/parallel.h"
+#include "voronoi/neighbours.h"
+
+namespace bisector::host {
+
+class ExactRung {
+ public:
+  // For new seeds. Lists come from `neighbours` if given, else they are grown on demand from a few times `spacing`.
+  void begin(const SortedSeeds& seeds, const Neighbours* neighbours, double spacing);
+  // The slots that own the points.
+  std::vector<Index> owners(const std::vector<Vec3>& points);
+  // Neighbours that can answer Neighbours::nearest_to().
+  const Neighbours& neighbours();
+  // Calls visit(k, clipper) for k < count, with a clipper (voronoi/clip.h, clip_tet.h) that knows the seeds, in parallel.
+  template <class Clipper, class Visit>
+  void for_each(std::size_t count, const Visit& visit, std::size_t chunk = 64) {
+    const Neighbours& near = neighbours();
+    parallel_chunks(count, chunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+      Clipper clipper;
+      if constexpr (requires { clipper.reset(*seeds_, near); }) clipper.reset(*seeds_, near);
+      else clipper.reset(*seeds_);
+      for (std::size_t k = begin; k < end; ++k) visit(k, clipper);
+    });
+  }
+
+ private:
+  const SortedSeeds* seeds_ = nullptr;
+  const Neighbours* given_ = nullptr;
+  Neighbours own_;
+  double spacing_ = 0;
+  bool built_ = false;
+};
+
+}  // namespace bisector::host

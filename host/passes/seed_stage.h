@@ -1,0 +1,75 @@
+// What an evaluation on a device starts with, whatever its domain: the seeds on the device in a spatial order, and lists of their
+// neighbours.
+#pragma once
+
+#include <memory>
+
+#include "backend/backend.h"
+#include "host/passes/counters.h"
+#include "host/passes/exact_rung.h"
+#include "host/passes/neighbour_pass.h"
+#include "host/passes/scan.h"
+#include "host/passes/seeds.h"
+
+namespace bisector::host {
+
+// The precision that a backend computes in, and whether single precision may hand work to the double kernels.
+struct Precisions {
+  bool is_double, double_rung;
+};
+// Throws DeviceError if double precision is asked for and the device lacks it.
+Precisions choose_precisions(const Device& device, Precision asked, bool double_rung);
+
+class SeedStage {
+ public:
+  // `box` is the domain's; `in_solid`: seeds lie in space, not on a surface.
+  SeedStage(std::unique_ptr<Device> device, const Precisions& precisions, NeighbourSource source, double scale,
+            const Box& box, bool in_solid);
+
+  // Whether all seeds have coordinates that single precision can square.
+  bool within_reach(const std::vector<Vec3>& seeds) const;
+  // Takes new seeds; those as many as the last ones keep their slots, whose order in space is good enough.
+  void begin(const std::vector<Vec3>& seeds);
+  // Records the upload, and the search for lists if they are not from the host.
+  void record();
+  // Whether slots mean other seeds than in the last evaluation.
+  bool sorted_anew() const { return !followed_; }
+  // To be called once what was recorded has run. If seeds that were followed have met, takes them anew, and all has to be
+  // recorded again: then it returns false.
+  bool settle(const std::vector<Vec3>& seeds, const Counters& counters);
+  // Runs what is recorded and reads the counters.
+  Counters run_counted();
+  void set_step_masses(CellMoments& moments);
+  // On the device, since the last call.
+  DeviceSeconds take_seconds();
+
+  BackendDescription description() const;
+  Device& device() { return *device_; }
+  bool is_double() const { return double_; }
+  bool has_double_rung() const { return double_rung_; }
+  bool delaunay() const { return source_ == NeighbourSource::delaunay; }
+  double lists_seconds() const { return lists_seconds_; }  // on the host
+
+ private:
+  void sort(const std::vector<Vec3>& seeds);
+  void upload_seeds();
+
+  std::unique_ptr<Device> device_;
+  bool double_, double_rung_, in_solid_;
+  NeighbourSource source_;
+  Box box_;
+  bool followed_ = false;
+  double spacing_ = 0, lists_seconds_ = 0;
+  Neighbours rings_;
+
+ public:
+  // What the passes work with.
+  Commands commands;
+  Scan scan;
+  Buffer counters;
+  DeviceSeeds seeds;
+  NeighbourPass neighbours;
+  ExactRung exact;
+};
+
+}  // namespace bisector::host

@@ -1,0 +1,44 @@
+// Incident pairs of a surface on a device: what backends of surfaces and of solids share.
+#pragma once
+
+#include "host/passes/facet_pairs.h"
+#include "host/passes/polygon_pass.h"
+#include "host/passes/seed_stage.h"
+
+namespace bisector::host {
+
+class SurfaceStage {
+ public:
+  SurfaceStage(SeedStage& seeds, const Surface& surface, const Rooms& rooms);
+
+  // Records the search for the owners of sites and samples, for seeds that are recorded.
+  void record_owners();
+  // Once that has run: finds those that are lost.
+  void settle_owners(const Counters& counters);
+  void find_pairs(Certification& certification) { pairs_.run(job(), certification); }
+  std::size_t refine(const Buffer& cells, float share, Certification& certification) {
+    return pairs_.refine(job(), cells, share, certification);
+  }
+  void polygons(RestrictedPolygons& polygons) { polygon_pass_.run(pairs_, job(), domain_, polygons); }
+
+  const PairStore& store() const { return store_; }
+  const Surface& surface() const { return surface_; }
+
+ private:
+  PairJob job() {
+    return {seeds_.commands, seeds_.seeds, seeds_.neighbours, seeds_.scan, seeds_.counters, store_, domain_};
+  }
+
+  SeedStage& seeds_;
+  const Surface& surface_;
+  SurfaceBuffers buffers_;
+  OwnerPass sites_, samples_;
+  FacetPairs domain_;
+  PairPass pairs_;
+  PairStore store_;
+  PolygonPass polygon_pass_;
+  double batch_pairs_;
+  std::size_t planned_for_ = 0;
+};
+
+}  // namespace bisector::host

@@ -1,0 +1,86 @@
+// Where diagrams are computed: devices, precision, and what an evaluation reports of itself.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace bisector {
+
+enum class Precision {
+  automatic,  // double where the device computes in double, else single
+  single,
+  double_,
+};
+
+enum class NeighbourSource {
+  nearest,   // nearest seeds by distance, grown where they prove too few
+  delaunay,  // Delaunay 1-ring; falls back to `nearest` for seeds in a plane
+};
+
+struct ComputeOptions {
+  // "cpu"; "vulkan" (the best device), "vulkan:INDEX" or "vulkan:UUID" (that very one); or "auto": the best GPU, or the CPU if
+  // there is none or it fails.
+  std::string device = "auto";
+  Precision precision = Precision::automatic;
+  NeighbourSource neighbours = NeighbourSource::nearest;
+};
+
+// A Vulkan device as `bisector devices` lists it.
+struct DeviceDescription {
+  unsigned index = 0;        // in the loader's order
+  std::string uuid;          // 32 hexadecimal digits in groups of 8-4-4-4-12
+  std::string name;
+  std::string kind;          // "discrete", "integrated", "virtual", "software" or "other"
+  std::string driver;        // name and version
+  std::string api;           // "1.3.230"
+  std::uint64_t memory = 0;  // bytes, of the largest device-local heap
+  bool float64 = false;      // double precision that passed the self-test
+  std::vector<std::string> features;  // optional ones that Bisector uses: "float64", ...
+  std::string rejected;      // why it cannot be used; empty if it can
+};
+
+struct DeviceList {
+  std::vector<DeviceDescription> devices;
+  std::string problem;       // why there are none: no loader, no driver, built without Vulkan
+};
+
+// Never throws for lack of a loader, a driver or a device.
+DeviceList list_devices();
+
+// The word for the best usable device of a list that is not software, "vulkan:INDEX"; empty if there is none. With `double_`
+// only those count that have it.
+std::string best_gpu(DeviceList list, Precision precision = Precision::automatic);
+
+struct BackendDescription {
+  std::string name;       // of the processor or device
+  std::string kind;       // "cpu", or a device's: "discrete", "integrated", "virtual", "software", "other"
+  std::string precision;  // "single" or "double"
+  std::string fallback;   // why a device was given up for this one; empty if none was
+};
+
+// Seconds on a device, from its own clock; all 0 where the CPU computed.
+struct DeviceSeconds {
+  double transfer = 0, grid = 0, neighbours = 0, owners = 0, clip = 0, sort = 0, sum = 0;
+
+  DeviceSeconds& operator+=(const DeviceSeconds& b);
+};
+
+struct DiagramSeconds {
+  double delaunay = 0, neighbours = 0, pairs = 0, clip = 0;
+  DeviceSeconds device;  // within those above
+
+  DiagramSeconds& operator+=(const DiagramSeconds& b);
+};
+
+// How the pairs of a diagram were certified.
+struct Certification {
+  std::size_t pairs = 0;
+  std::size_t uncertain = 0;  // a decision, or a cell's mass in single precision, was within its error bound at first
+  std::size_t wider = 0;      // needed a longer list of neighbours
+  std::size_t doubled = 0;    // of a device: uncertain in single precision and clipped anew in double
+  std::size_t cpu = 0;        // settled by the CPU's exact arithmetic
+};
+
+}  // namespace bisector

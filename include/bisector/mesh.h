@@ -1,0 +1,61 @@
+// Points, triangle meshes, tetrahedral meshes and sparse rows: plain data without arithmetic, so that results never depend on
+// how the including program is compiled.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace bisector {
+
+using Index = std::uint32_t;
+inline constexpr Index kNone = 0xffffffffu;
+
+// A point or a vector.
+struct Vec3 {
+  double x = 0, y = 0, z = 0;
+
+  double operator[](int k) const { return k == 0 ? x : k == 1 ? y : z; }
+  double& operator[](int k) { return k == 0 ? x : k == 1 ? y : z; }
+  friend bool operator==(const Vec3& a, const Vec3& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+};
+
+using Triangle = std::array<Index, 3>;
+
+// Triangles over shared vertices. Any soup is valid: open, non-manifold, with zero-area triangles.
+struct TriangleMesh {
+  std::vector<Vec3> vertices;
+  std::vector<Triangle> triangles;
+  // Input face of each triangle where faces with more than three corners were split; empty: the same index.
+  std::vector<Index> face_of_triangle = {};
+  std::vector<std::int32_t> labels = {};  // of each triangle, e.g. its CAD patch; or empty
+  // Edges marked as features, by a file or a caller.
+  std::vector<std::array<Index, 2>> feature_edges = {};
+};
+
+using Tetrahedron = std::array<Index, 4>;
+
+// Tetrahedra over shared vertices. Facet k of a tetrahedron is the one opposite its corner k.
+struct TetMesh {
+  std::vector<Vec3> vertices;
+  std::vector<Tetrahedron> tets;  // det(b - a, c - a, d - a) > 0 unless said otherwise
+  std::vector<std::int32_t> regions = {};  // of each tetrahedron, e.g. its material; or empty
+  std::vector<Triangle> boundary = {};     // marked triangles, on the boundary counter-clockwise seen from outside; or empty
+  std::vector<std::int32_t> boundary_labels = {};       // of each marked triangle, or empty
+  std::vector<std::array<Index, 2>> feature_edges = {}; // edges marked as features
+};
+
+// Compressed sparse rows: row i is values[offsets[i] .. offsets[i + 1]).
+template <class T>
+struct Csr {
+  std::vector<std::size_t> offsets{0};
+  std::vector<T> values;
+
+  std::size_t rows() const { return offsets.size() - 1; }
+  const T* begin(std::size_t i) const { return values.data() + offsets[i]; }
+  const T* end(std::size_t i) const { return values.data() + offsets[i + 1]; }
+  std::size_t size(std::size_t i) const { return offsets[i + 1] - offsets[i]; }
+};
+
+}  // namespace bisector

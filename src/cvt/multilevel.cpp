@@ -1,0 +1,240 @@
+#include "cvt/multilevel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "mesh/sampling.h"
+#include "mesh/topology.h"
+#include "voronoi/dual.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kPerComponent = 4;      // a tetrahedron
+constexpr std::size_t kCoarsest = 100;        // seeds on the coarsest level, at least
+constexpr int kLevels = 3;
+constexpr double kNearMiddle = 0.25;          // of the distance of two seeds
+
+bool on_surface(const std::vector<SeedPlace>& places, Index i) {
+  return places.empty() || places[i].kind == SeedPlace::Kind::surface;
+}
+
+}  // namespace
+
+std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::uint64_t random_seed) {
+  std::vector<double> weight(surface.density.size());
+  std::transform(surface.density.begin(), surface.density.end(), weight.begin(), [](double r) { return std::sqrt(r); });
+  std::vector<SurfaceSample> samples = sample_surface(surface.mesh, count, random_seed, weight);
+
+  // Components that chance left too few move seeds over from the others.
+  const std::vector<Index> label = label_components(surface.mesh.triangles, surface.mesh.vertices.size());
+  std::vector<std::vector<Triangle>> parts;
+  for (const FacetSummary& facet : surface.summaries) {
+    const Triangle& t = surface.mesh.triangles[facet.triangle];
+    if (label[t[0]] >= parts.size()) parts.resize(label[t[0]] + 1);
+    parts[label[t[0]]].push_back(t);
+  }
+  const auto component = [&](const SurfaceSample& s) { return label[surface.mesh.triangles[s.triangle][0]]; };
+  std::vector<std::size_t> have(parts.size(), 0);
+  for (const SurfaceSample& s : samples) ++have[component(s)];
+  std::vector<Vec3> added;
+  for (Index c = 0; c < parts.size() && count >= kPerComponent * parts.size(); ++c) {
+    if (parts[c].empty() || have[c] >= kPerComponent) continue;
+    const TriangleMesh part{surface.mesh.vertices, parts[c], {}};
+    for (const SurfaceSample& s : sample_surface(part, kPerComponent - have[c], random_seed + c + 1, weight))
+      added.push_back(s.point);
+  }
+  std::size_t surplus = added.size();
+  std::vector<Vec3> seeds = std::move(added);
+  for (const SurfaceSample& s : samples) {
+    std::size_t& left = have[component(s)];
+    if (surplus > 0 && left > kPerComponent) {
+      --surplus;
+      --left;
+    } else {
+      seeds.push_back(s.point);
+    }
+  }
+  return seeds;
+}
+
+std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::size_t components, int levels) {
+  const std::size_t least = std::max(kCoarsest, kPerComponent * components);
+  std::vector<std::size_t> counts{count};
+  const int most = levels > 0 ? levels : kLevels;
+  while (static_cast<int>(counts.size()) < most) {
+    const long long coarser = (static_cast<long long>(counts.back()) + 3 * euler + 2) / 4;
+    if (coarser < static_cast<long long>(levels > 0 ? kPerComponent * components : least)) break;
+    counts.push_back(static_cast<std::size_t>(coarser));
+  }
+  std::reverse(counts.begin(), counts.end());
+  return counts;
+}
+
+namespace {
+
+// The midpoints of the dual edges, as many as there is room for; where edges are too few, also points of cells of high energy.
+void append_midpoints(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
+                      const std::vector<SeedPlace>& places, std::vector<DualEdge> edges, std::size_t count, std::vector<Vec3>& finer) {
+  const std::size_t room = count > finer.size() ? count - finer.size() : 0;
+  if (edges.size() > room) {
+    std::stable_sort(edges.begin(), edges.end(), [&](const DualEdge& e, const DualEdge& f) {
+      return norm2(seeds[e.a] - seeds[e.b]) > norm2(seeds[f.a] - seeds[f.b]);
+    });
+    edges.resize(room);
+  }
+  for (const DualEdge& edge : edges) {
+    const Vec3 a = seeds[edge.a], b = seeds[edge.b], middle = 0.5 * (a + b);
+    // On a smooth surface the middle is the better start; where the edge crosses elsewhere, it may be off the sheet.
+    const bool near = norm2(middle - edge.crossing) < kNearMiddle * kNearMiddle * norm2(b - a);
+    finer.push_back(near ? middle : edge.crossing);
+  }
+  if (finer.size() < count) {
+    const std::vector<Vec3> more = insertion_points(polygons, seeds, places, moments, count - finer.size());
+    finer.insert(finer.end(), more.begin(), more.end());
+  }
+}
+
+}  // namespace
+
+std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
+                         std::size_t count) {
+  std::vector<Vec3> finer = seeds;
+  append_midpoints(polygons, moments, seeds, {}, extract_dual_edges(polygons, seeds), count, finer);
+  return finer;
+}
+
+PlacedSeeds refine(const RestrictedPolygons& polygons, const CellMoments& moments, const PlacedSeeds& coarse,
+                   const FeatureCurves& curves, const PlacedSeeds& features, std::size_t count) {
+  PlacedSeeds finer = features;
+  for (std::size_t i = 0; i < coarse.seeds.size(); ++i)
+    if (coarse.places[i].kind == SeedPlace::Kind::surface) finer.seeds.push_back(coarse.seeds[i]);
+  const std::vector<std::array<Index, 2>> along = curve_neighbours(curves, coarse.places);
+  std::vector<DualEdge> edges = extract_dual_edges(polygons, coarse.seeds);
+  std::erase_if(edges, [&](const DualEdge& e) {
+    return std::binary_search(along.begin(), along.end(), std::array<Index, 2>{e.a, e.b});
+  });
+  append_midpoints(polygons, moments, coarse.seeds, coarse.places, std::move(edges), count, finer.seeds);
+  finer.places.resize(finer.seeds.size());
+  return finer;
+}
+
+std::vector<std::array<Index, 2>> curve_neighbours(const FeatureCurves& curves, const std::vector<SeedPlace>& places) {
+  std::vector<std::vector<std::pair<double, Index>>> on(curves.size());
+  std::vector<Index> at_corner(curves.graph().corners.size(), kNone);
+  for (Index i = 0; i < places.size(); ++i) {
+    if (places[i].curve != kNone) on[places[i].curve].push_back({places[i].position, i});
+    if (places[i].corner != kNone) at_corner[places[i].corner] = i;
+  }
+  std::vector<std::array<Index, 2>> pairs;
+  for (Index c = 0; c < on.size(); ++c) {
+    std::sort(on[c].begin(), on[c].end());
+    std::vector<Index> row;
+    for (const auto& [position, seed] : on[c]) row.push_back(seed);
+    if (curves.closed(c)) {
+      if (!row.empty()) row.push_back(row.front());
+    } else {
+      const auto [first, last] = curves.ends(c);
+      if (at_corner[first] != kNone) row.insert(row.begin(), at_corner[first]);
+      if (at_corner[last] != kNone) row.push_back(at_corner[last]);
+    }
+    for (std::size_t k = 1; k < row.size(); ++k)
+      if (row[k - 1] != row[k]) pairs.push_back({std::min(row[k - 1], row[k]), std::max(row[k - 1], row[k])});
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds,
+                                   const std::vector<SeedPlace>& places, const CellMoments& moments, std::size_t count) {
+  std::vector<double> squared(seeds.size(), -1);
+  std::vector<Vec3> corner(seeds.size());
+  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+    const Index cell = polygons.pairs[k].cell;
+    for (std::size_t e = polygons.offsets[k]; e < polygons.offsets[k + 1]; ++e) {
+      const double d = norm2(polygons.vertices[e] - seeds[cell]);
+      if (d > squared[cell]) {
+        squared[cell] = d;
+        corner[cell] = polygons.vertices[e];
+      }
+    }
+  }
+  std::vector<Index> order(seeds.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
+    return moments.cells[a].second > moments.cells[b].second;
+  });
+  std::vector<std::vector<Index>> around(seeds.size());
+  for (const DualEdge& e : extract_dual_edges(polygons, seeds)) {
+    around[e.a].push_back(e.b);
+    around[e.b].push_back(e.a);
+  }
+  std::vector<char> taken(seeds.size(), 0);
+  std::set<std::array<double, 3>> distinct;
+  std::vector<Vec3> points;
+  for (bool spread : {true, false}) {
+    std::vector<char> blocked(seeds.size(), 0);
+    for (Index i : order) {
+      if (points.size() == count) return points;
+      if (!on_surface(places, i) || squared[i] <= 0 || taken[i] || blocked[i]) continue;
+      taken[i] = 1;
+      // A corner belongs to several cells.
+      if (!distinct.insert({corner[i].x, corner[i].y, corner[i].z}).second) continue;
+      points.push_back(corner[i]);
+      if (spread)
+        for (Index j : around[i]) blocked[j] = 1;
+    }
+  }
+  return points;
+}
+
+void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, std::size_t count,
+               std::vector<Vec3>& seeds, std::vector<SeedPlace>& places) {
+  if (seeds.size() < count) {
+    const std::vector<Vec3> more = insertion_points(polygons, seeds, places, moments, count - seeds.size());
+    seeds.insert(seeds.end(), more.begin(), more.end());
+    if (!places.empty()) places.resize(seeds.size());
+  }
+  if (seeds.size() <= count) return;
+  std::vector<DualEdge> edges = extract_dual_edges(polygons, seeds);
+  std::vector<double> squared(edges.size());
+  std::vector<std::size_t> order(edges.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  for (std::size_t k = 0; k < edges.size(); ++k) squared[k] = norm2(seeds[edges[k].a] - seeds[edges[k].b]);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return squared[a] < squared[b]; });
+  std::vector<char> removed(seeds.size(), 0);
+  std::size_t left = seeds.size();
+  const auto remove = [&](Index i) {
+    if (left > count && !removed[i] && on_surface(places, i)) {
+      removed[i] = 1;
+      --left;
+    }
+  };
+  for (Index i = 0; i < seeds.size(); ++i)
+    if (moments.cells[i].mass <= 0) remove(i);
+  for (bool spread : {true, false}) {
+    std::vector<char> blocked(seeds.size(), 0);
+    for (std::size_t k : order) {
+      const DualEdge& e = edges[k];
+      if (left == count) break;
+      if (removed[e.a] || removed[e.b] || (spread && (blocked[e.a] || blocked[e.b]))) continue;
+      const Index gone = on_surface(places, e.b) ? e.b : e.a;
+      if (!on_surface(places, gone)) continue;
+      remove(gone);
+      blocked[e.a] = blocked[e.b] = 1;
+    }
+  }
+  std::size_t n = 0;
+  for (Index i = 0; i < seeds.size(); ++i)
+    if (!removed[i]) {
+      if (!places.empty()) places[n] = places[i];
+      seeds[n++] = seeds[i];
+    }
+  seeds.resize(n);
+  if (!places.empty()) places.resize(n);
+}
+
+}  // namespace bisector

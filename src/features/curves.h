@@ -1,0 +1,65 @@
+// Feature curves as places for seeds: points by arc length, tangents, nearest points (thesis 4.4.3, equation 4.8).
+#pragma once
+
+#include <vector>
+
+#include "core/geometry.h"
+#include "features/features.h"
+
+namespace bisector {
+
+// Where a seed may be.
+struct SeedPlace {
+  enum class Kind : unsigned char {
+    surface,   // anywhere on the surface
+    curve,     // on one feature curve
+    fixed,     // where it is
+    interior,  // anywhere: the inside of a solid
+  };
+  Kind kind = Kind::surface;
+  Index curve = kNone;   // the feature curve it lies on, if one alone
+  Index corner = kNone;  // index in FeatureGraph::corners of the corner it lies at, if any
+  double position = 0;   // arc length along `curve`, if there is one
+};
+
+// Seeds and their places, parallel.
+struct PlacedSeeds {
+  std::vector<Vec3> seeds;
+  std::vector<SeedPlace> places;
+};
+
+class FeatureCurves {
+ public:
+  FeatureCurves() = default;
+  FeatureCurves(const FeatureGraph& graph, const std::vector<Vec3>& vertices);
+
+  const FeatureGraph& graph() const { return graph_; }
+  std::size_t size() const { return graph_.curves.size(); }
+  double length(Index curve) const { return starts_[curve].back(); }
+  bool closed(Index curve) const { return graph_.curves[curve].closed; }
+  // Arc length of vertex k of the curve; k = number of segments gives the length.
+  double position_of(Index curve, std::size_t k) const { return starts_[curve][k]; }
+  // Number of segments.
+  std::size_t segments(Index curve) const { return starts_[curve].size() - 1; }
+  // Positions beyond an end are taken around a closed curve, and to the end of an open one.
+  double wrap(Index curve, double position) const;
+  std::size_t segment_at(Index curve, double position) const;
+  Vec3 point(Index curve, double position) const;
+  Vec3 tangent(Index curve, double position) const;  // unit length, of the segment there
+  // Ends of segment k.
+  const Vec3& point_of(Index curve, std::size_t k) const { return points_[curve][k]; }
+  Vec3 corner(Index corner) const { return corners_[corner]; }
+  // The corners at the start and the end of an open curve; kNone of a closed one.
+  std::array<Index, 2> ends(Index curve) const { return ends_[curve]; }
+  // The position, no farther than `reach` along the curve from `from`, of the point nearest to p.
+  double nearest(Index curve, const Vec3& p, double from, double reach) const;
+
+ private:
+  FeatureGraph graph_;
+  std::vector<std::vector<Vec3>> points_;     // of each curve; a closed one repeats its first
+  std::vector<std::vector<double>> starts_;   // arc length at each point
+  std::vector<Vec3> corners_;
+  std::vector<std::array<Index, 2>> ends_;
+};
+
+}  // namespace bisector

@@ -1,0 +1,661 @@
+#include "features/features.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "mesh/degenerate.h"
+#include "mesh/topology.h"
+
+namespace bisector {
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::size_t kNoEdge = static_cast<std::size_t>(-1);
+
+// --- how the surface folds at its edges ---
+
+constexpr double kSeedAngle = 40 * kDegree;  // more can be a crease by itself
+constexpr double kSliverHeight = 1e-4;  // of the diagonal; roundings of a file may have turned thinner triangles
+constexpr double kSliverAspect = 0.02;  // height over longest edge
+
+double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 d = b - a;
+  const double length2 = norm2(d);
+  const double t = length2 > 0 ? std::clamp(dot(p - a, d) / length2, 0.0, 1.0) : 0.0;
+  return norm(p - (a + t * d));
+}
+
+// Angle between two directions that need not have unit length.
+double angle_between(const Vec3& a, const Vec3& b) {
+  const double m = norm(a), n = norm(b);
+  if (!(m > 0 && n > 0)) return 0;
+  const Vec3 u = (1 / m) * a, v = (1 / n) * b;  // lengths squared twice could leave the range
+  return std::atan2(norm(cross(u, v)), dot(u, v));
+}
+
+class Folds {
+ public:
+  // Both must outlive the object; no triangle may have a repeated corner.
+  Folds(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles)
+      : points_(points),
+        triangles_(triangles),
+        table(edge_table(triangles, points.size())),
+        edge_of_(3 * triangles.size()) {
+    for (std::size_t e = 0; e < table.edges.size(); ++e)
+      for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of_[*h] = e;
+    find_normals();
+    angle.resize(table.edges.size());
+    bend.resize(table.edges.size());
+    beside.resize(table.edges.size(), {kNone, kNone});
+    parallel_each(table.edges.size(), [&](std::size_t e) { measure(e); });
+  }
+
+ private:
+  const std::vector<Vec3>& points_;
+  const std::vector<Triangle>& triangles_;
+
+ public:
+  EdgeTable table;
+  // Of each edge the two triangles that it lies between, seen through those without normal; else kNone, and angle 0.
+  std::vector<std::array<Index, 2>> beside;
+  std::vector<double> angle;  // between their normals, radians
+  std::vector<double> bend;   // of the surface beside the edge, about the edge: the greater of both sides, radians
+
+  const Vec3& point(Index v) const { return points_[v]; }
+  // Of a triangle, with lengths multiplied by `scale`.
+  double area(std::size_t t, double scale) const {
+    const Triangle& v = triangles_[t];
+    return 0.5 * norm(cross(scale * (point(v[1]) - point(v[0])), scale * (point(v[2]) - point(v[0]))));
+  }
+  double length(std::size_t e) const { return norm(point(table.edges[e][1]) - point(table.edges[e][0])); }
+  std::size_t edge_of(std::size_t half_edge) const { return edge_of_[half_edge]; }
+
+ private:
+  // What lies across an edge, beyond triangles without normal.
+  struct Side {
+    std::size_t triangle = kNoEdge;
+    std::size_t edge = kNoEdge;  // by which it was entered
+    bool flipped = false;        // against the triangle that was left
+  };
+
+  bool has_normal(std::size_t triangle) const { return !(normals_[triangle] == Vec3{}); }
+
+  void find_normals() {
+    const double diagonal = bounding_box(points_).diagonal();
+    normals_.resize(triangles_.size());
+    parallel_each(triangles_.size(), [&](std::size_t t) {
+      const auto [a, b, c] = triangles_[t];
+      const Vec3 p = point(b) - point(a), q = point(c) - point(a);
+      const double longest = std::sqrt(std::max({norm2(p), norm2(q), norm2(p - q)}));
+      if (!(longest > 0)) return;
+      const Vec3 n = cross((1 / longest) * p, (1 / longest) * q);
+      const double aspect = norm(n);
+      const bool sliver = aspect < kSliverAspect && aspect * longest < kSliverHeight * diagonal;
+      if (!sliver && std::isnormal(aspect) && !collinear(point(a), point(b), point(c))) normals_[t] = (1 / aspect) * n;
+    });
+  }
+
+  Index start_of(std::size_t half_edge) const { return triangles_[half_edge / 3][half_edge % 3]; }
+
+  // From a half-edge's triangle across that edge of two triangles.
+  Side cross_edge(std::size_t half_edge) const {
+    Side side;
+    std::size_t edge = edge_of_[half_edge];
+    const Vec3 middle = 0.5 * (point(table.edges[edge][0]) + point(table.edges[edge][1]));
+    for (std::size_t step = 0; step <= kMostSteps; ++step) {
+      if (table.half_edges.size(edge) != 2) return {};
+      const std::size_t* sides = table.half_edges.begin(edge);
+      const std::size_t other = sides[0] == half_edge ? sides[1] : sides[0];
+      if (start_of(half_edge) == start_of(other)) side.flipped = !side.flipped;
+      if (other / 3 == half_edge / 3) return {};
+      if (has_normal(other / 3)) {
+        side.triangle = other / 3;
+        side.edge = edge;
+        return side;
+      }
+      const std::size_t base = other - other % 3;
+      const std::size_t first = base + (other + 1) % 3, second = base + (other + 2) % 3;
+      half_edge = distance_to(middle, first) <= distance_to(middle, second) ? first : second;
+      edge = edge_of_[half_edge];
+    }
+    return {};
+  }
+  double distance_to(const Vec3& p, std::size_t half_edge) const {
+    const auto [a, b] = table.edges[edge_of_[half_edge]];
+    return distance_to_segment(p, point(a), point(b));
+  }
+
+  // The largest turn of the normal about `axis` from a triangle to its neighbours, other than across `from`. What could
+  // be another crease is not counted: small polyhedra have nothing else.
+  double bend_beside(std::size_t triangle, std::size_t from, const Vec3& axis) const {
+    double largest = 0;
+    for (std::size_t h = 3 * triangle; h < 3 * triangle + 3; ++h) {
+      if (edge_of_[h] == from) continue;
+      const Side side = cross_edge(h);
+      if (side.triangle == kNoEdge) continue;
+      const Vec3 n = normals_[triangle], m = side.flipped ? -normals_[side.triangle] : normals_[side.triangle];
+      if (angle_between(n, m) > kSeedAngle) continue;
+      const Vec3 across = m - dot(m, axis) * axis;
+      if (norm2(across) > 1e-4) largest = std::max(largest, norm(across) * angle_between(n, across));
+    }
+    return largest;
+  }
+
+  void measure(std::size_t e) {
+    if (table.half_edges.size(e) != 2) return;
+    const std::size_t* h = table.half_edges.begin(e);
+    const bool good0 = has_normal(h[0] / 3), good1 = has_normal(h[1] / 3);
+    if (!good0 && !good1) return;
+    const std::size_t from = good0 ? h[0] : h[1];
+    const Side side = cross_edge(from);
+    if (side.triangle == kNoEdge || side.triangle == from / 3) return;
+    // Of the edges around triangles without normal the shorter ones follow the fold, not the longer ones as well.
+    if (side.edge != e && std::pair(length(e), e) > std::pair(length(side.edge), side.edge)) return;
+    const Vec3 n = normals_[from / 3], m = side.flipped ? -normals_[side.triangle] : normals_[side.triangle];
+    angle[e] = angle_between(n, m);
+    beside[e] = {static_cast<Index>(from / 3), static_cast<Index>(side.triangle)};
+    const Vec3 along = point(table.edges[e][1]) - point(table.edges[e][0]);
+    if (const double l = norm(along); l > 0)
+      bend[e] = std::max(bend_beside(from / 3, e, (1 / l) * along),
+                         bend_beside(side.triangle, side.edge, (1 / l) * along));
+  }
+
+  static constexpr std::size_t kMostSteps = 64;
+
+  std::vector<std::size_t> edge_of_;  // of each half-edge
+  std::vector<Vec3> normals_;  // unit; zero: look through the triangle
+};
+
+// The edges of each vertex, ascending.
+Csr<std::size_t> edges_at_vertices(const std::vector<std::array<Index, 2>>& edges, std::size_t vertices) {
+  Csr<std::size_t> rows;
+  rows.offsets.assign(vertices + 1, 0);
+  for (const auto& e : edges)
+    for (const Index v : e) ++rows.offsets[v + 1];
+  std::partial_sum(rows.offsets.begin(), rows.offsets.end(), rows.offsets.begin());
+  rows.values.resize(2 * edges.size());
+  std::vector<std::size_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    for (const Index v : edges[e]) rows.values[next[v]++] = e;
+  return rows;
+}
+
+Index other_end(const std::array<Index, 2>& edge, Index v) { return edge[0] == v ? edge[1] : edge[0]; }
+
+using Edge = std::array<Index, 2>;
+
+// --- creases of mode automatic ---
+
+constexpr double kSeedBend = 0.5;  // of the surface beside an edge, of the edge's angle
+constexpr double kTailAngle = 10 * kDegree;
+constexpr double kTailBend = 0.8;
+constexpr double kTailFall = 0.3;  // angle of an edge, of that of the edge before
+constexpr double kEven = 0.8;      // the same where a crease goes on whatever is beside it
+constexpr double kTailTurn = 40 * kDegree;
+constexpr double kPlainFold = 30 * kDegree;  // a chain's mean angle has to exceed this ...
+constexpr double kDisorderWeight = 5;        // ... by this times its disorder
+constexpr std::size_t kEnough = 12;          // inner vertices that tell whether a chain is folded evenly
+constexpr double kLeastDisorder = 0.4;       // of a chain that is folded evenly, of that around it
+constexpr double kShortest = 5;              // least length of what is joined to nothing, in edges around it ...
+constexpr double kRoom = 0.02;                   // area beside what is joined to nothing, of its extent squared ...
+constexpr std::size_t kFewEdges = 60;            // ... if it has fewer edges than this
+constexpr std::size_t kManyTriangles = 500;      // beside it, are room enough
+constexpr double kFlat = 0.1 * kDegree;          // its disorder, if it is of the faces of a plate or a bar, however thin
+constexpr std::size_t kManyEdges = 12;       // ... unless it has as many edges as this
+
+class CreaseFinder {
+ public:
+  // `anchored` are the vertices on features of other kinds.
+  CreaseFinder(const Folds& folds, const Csr<std::size_t>& at_vertex, const std::vector<char>& anchored)
+      : folds_(folds), at_vertex_(at_vertex), anchored_(anchored), crease_(folds.table.edges.size(), 0) {}
+
+  std::vector<char> find() {
+    std::vector<std::size_t> seeds;
+    for (std::size_t e = 0; e < crease_.size(); ++e)
+      if (folds_.angle[e] > kSeedAngle && folds_.bend[e] < kSeedBend * folds_.angle[e]) seeds.push_back(e);
+    for (const std::size_t e : seeds) crease_[e] = 1;
+    for (const std::size_t e : seeds)
+      for (const Index v : folds_.table.edges[e]) follow(e, v);
+    drop_weak_components();
+    return std::move(crease_);
+  }
+
+ private:
+  bool has_other_crease(Index v, std::size_t edge) const {
+    return std::any_of(at_vertex_.begin(v), at_vertex_.end(v), [&](std::size_t e) { return e != edge && crease_[e]; });
+  }
+
+  // Continues a chain beyond v, the end of its last edge.
+  void follow(std::size_t edge, Index v) {
+    while (!anchored_[v] && !has_other_crease(v, edge)) {
+      const Vec3 ahead = folds_.point(v) - folds_.point(other_end(folds_.table.edges[edge], v));
+      std::size_t best = kNoEdge;
+      double best_score = 0;
+      for (const std::size_t* e = at_vertex_.begin(v); e != at_vertex_.end(v); ++e) {
+        const double angle = folds_.angle[*e];
+        if (*e == edge || angle < kTailAngle || angle < kTailFall * folds_.angle[edge]) continue;
+        const bool even = angle > kSeedAngle && angle > kEven * folds_.angle[edge];
+        if (!even && folds_.bend[*e] > kTailBend * angle) continue;
+        const Vec3 onwards = folds_.point(other_end(folds_.table.edges[*e], v)) - folds_.point(v);
+        const double turn = angle_between(ahead, onwards), score = angle * std::cos(turn);
+        if (turn < kTailTurn && score > best_score) {
+          best = *e;
+          best_score = score;
+        }
+      }
+      if (best == kNoEdge) return;
+      crease_[best] = 1;
+      edge = best;
+      v = other_end(folds_.table.edges[edge], v);
+    }
+  }
+
+  void drop_weak_components() {
+    std::vector<char> seen(crease_.size(), 0);
+    std::vector<std::size_t> component;
+    for (std::size_t first = 0; first < crease_.size(); ++first) {
+      if (!crease_[first] || seen[first]) continue;
+      component = {first};
+      seen[first] = 1;
+      for (std::size_t i = 0; i < component.size(); ++i)
+        for (const Index v : folds_.table.edges[component[i]])
+          for (const std::size_t* e = at_vertex_.begin(v); e != at_vertex_.end(v); ++e)
+            if (crease_[*e] && !std::exchange(seen[*e], 1)) component.push_back(*e);
+      if (!is_sound(component))
+        for (const std::size_t e : component) crease_[e] = 0;
+    }
+  }
+
+  // Whether most of the chain has room on both sides: a part of the surface that is not cut off by the chain itself, as slivers
+  // are that noise has folded.
+  bool has_room(const std::vector<std::size_t>& component, const std::vector<Index>& vertices, double length) const {
+    const auto farthest = [&](Index from) {
+      return *std::max_element(vertices.begin(), vertices.end(), [&](Index a, Index b) {
+        return norm2(folds_.point(a) - folds_.point(from)) < norm2(folds_.point(b) - folds_.point(from));
+      });
+    };
+    const Index a = farthest(vertices.front()), b = farthest(a);
+    const double extent = norm(folds_.point(b) - folds_.point(a));
+    double narrow = 0;
+    for (const std::size_t e : component)
+      for (const std::size_t* h = folds_.table.half_edges.begin(e); h != folds_.table.half_edges.end(e); ++h)
+        if (!reaches(*h / 3, 1 / extent)) {
+          narrow += folds_.length(e);
+          break;
+        }
+    return narrow < 0.5 * length;
+  }
+
+  // Whether the triangles that are reached from one without crossing creases have the area, with lengths multiplied by `scale`.
+  bool reaches(std::size_t triangle, double scale) const {
+    std::vector<std::size_t> part{triangle};
+    double area = 0;
+    for (std::size_t i = 0; i < part.size() && area < kRoom; ++i) {
+      area += folds_.area(part[i], scale);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t e = folds_.edge_of(3 * part[i] + k);
+        if (crease_[e]) continue;
+        for (const std::size_t* h = folds_.table.half_edges.begin(e); h != folds_.table.half_edges.end(e); ++h)
+          if (std::find(part.begin(), part.end(), *h / 3) == part.end()) part.push_back(*h / 3);
+      }
+      if (part.size() > kManyTriangles) return true;
+    }
+    return area >= kRoom;
+  }
+
+  // Creases of a part are folded evenly along their way, or between faces that are hardly folded; ridges of a scan are
+  // neither, and the disorder is the smaller of the two.
+  bool is_sound(const std::vector<std::size_t>& component) const {
+    std::vector<Index> vertices;
+    double length = 0, fold = 0;
+    for (const std::size_t e : component) {
+      length += folds_.length(e);
+      fold += folds_.length(e) * folds_.angle[e];
+      for (const Index v : folds_.table.edges[e]) vertices.push_back(v);
+    }
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+
+    std::vector<double> around;
+    double around_length = 0, change = 0;
+    std::size_t around_count = 0, inner = 0;
+    bool attached = false;
+    for (const Index v : vertices) {
+      std::vector<std::size_t> own;
+      for (const std::size_t* e = at_vertex_.begin(v); e != at_vertex_.end(v); ++e) {
+        if (crease_[*e]) own.push_back(*e);
+        else if (folds_.beside[*e][0] != kNone) around.push_back(folds_.angle[*e]);
+        around_length += folds_.length(*e);
+        ++around_count;
+      }
+      attached |= anchored_[v] != 0;
+      if (own.size() != 2) continue;
+      change += std::abs(folds_.angle[own[0]] - folds_.angle[own[1]]);
+      ++inner;
+    }
+    if (!attached && component.size() < kManyEdges &&
+        length * static_cast<double>(around_count) < kShortest * around_length)
+      return false;
+    double disorder = 0;
+    if (!around.empty()) {
+      const auto middle = around.begin() + static_cast<std::ptrdiff_t>((around.size() - 1) / 2);
+      std::nth_element(around.begin(), middle, around.end());
+      disorder = *middle;
+    }
+    if (!attached && component.size() < kFewEdges && disorder > kFlat && !has_room(component, vertices, length))
+      return false;
+    if (inner >= kEnough)
+      disorder = std::clamp(change / static_cast<double>(inner), kLeastDisorder * disorder, disorder);
+    return fold > length * (kPlainFold + kDisorderWeight * disorder);
+  }
+
+  const Folds& folds_;
+  const Csr<std::size_t>& at_vertex_;
+  const std::vector<char>& anchored_;
+  std::vector<char> crease_;  // of each edge
+};
+
+// --- corners ---
+
+constexpr double kTiny = 0.2;                    // of the longest of the feature edges near by
+constexpr int kNearBy = 3;                       // feature edges to either side
+constexpr double kOwnTurn = 0.7;                 // of the two edges at a corner, of the least turn
+constexpr double kTipDeficit = 54 * kDegree;     // of the angles around a tip, from a full turn
+constexpr double kTipContrast = 0.25;            // the same at the vertices around it, of its own
+constexpr double kTipFold = 15 * kDegree;        // of the surface around it, along its rays
+
+class GraphBuilder {
+ public:
+  // `kinds` holds a FeatureKind for each edge, or kPlain.
+  static constexpr std::uint8_t kPlain = 255;
+  GraphBuilder(const Folds& folds, const Csr<std::size_t>& at_vertex, const std::vector<std::uint8_t>& kinds,
+               const std::vector<std::int32_t>& labels, double corner_angle)
+      : folds_(folds), at_vertex_(at_vertex), kinds_(kinds), labels_(labels), corner_angle_(corner_angle) {}
+
+  FeatureGraph build(const std::vector<Triangle>& triangles, bool tips) {
+    const std::size_t vertices = at_vertex_.rows();
+    corner_.assign(vertices, 0);
+    turn_.assign(vertices, 0);
+    on_feature_.assign(vertices, 0);
+    parallel_each(vertices, [&](std::size_t v) { judge(static_cast<Index>(v)); });
+    keep_sharpest_turns();
+    if (tips) find_tips(triangles);
+    FeatureGraph graph;
+    for (std::size_t e = 0; e < kinds_.size(); ++e)
+      if (kinds_[e] != kPlain) graph.edges.push_back(folds_.table.edges[e]);
+    for (std::size_t v = 0; v < vertices; ++v)
+      if (corner_[v]) graph.corners.push_back(static_cast<Index>(v));
+    trace(graph);
+    return graph;
+  }
+
+ private:
+  struct Pair {
+    std::size_t count = 0;
+    std::array<std::size_t, 2> edges{};
+  };
+  // The feature edges at a vertex, the first two of them by index.
+  Pair features_at(Index v) const {
+    Pair pair;
+    for (const std::size_t* e = at_vertex_.begin(v); e != at_vertex_.end(v); ++e) {
+      if (kinds_[*e] == kPlain) continue;
+      if (pair.count < 2) pair.edges[pair.count] = *e;
+      ++pair.count;
+    }
+    return pair;
+  }
+
+  std::array<std::int32_t, 2> labels_beside(std::size_t e) const {
+    std::array<std::int32_t, 2> pair{};
+    if (labels_.empty() || folds_.beside[e][0] == kNone) return pair;
+    pair = {labels_[folds_.beside[e][0]], labels_[folds_.beside[e][1]]};
+    std::sort(pair.begin(), pair.end());
+    return pair;
+  }
+
+  void judge(Index v) {
+    const Pair pair = features_at(v);
+    on_feature_[v] = pair.count > 0;
+    if (has_several_fans(v)) corner_[v] = 1;
+    if (pair.count == 0) return;
+    if (pair.count != 2 || kinds_[pair.edges[0]] != kinds_[pair.edges[1]] ||
+        labels_beside(pair.edges[0]) != labels_beside(pair.edges[1])) {
+      corner_[v] = 1;
+      return;
+    }
+    turn_[v] = turn_at(v, pair);
+  }
+
+  // Whether the triangles at v, linked through edges, fall apart.
+  bool has_several_fans(Index v) const {
+    const std::size_t* begin = at_vertex_.begin(v);
+    const std::size_t* end = at_vertex_.end(v);
+    const auto place = [&](std::size_t e) { return static_cast<std::size_t>(std::lower_bound(begin, end, e) - begin); };
+    std::vector<std::size_t> parent(at_vertex_.size(v));
+    std::iota(parent.begin(), parent.end(), std::size_t{0});
+    const auto root = [&](std::size_t i) {
+      while (parent[i] != i) i = parent[i] = parent[parent[i]];
+      return i;
+    };
+    std::size_t fans = parent.size();
+    for (const std::size_t* e = begin; e != end; ++e)
+      for (const std::size_t* h = folds_.table.half_edges.begin(*e); h != folds_.table.half_edges.end(*e); ++h)
+        for (std::size_t k = 3 * (*h / 3); k < 3 * (*h / 3) + 3; ++k) {
+          const std::size_t other = folds_.edge_of(k);
+          const Edge& ends = folds_.table.edges[other];
+          if (other == *e || (ends[0] != v && ends[1] != v)) continue;
+          const std::size_t i = root(place(*e)), j = root(place(other));
+          if (i == j) continue;
+          parent[std::max(i, j)] = std::min(i, j);
+          --fans;
+        }
+    return fans > 1;
+  }
+
+  // The feature edge that continues a curve at v; kNoEdge at its end.
+  std::size_t next_edge(std::size_t edge, Index v) const {
+    const Pair pair = features_at(v);
+    if (pair.count != 2) return kNoEdge;
+    return pair.edges[0] == edge ? pair.edges[1] : pair.edges[0];
+  }
+
+  double longest_near(Index v, std::size_t edge) const {
+    double longest = 0;
+    for (int i = 0; i < kNearBy && edge != kNoEdge; ++i) {
+      longest = std::max(longest, folds_.length(edge));
+      v = other_end(folds_.table.edges[edge], v);
+      edge = next_edge(edge, v);
+    }
+    return longest;
+  }
+
+  // Calls body(vertex) for what follows v on a curve, until it returns false or the curve ends or comes back.
+  template <class Body>
+  void walk(Index v, std::size_t edge, const Body& body) const {
+    const Index start = v;
+    while (edge != kNoEdge) {
+      v = other_end(folds_.table.edges[edge], v);
+      if (v == start || !body(v)) return;
+      edge = next_edge(edge, v);
+    }
+  }
+
+  double tiny_at(Index v, const Pair& pair) const {
+    return kTiny * std::max(longest_near(v, pair.edges[0]), longest_near(v, pair.edges[1]));
+  }
+
+  // The first vertex beyond `reach` of v.
+  Vec3 ahead(Index v, std::size_t edge, double reach) const {
+    Vec3 p = folds_.point(v);
+    walk(v, edge, [&](Index w) {
+      p = folds_.point(w);
+      return norm(p - folds_.point(v)) < reach;
+    });
+    return p;
+  }
+
+  // Across what is tiny; 0 where the two edges alone hardly turn.
+  double turn_at(Index v, const Pair& pair) const {
+    const auto turn = [&](double reach) {
+      const Vec3 p = folds_.point(v);
+      return angle_between(p - ahead(v, pair.edges[0], reach), ahead(v, pair.edges[1], reach) - p);
+    };
+    return turn(0) > kOwnTurn * corner_angle_ ? turn(tiny_at(v, pair)) : 0;
+  }
+
+  // Of the sharp turns that tiny edges part, the sharpest is a corner.
+  void keep_sharpest_turns() {
+    std::vector<Index> sharp;
+    for (std::size_t v = 0; v < turn_.size(); ++v)
+      if (!corner_[v] && turn_[v] > corner_angle_) sharp.push_back(static_cast<Index>(v));
+    std::vector<char> wins(sharp.size(), 1);
+    for (std::size_t i = 0; i < sharp.size(); ++i) {
+      const Index v = sharp[i];
+      const Pair pair = features_at(v);
+      const double reach = tiny_at(v, pair);
+      for (const std::size_t edge : pair.edges)
+        walk(v, edge, [&](Index w) {
+          if (norm(folds_.point(w) - folds_.point(v)) >= reach) return false;
+          if (corner_[w] || turn_[w] > turn_[v] || (turn_[w] == turn_[v] && w < v)) wins[i] = 0;
+          return true;
+        });
+    }
+    for (std::size_t i = 0; i < sharp.size(); ++i)
+      if (wins[i]) corner_[sharp[i]] = 1;
+  }
+
+  // Tips of cones: angles are missing around them and hardly at their neighbours, and the surface runs straight on.
+  void find_tips(const std::vector<Triangle>& triangles) {
+    std::vector<double> deficit(at_vertex_.rows(), 2 * std::numbers::pi);
+    for (const Triangle& t : triangles)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3& p = folds_.point(t[k]);
+        deficit[t[k]] -= angle_between(folds_.point(t[(k + 1) % 3]) - p, folds_.point(t[(k + 2) % 3]) - p);
+      }
+    for (Index v = 0; v < deficit.size(); ++v) {
+      if (on_feature_[v] || at_vertex_.size(v) == 0 || deficit[v] < kTipDeficit) continue;
+      bool tip = true;
+      for (const std::size_t* e = at_vertex_.begin(v); tip && e != at_vertex_.end(v); ++e) {
+        const Index w = other_end(folds_.table.edges[*e], v);
+        tip = on_feature_[w] || std::abs(deficit[w]) < kTipContrast * deficit[v];
+        for (const std::size_t* h = folds_.table.half_edges.begin(*e); tip && h != folds_.table.half_edges.end(*e); ++h)
+          for (std::size_t k = 3 * (*h / 3); k < 3 * (*h / 3) + 3; ++k) {
+            const std::size_t rim = folds_.edge_of(k);
+            const Edge& ends = folds_.table.edges[rim];
+            if (ends[0] != v && ends[1] != v && kinds_[rim] == kPlain && folds_.angle[rim] > kTipFold) tip = false;
+          }
+      }
+      if (tip) corner_[v] = 1;
+    }
+  }
+
+  void trace(FeatureGraph& graph) const {
+    std::vector<char> done(kinds_.size(), 0);
+    const auto follow = [&](Index v, std::size_t edge) {
+      FeatureCurve curve;
+      curve.kind = static_cast<FeatureKind>(kinds_[edge]);
+      curve.vertices.push_back(v);
+      while (edge != kNoEdge && !std::exchange(done[edge], 1)) {
+        v = other_end(folds_.table.edges[edge], v);
+        curve.vertices.push_back(v);
+        edge = corner_[v] ? kNoEdge : next_edge(edge, v);
+      }
+      if (!corner_[curve.vertices[0]]) {
+        curve.vertices.pop_back();
+        curve.closed = true;
+      }
+      graph.curves.push_back(std::move(curve));
+    };
+    for (const Index v : graph.corners)
+      for (const std::size_t* e = at_vertex_.begin(v); e != at_vertex_.end(v); ++e)
+        if (kinds_[*e] != kPlain && !done[*e]) follow(v, *e);
+    for (std::size_t e = 0; e < kinds_.size(); ++e)
+      if (kinds_[e] != kPlain && !done[e]) follow(folds_.table.edges[e][0], e);
+  }
+
+  const Folds& folds_;
+  const Csr<std::size_t>& at_vertex_;
+  const std::vector<std::uint8_t>& kinds_;
+  const std::vector<std::int32_t>& labels_;
+  const double corner_angle_;
+  std::vector<char> corner_, on_feature_;
+  std::vector<double> turn_;  // of the curve at each vertex inside one
+};
+
+void check(const TriangleMesh& mesh, const FeatureOptions& options) {
+  for (const auto& [name, angle] : {std::pair{"feature", options.angle}, {"corner", options.corner_angle}})
+    if (!(angle > 0 && angle < 180))
+      throw Error(fmt::format("{} angle {}: give degrees between 0 and 180", name, angle));
+  if (!mesh.labels.empty() && mesh.labels.size() != mesh.triangles.size())
+    throw Error(fmt::format("{} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
+}
+
+void mark_given(const std::vector<Edge>& edges, const EdgeTable& table, std::vector<std::uint8_t>& kinds) {
+  constexpr auto kGiven = static_cast<std::uint8_t>(FeatureKind::given);
+  for (const Edge& given : edges) {
+    const Edge e{std::min(given[0], given[1]), std::max(given[0], given[1])};
+    const auto at = std::lower_bound(table.edges.begin(), table.edges.end(), e);
+    if (at == table.edges.end() || *at != e)
+      throw Error(fmt::format("feature edge {} {} is not an edge of the mesh; remove it", given[0], given[1]));
+    std::uint8_t& kind = kinds[static_cast<std::size_t>(at - table.edges.begin())];
+    kind = std::min(kind, kGiven);
+  }
+}
+
+}  // namespace
+
+FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& options) {
+  check(mesh, options);
+  std::vector<Triangle> triangles;
+  std::vector<std::int32_t> labels;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const Triangle& t = mesh.triangles[i];
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    triangles.push_back(t);
+    if (!mesh.labels.empty()) labels.push_back(mesh.labels[i]);
+  }
+  const Folds folds(mesh.vertices, triangles);
+  const EdgeTable& table = folds.table;
+  const Csr<std::size_t> at_vertex = edges_at_vertices(table.edges, mesh.vertices.size());
+
+  std::vector<std::uint8_t> kinds(table.edges.size(), GraphBuilder::kPlain);
+  const auto mark = [&](std::size_t e, FeatureKind kind) {
+    kinds[e] = std::min(kinds[e], static_cast<std::uint8_t>(kind));
+  };
+  for (std::size_t e = 0; e < kinds.size(); ++e) {
+    const std::size_t sides = table.half_edges.size(e);
+    if (sides != 2) mark(e, sides == 1 ? FeatureKind::border : FeatureKind::non_manifold);
+  }
+  mark_given(options.given, table, kinds);
+  if (options.mode != FeatureMode::none) {
+    mark_given(mesh.feature_edges, table, kinds);
+    for (std::size_t e = 0; e < kinds.size(); ++e)
+      if (const auto [left, right] = folds.beside[e]; !labels.empty() && left != kNone && labels[left] != labels[right])
+        mark(e, FeatureKind::label);
+  }
+  if (options.mode == FeatureMode::degrees) {
+    for (std::size_t e = 0; e < kinds.size(); ++e)
+      if (folds.angle[e] > options.angle * kDegree) mark(e, FeatureKind::crease);
+  } else if (options.mode == FeatureMode::automatic) {
+    std::vector<char> anchored(mesh.vertices.size(), 0);
+    for (std::size_t e = 0; e < kinds.size(); ++e)
+      if (kinds[e] != GraphBuilder::kPlain)
+        for (const Index v : table.edges[e]) anchored[v] = 1;
+    const std::vector<char> crease = CreaseFinder(folds, at_vertex, anchored).find();
+    for (std::size_t e = 0; e < kinds.size(); ++e)
+      if (crease[e]) mark(e, FeatureKind::crease);
+  }
+  return GraphBuilder(folds, at_vertex, kinds, labels, options.corner_angle * kDegree)
+      .build(triangles, options.mode != FeatureMode::none);
+}
+
+}  // namespace bisector

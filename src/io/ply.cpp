@@ -1,0 +1,502 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "io/bytes.h"
+#include "io/mesh_formats.h"
+#include "io/text.h"
+
+namespace bisector::io {
+
+namespace {
+
+enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+
+std::size_t size_of(Scalar type) {
+  constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
+  return kSizes[static_cast<std::size_t>(type)];
+}
+
+Scalar read_scalar_type(TextReader& in) {
+  static constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames{
+      {{"char", Scalar::int8}, {"int8", Scalar::int8}, {"uchar", Scalar::uint8}, {"uint8", Scalar::uint8},
+       {"short", Scalar::int16}, {"int16", Scalar::int16}, {"ushort", Scalar::uint16}, {"uint16", Scalar::uint16},
+       {"int", Scalar::int32}, {"int32", Scalar::int32}, {"uint", Scalar::uint32}, {"uint32", Scalar::uint32},
+       {"float", Scalar::float32}, {"float32", Scalar::float32}, {"double", Scalar::float64},
+       {"float64", Scalar::float64}}};
+  const std::string_view word = in.word();
+  for (const auto& [name, type] : kNames)
+    if (word == name) return type;
+  in.fail("'" + printable(word) + "' is not a PLY type; " + kExportAgain);
+}
+
+struct PlyProperty {
+  std::string name;
+  Scalar type;
+  bool list = false;
+  Scalar count_type = Scalar::uint8;
+};
+
+struct PlyElement {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<PlyProperty> properties;
+
+  // Bytes that one item takes at least.
+  std::size_t least_size() const {
+    std::size_t size = 0;
+    for (const PlyProperty& p : properties) size += size_of(p.list ? p.count_type : p.type);
+    return size;
+  }
+};
+
+struct PlyHeader {
+  bool text = false, big_endian = false;
+  std::vector<PlyElement> elements;
+
+  const PlyElement* find(std::string_view name) const {
+    for (const PlyElement& e : elements)
+      if (e.name == name) return &e;
+    return nullptr;
+  }
+};
+
+bool is_index_list(const PlyProperty& p) {
+  return p.list && (p.name == "vertex_indices" || p.name == "vertex_index");
+}
+
+PlyProperty read_ply_property(TextReader& in) {
+  PlyProperty property{};
+  TextReader ahead = in;
+  if (ahead.word() == "list") {
+    in.word();
+    property.list = true;
+    property.count_type = read_scalar_type(in);
+    if (property.count_type >= Scalar::float32) in.fail(std::string("a list is counted by floats; ") + kExportAgain);
+  }
+  property.type = read_scalar_type(in);
+  property.name = in.word();
+  if (property.name.empty()) in.fail(std::string("a property has no name; ") + kExportAgain);
+  return property;
+}
+
+PlyHeader read_ply_header(TextReader& in) {
+  PlyHeader header;
+  if (!in.next_line() || in.word() != "ply") in.fail("does not begin with 'ply'; check that this is a PLY file");
+  bool format = false;
+  for (;;) {
+    if (!in.next_line()) in.fail_truncated("a part of the header");
+    const std::string_view keyword = in.word();
+    if (keyword == "end_header") break;
+    if (keyword == "comment" || keyword == "obj_info") continue;
+    if (keyword == "format") {
+      const std::string_view name = in.word();
+      header.text = name == "ascii";
+      header.big_endian = name == "binary_big_endian";
+      if (!header.text && !header.big_endian && name != "binary_little_endian")
+        in.fail("unknown PLY format '" + printable(name) + "'; " + kExportAgain);
+      format = true;
+    } else if (keyword == "element") {
+      PlyElement element;
+      element.name = in.word();
+      if (header.find(element.name))
+        in.fail("element '" + printable(element.name) + "' appears twice; " + kExportAgain);
+      element.count = in.count("items");
+      header.elements.push_back(std::move(element));
+    } else if (keyword == "property") {
+      if (header.elements.empty()) in.fail(std::string("a property comes before all elements; ") + kExportAgain);
+      header.elements.back().properties.push_back(read_ply_property(in));
+    } else {
+      in.fail("unknown header line '" + printable(keyword) + "'; " + kExportAgain);
+    }
+  }
+  if (!format) in.fail(std::string("the header has no format line; ") + kExportAgain);
+  return header;
+}
+
+// The body's values as text: one item a line, further columns ignored.
+class PlyText {
+ public:
+  explicit PlyText(TextReader& in) : in_(in) {}
+  void begin_item(const PlyElement& element, std::size_t item) {
+    if (!in_.next_line())
+      in_.fail_truncated(fmt::format("{} of {} items of '{}'", item, element.count, printable(element.name)));
+  }
+  double value(Scalar) { return in_.number(); }
+  void skip(Scalar, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i) {
+      if (in_.word().empty()) fail(std::string("the line ends early; ") + kExportAgain);
+    }
+  }
+  std::size_t most_items(const PlyElement& element) const {
+    return in_.remaining() / (2 * std::max<std::size_t>(1, element.properties.size())) + 1;
+  }
+  std::string ignored() { return count_lines_left(in_); }
+  [[noreturn]] void fail(const std::string& what) const { in_.fail(what); }
+
+ private:
+  TextReader& in_;
+};
+
+// The body's values as bytes.
+class PlyBinary {
+ public:
+  PlyBinary(const std::string& path, std::string_view bytes, bool big_endian)
+      : path_(path), bytes_(bytes), big_endian_(big_endian) {}
+  void begin_item(const PlyElement& element, std::size_t item) {
+    element_ = &element;
+    item_ = item;
+  }
+  double value(Scalar type) {
+    const char* at = take(size_of(type));
+    switch (type) {
+      case Scalar::int8: return load<std::int8_t>(at, big_endian_);
+      case Scalar::uint8: return load<std::uint8_t>(at, big_endian_);
+      case Scalar::int16: return load<std::int16_t>(at, big_endian_);
+      case Scalar::uint16: return load<std::uint16_t>(at, big_endian_);
+      case Scalar::int32: return load<std::int32_t>(at, big_endian_);
+      case Scalar::uint32: return load<std::uint32_t>(at, big_endian_);
+      case Scalar::float32: return load<float>(at, big_endian_);
+      case Scalar::float64: return load<double>(at, big_endian_);
+    }
+    return 0;
+  }
+  void skip(Scalar type, std::size_t n) { take(n * size_of(type)); }
+  std::size_t most_items(const PlyElement& element) const {
+    return bytes_.size() / std::max<std::size_t>(1, element.least_size());
+  }
+  std::string ignored() const { return bytes_.empty() ? "" : quantity(bytes_.size(), "byte", "bytes"); }
+  [[noreturn]] void fail(const std::string& what) const {
+    io::fail(path_, fmt::format("{} {}: {}", printable(element_->name), item_, what));
+  }
+
+ private:
+  const char* take(std::size_t size) {
+    if (size > bytes_.size())
+      fail(fmt::format("the file ends here, of {} declared; it is truncated, {}", element_->count, kExportAgain));
+    const char* at = bytes_.data();
+    bytes_.remove_prefix(size);
+    return at;
+  }
+
+  const std::string& path_;
+  std::string_view bytes_;
+  bool big_endian_;
+  const PlyElement* element_ = nullptr;
+  std::size_t item_ = 0;
+};
+
+template <class Source>
+std::size_t read_ply_count(Source& source, const PlyProperty& property) {
+  const double n = source.value(property.count_type);
+  if (!(n >= 0 && n < kNone && n == std::floor(n)))
+    source.fail(fmt::format("a list cannot have {} entries; {}", n, kExportAgain));
+  return static_cast<std::size_t>(n);
+}
+
+template <class Source>
+void skip_ply_property(Source& source, const PlyProperty& property) {
+  source.skip(property.type, property.list ? read_ply_count(source, property) : 1);
+}
+
+template <class Source>
+void skip_ply_items(Source& source, const PlyElement& element) {
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    for (const PlyProperty& property : element.properties) skip_ply_property(source, property);
+  }
+}
+
+template <class Source>
+void read_ply_vertices(Source& source, const PlyElement& element, Soup& soup) {
+  std::vector<int> axes;
+  for (const PlyProperty& p : element.properties)
+    axes.push_back(p.name == "x" ? 0 : p.name == "y" ? 1 : p.name == "z" ? 2 : -1);
+  soup.vertices.reserve(std::min(element.count, source.most_items(element)));
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    Vec3 p;
+    for (std::size_t j = 0; j < axes.size(); ++j) {
+      const int axis = axes[j];
+      if (axis < 0) {
+        skip_ply_property(source, element.properties[j]);
+        continue;
+      }
+      p[axis] = source.value(element.properties[j].type);
+      if (const char* flaw = coordinate_flaw(p[axis])) source.fail(flaw);
+    }
+    soup.vertices.push_back(p);
+  }
+}
+
+template <class Source>
+void read_ply_face(Source& source, const PlyProperty& property, std::size_t vertices, Soup& soup) {
+  const std::size_t degree = read_ply_count(source, property);
+  if (degree < 3) source.fail(fmt::format("has {}; remove it", quantity(degree, "corner", "corners")));
+  for (std::size_t k = 0; k < degree; ++k) {
+    const double v = source.value(property.type);
+    if (!(v >= 0 && v < static_cast<double>(vertices) && v == std::floor(v)))
+      source.fail(fmt::format("index {} is out of range, the file has {} vertices; mend the face", v, vertices));
+    soup.faces.values.push_back(static_cast<Index>(v));
+  }
+  soup.end_face();
+}
+
+bool is_label(const PlyProperty& p) { return p.name == "label" && !p.list && p.type < Scalar::float32; }
+
+template <class Source>
+void read_ply_label(Source& source, const PlyProperty& property, Soup& soup) {
+  const double label = source.value(property.type);
+  if (!(label >= -0x1p31 && label < 0x1p32 && label == std::floor(label)))
+    source.fail(fmt::format("{} is not a label; give an integer of 32 bits", label));
+  soup.labels.push_back(static_cast<std::int32_t>(static_cast<std::uint32_t>(static_cast<std::int64_t>(label))));
+}
+
+template <class Source>
+void read_ply_faces(Source& source, const PlyElement& element, std::size_t vertices, Soup& soup) {
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    for (const PlyProperty& property : element.properties) {
+      if (is_index_list(property)) read_ply_face(source, property, vertices, soup);
+      else if (is_label(property)) read_ply_label(source, property, soup);
+      else skip_ply_property(source, property);
+    }
+  }
+}
+
+int edge_end(const PlyProperty& p) {
+  if (p.list || p.type >= Scalar::float32) return -1;
+  return p.name == "vertex1" ? 0 : p.name == "vertex2" ? 1 : -1;
+}
+
+bool has_ends(const PlyElement& element) {
+  for (const int end : {0, 1})
+    if (std::count_if(element.properties.begin(), element.properties.end(),
+                      [&](const PlyProperty& p) { return edge_end(p) == end; }) != 1)
+      return false;
+  return true;
+}
+
+template <class Source>
+void read_ply_edges(Source& source, const PlyElement& element, std::size_t vertices, Soup& soup) {
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    std::array<Index, 2> ends{};
+    for (const PlyProperty& property : element.properties) {
+      const int end = edge_end(property);
+      if (end < 0) {
+        skip_ply_property(source, property);
+        continue;
+      }
+      const double v = source.value(property.type);
+      if (!(v >= 0 && v < static_cast<double>(vertices) && v == std::floor(v)))
+        source.fail(fmt::format("index {} is out of range, the file has {} vertices; mend the edge", v, vertices));
+      ends[static_cast<std::size_t>(end)] = static_cast<Index>(v);
+    }
+    soup.edges.push_back(ends);
+  }
+}
+
+template <class Source>
+void read_ply_body(Source& source, const PlyHeader& header, Soup& soup) {
+  const std::size_t vertices = header.find("vertex")->count;
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty()) continue;
+    if (element.name == "vertex") {
+      read_ply_vertices(source, element, soup);
+    } else if (element.name == "face") {
+      read_ply_faces(source, element, vertices, soup);
+    } else if (element.name == "edge" && has_ends(element)) {
+      read_ply_edges(source, element, vertices, soup);
+    } else {
+      skip_ply_items(source, element);
+    }
+  }
+  soup.ignored = source.ignored();
+}
+
+void check_ply_vertices(const TextReader& in, const PlyHeader& header) {
+  const PlyElement* vertex = header.find("vertex");
+  if (!vertex) in.fail(std::string("the header has no element 'vertex'; ") + kExportAgain);
+  for (const char* axis : {"x", "y", "z"})
+    if (std::count_if(vertex->properties.begin(), vertex->properties.end(),
+                      [&](const PlyProperty& p) { return p.name == axis && !p.list; }) != 1 ||
+        std::count_if(vertex->properties.begin(), vertex->properties.end(),
+                      [&](const PlyProperty& p) { return p.name == axis; }) != 1)
+      in.fail(fmt::format("element 'vertex' needs one property '{}'; {}", axis, kExportAgain));
+}
+
+void check_ply_elements(const TextReader& in, const PlyHeader& header) {
+  check_ply_vertices(in, header);
+  const PlyElement* face = header.find("face");
+  if (!face) in.fail("the header has no element 'face'; export as triangles");
+  if (std::count_if(face->properties.begin(), face->properties.end(), is_index_list) != 1)
+    in.fail("element 'face' needs one list 'vertex_indices'; export as triangles");
+  if (std::count_if(face->properties.begin(), face->properties.end(), is_label) > 1)
+    in.fail(std::string("element 'face' has several properties 'label'; ") + kExportAgain);
+}
+
+// What comes after the vertices is not read.
+template <class Source>
+std::vector<Vec3> read_ply_positions(Source& source, const PlyHeader& header) {
+  Soup soup;
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty()) continue;
+    if (element.name == "vertex") {
+      read_ply_vertices(source, element, soup);
+      break;
+    }
+    skip_ply_items(source, element);
+  }
+  return std::move(soup.vertices);
+}
+
+template <class Source>
+std::vector<double> read_ply_scalars(Source& source, const PlyHeader& header, const PlyProperty* wanted,
+                                     const std::string& path) {
+  std::vector<double> values;
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty()) continue;
+    if (element.name != "vertex") {
+      skip_ply_items(source, element);
+      continue;
+    }
+    values.reserve(std::min(element.count, source.most_items(element)));
+    for (std::size_t i = 0; i < element.count; ++i) {
+      source.begin_item(element, i);
+      for (const PlyProperty& property : element.properties) {
+        if (&property != wanted) {
+          skip_ply_property(source, property);
+          continue;
+        }
+        values.push_back(source.value(property.type));
+        if (!std::isfinite(values.back()))
+          fail(path, fmt::format("vertex {}: '{}' is not finite; mend the value", i, printable(wanted->name)));
+      }
+    }
+    break;
+  }
+  return values;
+}
+
+std::string ply_header(std::size_t vertices, std::size_t faces, std::size_t largest_degree) {
+  return fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
+                     "property double x\nproperty double y\nproperty double z\n"
+                     "element face {}\nproperty list {} {} vertex_indices\n",
+                     vertices, faces, largest_degree > 255 ? "uint" : "uchar", vertices >> 31 ? "uint" : "int");
+}
+
+void append_ply_vertices(std::string& out, const std::vector<Vec3>& vertices) {
+  for (const Vec3& p : vertices)
+    for (int k = 0; k < 3; ++k) append_bytes(out, p[k]);
+}
+
+std::string ply_edge_header(const std::vector<std::array<Index, 2>>& edges, std::size_t vertices) {
+  if (edges.empty()) return {};
+  const char* type = vertices >> 31 ? "uint" : "int";
+  return fmt::format("element edge {}\nproperty {} vertex1\nproperty {} vertex2\n", edges.size(), type, type);
+}
+
+void append_ply_edges(std::string& out, const std::vector<std::array<Index, 2>>& edges) {
+  for (const std::array<Index, 2>& e : edges)
+    for (const Index v : e) append_bytes(out, v);
+}
+
+}  // namespace
+
+Soup read_ply(const std::string& path, std::string_view bytes) {
+  TextReader in(path, bytes, 0);
+  const PlyHeader header = read_ply_header(in);
+  check_ply_elements(in, header);
+  Soup soup;
+  if (header.text) {
+    PlyText source(in);
+    read_ply_body(source, header, soup);
+  } else {
+    PlyBinary source(path, in.after_line(), header.big_endian);
+    read_ply_body(source, header, soup);
+  }
+  return soup;
+}
+
+std::vector<Vec3> read_ply_points(const std::string& path, std::string_view bytes) {
+  TextReader in(path, bytes, 0);
+  const PlyHeader header = read_ply_header(in);
+  check_ply_vertices(in, header);
+  if (header.find("vertex")->count == 0) fail(path, "there is no point at all; export the file with points");
+  if (header.text) {
+    PlyText source(in);
+    return read_ply_positions(source, header);
+  }
+  PlyBinary source(path, in.after_line(), header.big_endian);
+  return read_ply_positions(source, header);
+}
+
+std::vector<double> read_ply_attribute(const std::string& path, std::string_view bytes, const std::string& name) {
+  TextReader in(path, bytes, 0);
+  const PlyHeader header = read_ply_header(in);
+  check_ply_vertices(in, header);
+  const PlyProperty* wanted = nullptr;
+  std::string known;
+  for (const PlyProperty& p : header.find("vertex")->properties) {
+    if (p.list) continue;
+    if (p.name == name && wanted)
+      fail(path, fmt::format("element 'vertex' has several properties '{}'; {}", printable(name), kExportAgain));
+    if (p.name == name) wanted = &p;
+    known += (known.empty() ? "" : ", ") + printable(p.name);
+  }
+  if (!wanted)
+    fail(path, fmt::format("element 'vertex' has no scalar property '{}'; use one of {}", printable(name), known));
+  if (header.text) {
+    PlyText source(in);
+    return read_ply_scalars(source, header, wanted, path);
+  }
+  PlyBinary source(path, in.after_line(), header.big_endian);
+  return read_ply_scalars(source, header, wanted, path);
+}
+
+std::string format_ply(const TriangleMesh& mesh) {
+  std::string out = ply_header(mesh.vertices.size(), mesh.triangles.size(), 3);
+  if (!mesh.labels.empty()) out += "property int label\n";
+  out += ply_edge_header(mesh.feature_edges, mesh.vertices.size()) + "end_header\n";
+  out.reserve(out.size() + 24 * mesh.vertices.size() + 17 * mesh.triangles.size() + 8 * mesh.feature_edges.size());
+  append_ply_vertices(out, mesh.vertices);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    append_bytes(out, static_cast<std::uint8_t>(3));
+    for (const Index v : mesh.triangles[i]) append_bytes(out, v);
+    if (!mesh.labels.empty()) append_bytes(out, mesh.labels[i]);
+  }
+  append_ply_edges(out, mesh.feature_edges);
+  return out;
+}
+
+std::string format_ply(const PolygonMesh& mesh) {
+  const std::size_t faces = mesh.polygons.rows();
+  std::size_t largest_degree = 0;
+  for (std::size_t i = 0; i < faces; ++i) largest_degree = std::max(largest_degree, mesh.polygons.size(i));
+  std::string out = ply_header(mesh.vertices.size(), faces, largest_degree);
+  if (!mesh.labels.empty()) out += "property uint label\n";
+  if (!mesh.colours.empty()) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  out += ply_edge_header(mesh.feature_edges, mesh.vertices.size()) + "end_header\n";
+  append_ply_vertices(out, mesh.vertices);
+  for (std::size_t i = 0; i < faces; ++i) {
+    if (largest_degree > 255) append_bytes(out, static_cast<std::uint32_t>(mesh.polygons.size(i)));
+    else append_bytes(out, static_cast<std::uint8_t>(mesh.polygons.size(i)));
+    for (const Index* v = mesh.polygons.begin(i); v != mesh.polygons.end(i); ++v) append_bytes(out, *v);
+    if (!mesh.labels.empty()) append_bytes(out, mesh.labels[i]);
+    if (!mesh.colours.empty())
+      for (const unsigned char channel : mesh.colours[i]) append_bytes(out, channel);
+  }
+  append_ply_edges(out, mesh.feature_edges);
+  return out;
+}
+
+}  // namespace bisector::io

@@ -1,0 +1,22 @@
+// Which tetrahedra share a facet.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/geometry.h"
+
+namespace bisector {
+
+// Corners of the facet opposite corner k, counter-clockwise seen from outside a positively oriented tetrahedron.
+inline constexpr int kFacetCorners[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+
+inline Triangle facet_of(const Tetrahedron& tet, int k) {
+  return {tet[kFacetCorners[k][0]], tet[kFacetCorners[k][1]], tet[kFacetCorners[k][2]]};
+}
+
+// For each tetrahedron and each of its facets the tetrahedron on the other side, or kNone on the boundary. Throws Error,
+// naming the first, if a facet has more than two tetrahedra.
+std::vector<std::array<Index, 4>> tet_adjacency(const std::vector<Tetrahedron>& tets);
+
+}  // namespace bisector

@@ -1,0 +1,152 @@
+#include "mesh/tet_topology.h"
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "core/parallel.h"
+#include "mesh/tet_adjacency.h"
+
+namespace bisector {
+
+namespace {
+
+struct Side {
+  Triangle corners;  // ascending
+  std::size_t at;    // 4 tet + facet
+  bool even;         // facet_of is an even permutation of `corners`
+};
+
+std::vector<Side> sorted_sides(const std::vector<Tetrahedron>& tets) {
+  std::vector<Side> sides(4 * tets.size());
+  parallel_each(tets.size(), [&](std::size_t t) {
+    for (int k = 0; k < 4; ++k) {
+      Triangle f = facet_of(tets[t], k);
+      bool even = true;
+      for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}, std::pair{0, 1}})
+        if (f[i] > f[j]) {
+          std::swap(f[i], f[j]);
+          even = !even;
+        }
+      sides[4 * t + static_cast<std::size_t>(k)] = {f, 4 * t + static_cast<std::size_t>(k), even};
+    }
+  });
+  sort_in_parallel(sides,
+                   [](const Side& a, const Side& b) { return std::tie(a.corners, a.at) < std::tie(b.corners, b.at); });
+  return sides;
+}
+
+// Calls visit(first, last) for the sides of each facet.
+template <class Visit>
+void for_each_facet(const std::vector<Side>& sides, const Visit& visit) {
+  for (std::size_t first = 0, last; first < sides.size(); first = last) {
+    for (last = first + 1; last < sides.size() && sides[last].corners == sides[first].corners;) ++last;
+    visit(first, last);
+  }
+}
+
+std::vector<Triangle> boundary_of(const std::vector<Tetrahedron>& tets, const std::vector<Side>& sides) {
+  std::vector<std::size_t> single;
+  for_each_facet(sides, [&](std::size_t first, std::size_t last) {
+    if (last - first == 1) single.push_back(sides[first].at);
+  });
+  std::sort(single.begin(), single.end());
+  std::vector<Triangle> facets;
+  for (const std::size_t at : single) facets.push_back(facet_of(tets[at / 4], static_cast<int>(at % 4)));
+  return facets;
+}
+
+std::size_t find_root(std::vector<std::size_t>& parent, std::size_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+void check_vertices(const TetMesh& mesh, TetTopology& topology) {
+  std::vector<char> used(mesh.vertices.size(), 0);
+  for (const Tetrahedron& t : mesh.tets)
+    for (const Index v : t) used[v] = 1;
+  std::vector<Index> order;
+  for (Index v = 0; v < used.size(); ++v)
+    if (used[v]) order.push_back(v);
+  topology.unused_vertices = used.size() - order.size();
+  const auto key = [&](Index v) {
+    const Vec3& p = mesh.vertices[v];
+    return std::tuple(p.x, p.y, p.z);
+  };
+  sort_in_parallel(order, [&](Index a, Index b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
+  for (std::size_t i = 1; i < order.size(); ++i)
+    if (mesh.vertices[order[i]] == mesh.vertices[order[i - 1]]) ++topology.repeated_vertices;
+}
+
+}  // namespace
+
+TetTopology analyse_tet_topology(const TetMesh& mesh) {
+  TetTopology topology;
+  if (mesh.tets.empty()) return topology;
+  const std::vector<Side> sides = sorted_sides(mesh.tets);
+  std::vector<std::size_t> parent(mesh.tets.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  for_each_facet(sides, [&](std::size_t first, std::size_t last) {
+    if (last - first > 2) ++topology.overused_facets;
+    if (last - first == 2 && sides[first].even == sides[first + 1].even) ++topology.misoriented_facets;
+    for (std::size_t s = first + 1; s < last; ++s) {
+      const std::size_t a = find_root(parent, sides[first].at / 4), b = find_root(parent, sides[s].at / 4);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  });
+  for (std::size_t t = 0; t < parent.size(); ++t) topology.components += parent[t] == t;
+  check_vertices(mesh, topology);
+  topology.boundary = analyse_topology(boundary_of(mesh.tets, sides), mesh.vertices.size());
+  topology.conforming =
+      topology.overused_facets == 0 && topology.misoriented_facets == 0 && topology.repeated_vertices == 0;
+  return topology;
+}
+
+std::vector<Triangle> boundary_facets(const std::vector<Tetrahedron>& tets) {
+  return boundary_of(tets, sorted_sides(tets));
+}
+
+TriangleMesh boundary_surface(const TetMesh& mesh, std::vector<Index>* vertices) {
+  TriangleMesh surface;
+  surface.triangles = boundary_facets(mesh.tets);
+  if (!mesh.boundary_labels.empty()) {
+    std::vector<std::pair<Triangle, std::int32_t>> marks;
+    for (std::size_t i = 0; i < mesh.boundary.size(); ++i) {
+      Triangle t = mesh.boundary[i];
+      std::sort(t.begin(), t.end());
+      marks.emplace_back(t, mesh.boundary_labels[i]);
+    }
+    std::sort(marks.begin(), marks.end());
+    for (Triangle t : surface.triangles) {
+      std::sort(t.begin(), t.end());
+      const auto at = std::lower_bound(marks.begin(), marks.end(), t,
+                                       [](const auto& mark, const Triangle& key) { return mark.first < key; });
+      surface.labels.push_back(at != marks.end() && at->first == t ? at->second : 0);
+    }
+    if (std::all_of(surface.labels.begin(), surface.labels.end(), [](std::int32_t label) { return label == 0; }))
+      surface.labels.clear();
+  }
+
+  std::vector<Index> index(mesh.vertices.size(), kNone), origin;
+  for (const Triangle& t : surface.triangles)
+    for (const Index v : t) index[v] = 0;
+  for (Index v = 0; v < index.size(); ++v) {
+    if (index[v] == kNone) continue;
+    index[v] = static_cast<Index>(origin.size());
+    origin.push_back(v);
+    surface.vertices.push_back(mesh.vertices[v]);
+  }
+  for (Triangle& t : surface.triangles)
+    for (Index& v : t) v = index[v];
+  const EdgeTable table = edge_table(surface.triangles, surface.vertices.size());
+  for (const auto& [a, b] : mesh.feature_edges) {
+    if (index[a] == kNone || index[b] == kNone) continue;
+    const std::array<Index, 2> e{std::min(index[a], index[b]), std::max(index[a], index[b])};
+    if (std::binary_search(table.edges.begin(), table.edges.end(), e)) surface.feature_edges.push_back(e);
+  }
+  if (vertices) *vertices = std::move(origin);
+  return surface;
+}
+
+}  // namespace bisector

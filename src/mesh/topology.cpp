@@ -1,0 +1,175 @@
+#include "mesh/topology.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+namespace bisector {
+
+namespace {
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), std::size_t{0}); }
+
+  std::size_t root(std::size_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(std::size_t i, std::size_t j) {
+    i = root(i);
+    j = root(j);
+    parent_[std::max(i, j)] = std::min(i, j);
+  }
+
+ private:
+  std::vector<std::size_t> parent_;
+};
+
+Index origin(const std::vector<Triangle>& triangles, std::size_t half_edge) {
+  return triangles[half_edge / 3][half_edge % 3];
+}
+
+std::size_t next_half_edge(std::size_t half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
+
+// The corner of the half-edge's triangle that lies at an end of its edge; half-edge h starts at corner h.
+std::size_t corner_at(const std::vector<Triangle>& triangles, std::size_t half_edge, Index vertex) {
+  return origin(triangles, half_edge) == vertex ? half_edge : next_half_edge(half_edge);
+}
+
+// Number of vertices whose corners make more than one fan; `fans` links the corners (3 t + k) of each.
+std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count, DisjointSets& fans) {
+  constexpr std::size_t kUnseen = static_cast<std::size_t>(-1);
+  std::vector<std::size_t> fan(vertex_count, kUnseen);
+  std::vector<char> split(vertex_count, 0);
+  for (std::size_t corner = 0; corner < 3 * triangles.size(); ++corner) {
+    const Index v = origin(triangles, corner);
+    const std::size_t root = fans.root(corner);
+    if (fan[v] == kUnseen) fan[v] = root;
+    if (fan[v] != root) split[v] = 1;
+  }
+  return static_cast<std::size_t>(std::count(split.begin(), split.end(), 1));
+}
+
+}  // namespace
+
+EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  using Record = std::pair<Index, std::size_t>;  // the edge's higher vertex, half-edge
+  const std::size_t n = 3 * triangles.size();
+  const auto ends = [&](std::size_t h) {
+    return std::minmax({origin(triangles, h), origin(triangles, next_half_edge(h))});
+  };
+
+  std::vector<std::size_t> first(vertex_count + 1, 0);
+  for (std::size_t h = 0; h < n; ++h) ++first[ends(h).first + 1];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<Record> records(n);
+  std::vector<std::size_t> slot(first.begin(), first.end() - 1);
+  for (std::size_t h = 0; h < n; ++h) {
+    const auto [low, high] = ends(h);
+    records[slot[low]++] = {high, h};
+  }
+
+  EdgeTable table;
+  table.edges.reserve(n / 2);
+  table.half_edges.offsets.reserve(n / 2 + 1);
+  table.half_edges.values.reserve(n);
+  for (std::size_t v = 0; v < vertex_count; ++v) {
+    std::sort(records.begin() + first[v], records.begin() + first[v + 1]);
+    for (std::size_t i = first[v]; i < first[v + 1]; ++i) {
+      if (i == first[v] || records[i].first != records[i - 1].first) {
+        if (!table.edges.empty()) table.half_edges.offsets.push_back(table.half_edges.values.size());
+        table.edges.push_back({static_cast<Index>(v), records[i].first});
+      }
+      table.half_edges.values.push_back(records[i].second);
+    }
+  }
+  if (!table.edges.empty()) table.half_edges.offsets.push_back(table.half_edges.values.size());
+  return table;
+}
+
+MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  if (triangles.empty()) return {};
+  const EdgeTable table = edge_table(triangles, vertex_count);
+  MeshTopology topology;
+  topology.oriented = true;
+  DisjointSets fans(3 * triangles.size()), parts(vertex_count);
+  for (std::size_t e = 0; e < table.edges.size(); ++e) {
+    const auto [a, b] = table.edges[e];
+    const std::size_t* sides = table.half_edges.begin(e);
+    const std::size_t count = table.half_edges.size(e);
+    parts.join(a, b);
+    if (count == 1) ++topology.boundary_edges;
+    if (count > 2 || a == b) ++topology.non_manifold_edges;
+    if (count == 2 && origin(triangles, sides[0]) == origin(triangles, sides[1])) topology.oriented = false;
+    for (std::size_t s = 1; s < count; ++s)
+      for (const Index v : {a, b}) fans.join(corner_at(triangles, sides[0], v), corner_at(triangles, sides[s], v));
+  }
+  topology.non_manifold_vertices = count_split_vertices(triangles, vertex_count, fans);
+  topology.closed = topology.boundary_edges == 0;
+  topology.manifold = topology.non_manifold_edges == 0 && topology.non_manifold_vertices == 0;
+
+  std::vector<char> used(vertex_count, 0);
+  for (const Triangle& t : triangles)
+    for (const Index v : t) used[v] = 1;
+  long long vertices = 0;
+  for (std::size_t v = 0; v < vertex_count; ++v) {
+    if (!used[v]) continue;
+    ++vertices;
+    if (parts.root(v) == v) ++topology.components;
+  }
+  topology.euler = vertices - static_cast<long long>(table.edges.size()) + static_cast<long long>(triangles.size());
+  return topology;
+}
+
+std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  DisjointSets sets(vertex_count);
+  std::vector<Index> label(vertex_count, kNone);
+  for (const Triangle& t : triangles)
+    for (int k = 0; k < 3; ++k) {
+      sets.join(t[0], t[k]);
+      label[t[k]] = 0;
+    }
+  std::vector<Index> of_root(vertex_count, kNone);
+  Index count = 0;
+  for (std::size_t v = 0; v < vertex_count; ++v) {
+    if (label[v] == kNone) continue;
+    Index& component = of_root[sets.root(v)];
+    if (component == kNone) component = count++;
+    label[v] = component;
+  }
+  return label;
+}
+
+void orient(std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  const EdgeTable table = edge_table(triangles, vertex_count);
+  std::vector<std::size_t> edge_of(3 * triangles.size());
+  for (std::size_t e = 0; e < table.edges.size(); ++e)
+    for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of[*h] = e;
+  enum : char { unseen, kept, turned };
+  std::vector<char> state(triangles.size(), unseen);
+  for (std::size_t start = 0; start < triangles.size(); ++start) {
+    if (state[start] != unseen) continue;
+    std::vector<std::size_t> part{start};
+    state[start] = kept;
+    std::size_t turns = 0;
+    for (std::size_t head = 0; head < part.size(); ++head)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t h = 3 * part[head] + k, e = edge_of[h];
+        if (table.half_edges.size(e) != 2) continue;
+        const std::size_t* sides = table.half_edges.begin(e);
+        const std::size_t other = sides[0] == h ? sides[1] : sides[0], t = other / 3;
+        if (state[t] != unseen) continue;
+        const bool agree = origin(triangles, h) != origin(triangles, other);
+        state[t] = agree == (state[part[head]] == kept) ? kept : turned;
+        turns += state[t] == turned;
+        part.push_back(t);
+      }
+    if (2 * turns > part.size())
+      for (std::size_t t : part) state[t] = state[t] == kept ? turned : kept;
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (state[t] == turned) std::swap(triangles[t][1], triangles[t][2]);
+}
+
+}  // namespace bisector

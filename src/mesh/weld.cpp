@@ -1,0 +1,414 @@
+#include "mesh/weld.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <numeric>
+#include <utility>
+
+#include "bisector/error.h"
+#include "mesh/topology.h"
+#include "spatial/hilbert.h"
+#include "spatial/seed_tree.h"
+
+namespace bisector {
+
+namespace {
+
+using Edge = std::array<Index, 2>;
+
+bool has_repeated_corner(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+// For each point the first of those equal to it.
+std::vector<Index> first_equal(const std::vector<Vec3>& points) {
+  std::vector<Index> order(points.size()), first(points.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(), [&](Index i, Index j) {
+    const Vec3 &p = points[i], &q = points[j];
+    if (p.x != q.x) return p.x < q.x;
+    if (p.y != q.y) return p.y < q.y;
+    return p.z != q.z ? p.z < q.z : i < j;
+  });
+  for (std::size_t k = 0; k < order.size(); ++k)
+    first[order[k]] = k > 0 && points[order[k]] == points[order[k - 1]] ? first[order[k - 1]] : order[k];
+  return first;
+}
+
+// The mesh under work: its triangles and where each came from.
+struct Work {
+  const std::vector<Vec3>& points;
+  std::vector<Triangle> triangles;
+  std::vector<Index> origin;
+
+  // Returns how many were removed.
+  std::size_t remove(const std::vector<char>& unwanted) {
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      if (unwanted[t]) continue;
+      triangles[kept] = triangles[t];
+      origin[kept++] = origin[t];
+    }
+    const std::size_t removed = triangles.size() - kept;
+    triangles.resize(kept);
+    origin.resize(kept);
+    return removed;
+  }
+
+  std::size_t remove_degenerate() {
+    std::vector<char> unwanted(triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t) unwanted[t] = has_repeated_corner(triangles[t]);
+    return remove(unwanted);
+  }
+
+  std::size_t remove_duplicates() {
+    std::vector<std::pair<Triangle, std::size_t>> keys(triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      keys[t] = {triangles[t], t};
+      std::sort(keys[t].first.begin(), keys[t].first.end());
+    }
+    std::sort(keys.begin(), keys.end());
+    std::vector<char> unwanted(triangles.size(), 0);
+    for (std::size_t k = 1; k < keys.size(); ++k)
+      if (keys[k].first == keys[k - 1].first) unwanted[keys[k].second] = 1;
+    return remove(unwanted);
+  }
+
+  void rename(const std::vector<Index>& name) {
+    for (Triangle& t : triangles)
+      for (Index& v : t) v = name[v];
+  }
+};
+
+std::size_t count_border(const EdgeTable& table) {
+  std::size_t count = 0;
+  for (std::size_t e = 0; e < table.edges.size(); ++e) count += table.half_edges.size(e) == 1;
+  return count;
+}
+
+// The borders of a mesh, and what is near along the surface.
+class Borders {
+ public:
+  Borders(const Work& work, double tolerance)
+      : work_(work),
+        tolerance_(tolerance),
+        table(edge_table(work.triangles, work.points.size())),
+        edge_of_(3 * work.triangles.size()),
+        triangles_at_(triangles_at_vertices()),
+        stamp_(work.triangles.size(), 0) {
+    std::vector<char> on_border(work.points.size(), 0);
+    for (std::size_t e = 0; e < table.edges.size(); ++e) {
+      for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of_[*h] = e;
+      if (table.half_edges.size(e) != 1) continue;
+      edges.push_back(e);
+      for (const Index v : table.edges[e]) on_border[v] = 1;
+    }
+    for (std::size_t v = 0; v < on_border.size(); ++v)
+      if (on_border[v]) vertices.push_back(static_cast<Index>(v));
+
+    for (const Index v : vertices) ordered_points_.push_back(work.points[v]);
+    for (const Index i : hilbert_order(ordered_points_)) ordered_.push_back(vertices[i]);
+    for (std::size_t i = 0; i < ordered_.size(); ++i) ordered_points_[i] = work.points[ordered_[i]];
+    tree_.build(ordered_points_);
+  }
+  Borders(const Borders&) = delete;
+  Borders& operator=(const Borders&) = delete;
+
+ private:
+  const Work& work_;
+  const double tolerance_;
+
+ public:
+  const EdgeTable table;
+  std::vector<std::size_t> edges;  // of one triangle, ascending
+  std::vector<Index> vertices;     // on them, ascending
+
+  // Border vertices within the tolerance of a box, and some others, ascending.
+  const std::vector<Index>& near(const Box& box) {
+    found_.clear();
+    tree_.near(box, tolerance_, found_);
+    for (Index& i : found_) i = ordered_[i];
+    std::sort(found_.begin(), found_.end());
+    return found_;
+  }
+
+  // Marks the triangles that are joined to v through others, all of them within twice the tolerance of it.
+  void mark_surface_around(Index v) {
+    ++current_;
+    front_.clear();
+    const auto reach = [&](std::size_t t) {
+      if (std::exchange(stamp_[t], current_) != current_) front_.push_back(t);
+    };
+    for (const std::size_t* t = triangles_at_.begin(v); t != triangles_at_.end(v); ++t) reach(*t);
+    for (std::size_t i = 0; i < front_.size(); ++i)
+      for (std::size_t h = 3 * front_[i]; h < 3 * front_[i] + 3; ++h) {
+        const std::size_t e = edge_of_[h];
+        for (const std::size_t* other = table.half_edges.begin(e); other != table.half_edges.end(e); ++other)
+          if (stamp_[*other / 3] != current_ && distance(v, *other / 3) <= 2 * tolerance_) reach(*other / 3);
+      }
+  }
+  bool is_marked(std::size_t triangle) const { return stamp_[triangle] == current_; }
+  bool touches_marked(Index v) const {
+    return std::any_of(triangles_at_.begin(v), triangles_at_.end(v), [&](std::size_t t) { return is_marked(t); });
+  }
+
+ private:
+  Csr<std::size_t> triangles_at_vertices() const {
+    Csr<std::size_t> rows;
+    rows.offsets.assign(work_.points.size() + 1, 0);
+    for (const Triangle& t : work_.triangles)
+      for (const Index v : t) ++rows.offsets[v + 1];
+    std::partial_sum(rows.offsets.begin(), rows.offsets.end(), rows.offsets.begin());
+    rows.values.resize(3 * work_.triangles.size());
+    std::vector<std::size_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
+    for (std::size_t t = 0; t < work_.triangles.size(); ++t)
+      for (const Index v : work_.triangles[t]) rows.values[next[v]++] = t;
+    return rows;
+  }
+  double distance(Index v, std::size_t triangle) const {
+    const auto [a, b, c] = work_.triangles[triangle];
+    const Vec3& p = work_.points[v];
+    return norm(p - nearest_on_triangle(p, work_.points[a], work_.points[b], work_.points[c]));
+  }
+
+  std::vector<std::size_t> edge_of_;  // of each half-edge
+  Csr<std::size_t> triangles_at_;     // of each vertex
+  std::vector<std::size_t> stamp_, front_;
+  std::size_t current_ = 0;
+  std::vector<Index> ordered_, found_;
+  std::vector<Vec3> ordered_points_;
+  SeedTree tree_;
+};
+
+// For each vertex the one that it becomes.
+std::vector<Index> merge_borders(const Work& work, double tolerance) {
+  Borders borders(work, tolerance);
+  std::vector<Index> name(work.points.size()), next_member(work.points.size(), kNone);
+  std::iota(name.begin(), name.end(), Index{0});
+  std::vector<std::pair<double, Index>> choices;
+  for (const Index v : borders.vertices) {
+    const Vec3& p = work.points[v];
+    choices.clear();
+    for (const Index w : borders.near({p, p})) {
+      const double d = norm(work.points[w] - p);
+      if (w < v && name[w] == w && d <= tolerance) choices.emplace_back(d, w);
+    }
+    if (choices.empty()) continue;
+    std::sort(choices.begin(), choices.end());
+    borders.mark_surface_around(v);
+    for (const auto& [d, w] : choices) {
+      Index last = w;
+      bool apart = !borders.touches_marked(w);
+      while (apart && next_member[last] != kNone) {
+        last = next_member[last];
+        apart = !borders.touches_marked(last);
+      }
+      if (!apart) continue;
+      name[v] = w;
+      next_member[last] = v;
+      break;
+    }
+  }
+  return name;
+}
+
+// Vertices to be put on an edge, in order from its lower end.
+struct Inserted {
+  Edge edge;
+  std::vector<Index> vertices;
+};
+
+class EdgeSplitter {
+ public:
+  EdgeSplitter(Work& work, double tolerance) : work_(work), tolerance_(tolerance), borders_(work, tolerance) {
+    neighbours_.resize(work.points.size());
+    for (const std::size_t e : borders_.edges) {
+      const auto [a, b] = borders_.table.edges[e];
+      neighbours_[a].push_back(b);
+      neighbours_[b].push_back(a);
+    }
+  }
+
+  // Ascending by edge.
+  std::vector<Inserted> split() {
+    std::vector<Inserted> all;
+    for (const std::size_t e : borders_.edges) {
+      Inserted inserted{borders_.table.edges[e], find(e)};
+      if (!inserted.vertices.empty()) all.push_back(std::move(inserted));
+    }
+    if (all.empty()) return all;
+    std::vector<Triangle> triangles;
+    std::vector<Index> origin;
+    for (std::size_t t = 0; t < work_.triangles.size(); ++t) {
+      emit(work_.triangles[t], 0, all, triangles);
+      origin.resize(triangles.size(), work_.origin[t]);
+    }
+    work_.triangles = std::move(triangles);
+    work_.origin = std::move(origin);
+    return all;
+  }
+
+ private:
+  double parameter(Index v, Index a, Index b) const {
+    const Vec3 d = work_.points[b] - work_.points[a];
+    return dot(work_.points[v] - work_.points[a], d) / norm2(d);
+  }
+  double distance_to_edge(Index v, Index a, Index b) const {
+    const double t = std::clamp(parameter(v, a, b), 0.0, 1.0);
+    return norm(work_.points[v] - ((1 - t) * work_.points[a] + t * work_.points[b]));
+  }
+
+  std::vector<Index> find(std::size_t e) {
+    const auto [a, b] = borders_.table.edges[e];
+    const std::size_t half_edge = *borders_.table.half_edges.begin(e);
+    const Index apex = work_.triangles[half_edge / 3][(half_edge + 2) % 3];
+    std::vector<std::pair<double, Index>> on_edge;
+    const std::vector<Index> near = borders_.near(bounding_box({work_.points[a], work_.points[b]}));
+    for (const Index v : near) {
+      if (v == a || v == b || v == apex || distance_to_edge(v, a, b) > tolerance_) continue;
+      if (norm(work_.points[v] - work_.points[a]) <= tolerance_) continue;
+      if (norm(work_.points[v] - work_.points[b]) <= tolerance_) continue;
+      const bool along = std::any_of(neighbours_[v].begin(), neighbours_[v].end(), [&](Index w) {
+        return distance_to_edge(w, a, b) <= tolerance_ || distance_to_edge(a, v, w) <= tolerance_ ||
+               distance_to_edge(b, v, w) <= tolerance_;
+      });
+      if (!along) continue;
+      borders_.mark_surface_around(v);
+      if (!borders_.is_marked(half_edge / 3)) on_edge.emplace_back(parameter(v, a, b), v);
+    }
+    std::sort(on_edge.begin(), on_edge.end());
+    std::vector<Index> vertices;
+    for (const auto& [t, v] : on_edge) vertices.push_back(v);
+    return turns_over(a, b, apex, vertices) ? std::vector<Index>{} : vertices;
+  }
+
+  bool turns_over(Index a, Index b, Index apex, const std::vector<Index>& vertices) const {
+    const Vec3& c = work_.points[apex];
+    const auto normal = [&](Index i, Index j) { return cross(work_.points[j] - work_.points[i], c - work_.points[i]); };
+    const Vec3 whole = normal(a, b);
+    Index last = a;
+    for (std::size_t k = 0; k <= vertices.size(); ++k) {
+      const Index next = k < vertices.size() ? vertices[k] : b;
+      if (!(dot(normal(last, next), whole) > 0)) return true;
+      last = next;
+    }
+    return false;
+  }
+
+  // Splits a triangle by fans, edge after edge from the given one on.
+  static void emit(const Triangle& t, std::size_t edge, const std::vector<Inserted>& all, std::vector<Triangle>& out) {
+    for (std::size_t k = edge; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
+      const Edge e{std::min(a, b), std::max(a, b)};
+      const auto at = std::lower_bound(all.begin(), all.end(), e,
+                                       [](const Inserted& i, const Edge& wanted) { return i.edge < wanted; });
+      if (at == all.end() || at->edge != e) continue;
+      std::vector<Index> chain = at->vertices;
+      if (a > b) std::reverse(chain.begin(), chain.end());
+      chain.insert(chain.begin(), a);
+      chain.push_back(b);
+      for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+        Triangle part;
+        part[k] = chain[i];
+        part[(k + 1) % 3] = chain[i + 1];
+        part[(k + 2) % 3] = c;
+        emit(part, k + 1, all, out);
+      }
+      return;
+    }
+    out.push_back(t);
+  }
+
+  Work& work_;
+  const double tolerance_;
+  Borders borders_;
+  std::vector<std::vector<Index>> neighbours_;  // of each vertex along borders
+};
+
+std::vector<Edge> rename_feature_edges(const TriangleMesh& mesh, const std::vector<Index>& name,
+                                       const std::vector<Inserted>& splits) {
+  std::vector<Edge> edges;
+  for (const Edge& old : mesh.feature_edges) {
+    const Edge e{std::min(name[old[0]], name[old[1]]), std::max(name[old[0]], name[old[1]])};
+    if (e[0] == e[1]) continue;
+    const auto at = std::lower_bound(splits.begin(), splits.end(), e,
+                                     [](const Inserted& i, const Edge& wanted) { return i.edge < wanted; });
+    Index last = e[0];
+    if (at != splits.end() && at->edge == e)
+      for (const Index v : at->vertices) edges.push_back({std::exchange(last, v), v});
+    edges.push_back({last, e[1]});
+  }
+  return edges;
+}
+
+// Sorts edges, each once, and drops those that collapsed with their triangles.
+void keep_edges_of(const Work& work, std::vector<Edge>& edges) {
+  if (edges.empty()) return;
+  for (Edge& e : edges) std::sort(e.begin(), e.end());
+  std::sort(edges.begin(), edges.end());
+  const std::vector<Edge> known = edge_table(work.triangles, work.points.size()).edges;
+  std::vector<Edge> kept;
+  std::set_intersection(edges.begin(), edges.end(), known.begin(), known.end(), std::back_inserter(kept));
+  edges = std::move(kept);
+}
+
+}  // namespace
+
+WeldResult weld(const TriangleMesh& mesh, double tolerance) {
+  if (!(tolerance >= 0 && std::isfinite(tolerance)))
+    throw Error(fmt::format("welding tolerance {}: give a length, 0 or more", tolerance));
+  WeldResult result;
+  Work work{mesh.vertices, mesh.triangles, std::vector<Index>(mesh.triangles.size())};
+  std::iota(work.origin.begin(), work.origin.end(), Index{0});
+  result.degenerate_triangles = work.remove_degenerate();
+  result.border_before = count_border(edge_table(work.triangles, work.points.size()));
+
+  std::vector<Index> name = first_equal(mesh.vertices);
+  const auto clean = [&] {
+    result.degenerate_triangles += work.remove_degenerate();
+    result.duplicate_triangles += work.remove_duplicates();
+  };
+  work.rename(name);
+  clean();
+  std::vector<Inserted> splits;
+  if (tolerance > 0) {
+    const std::vector<Index> merged = merge_borders(work, tolerance);
+    for (Index& v : name) v = merged[v];
+    work.rename(merged);
+    clean();
+    splits = EdgeSplitter(work, tolerance).split();
+    result.split_edges = splits.size();
+    clean();
+  }
+  std::vector<Edge> feature_edges = rename_feature_edges(mesh, name, splits);
+  keep_edges_of(work, feature_edges);
+
+  std::vector<Index> place(mesh.vertices.size(), kNone);
+  for (std::size_t v = 0; v < name.size(); ++v)
+    if (name[v] == v) {
+      place[v] = static_cast<Index>(result.mesh.vertices.size());
+      result.mesh.vertices.push_back(mesh.vertices[v]);
+    }
+  for (Index& v : name) v = place[v];
+  result.merged_vertices = mesh.vertices.size() - result.mesh.vertices.size();
+  work.rename(place);
+  for (Edge& e : feature_edges)
+    for (Index& v : e) v = place[v];
+
+  bool same_faces = work.origin.size() == mesh.triangles.size();
+  for (std::size_t t = 0; same_faces && t < work.origin.size(); ++t) same_faces = work.origin[t] == t;
+  for (const Index t : work.origin) {
+    if (!mesh.labels.empty()) result.mesh.labels.push_back(mesh.labels[t]);
+    if (!mesh.face_of_triangle.empty()) result.mesh.face_of_triangle.push_back(mesh.face_of_triangle[t]);
+    else if (!same_faces) result.mesh.face_of_triangle.push_back(t);
+  }
+  result.border_after = count_border(edge_table(work.triangles, result.mesh.vertices.size()));
+  result.mesh.triangles = std::move(work.triangles);
+  result.mesh.feature_edges = std::move(feature_edges);
+  result.vertex_of = std::move(name);
+  return result;
+}
+
+}  // namespace bisector

@@ -1,0 +1,34 @@
+// Closing cracks: merging what is one point, and splitting edges at vertices that lie on them (thesis 4.6, "Incomplete
+// input data": through a crack, dual triangles go missing).
+#pragma once
+
+#include <vector>
+
+#include "core/geometry.h"
+
+namespace bisector {
+
+struct WeldResult {
+  TriangleMesh mesh;
+  std::vector<Index> vertex_of;          // of each vertex of the input, the one that it has become
+  std::size_t merged_vertices = 0;       // fewer than in the input
+  std::size_t split_edges = 0;           // border edges that got vertices of another border
+  std::size_t degenerate_triangles = 0;  // removed: two corners are the same vertex
+  std::size_t duplicate_triangles = 0;   // removed: of the same three vertices as an earlier one, either way round
+  std::size_t border_before = 0;         // edges of one triangle in the input
+  std::size_t border_after = 0;
+};
+
+// First merges vertices at the same point. With a positive tolerance, a length in the mesh's unit, it then merges
+// border vertices that are no farther apart, in ascending order of index, each into the nearest of those before it that
+// are not merged themselves; nothing moves by more than the tolerance, however many follow each other, and vertices
+// keep positions of the input. What is near along the surface too, within twice the tolerance, stays apart, so that
+// short edges and thin strips do not collapse; neither do thin sheets, for vertices away from borders stay. Last, a
+// border edge is split at vertices of other borders that lie within the tolerance of its inside, if a border runs along
+// it there and no triangle turns over.
+//
+// Vertices and triangles keep their order; labels, face_of_triangle and feature_edges follow. Throws Error if the
+// tolerance is negative or not finite.
+WeldResult weld(const TriangleMesh& mesh, double tolerance);
+
+}  // namespace bisector

@@ -1,0 +1,403 @@
+#include "remesh/feature_recovery.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "cvt/multilevel.h"
+#include "voronoi/dual.h"
+
+namespace bisector {
+namespace {
+
+using Kind = SeedPlace::Kind;
+
+constexpr int kRelocatingRounds = 3;  // the first, which keep to the number of seeds that a curve should have
+constexpr int kMovingRounds = 8;      // with an optimisation after each
+constexpr int kInsertingRounds = 20;  // after these
+constexpr int kClearingRounds = 4, kClearingSteps = 15;
+constexpr std::size_t kMostAdded = 100;  // and a quarter of the seeds
+constexpr int kFirstSteps = 20, kLastSteps = 4;
+constexpr double kRoomToSnap = 0.4;   // length of curve that a cell must hold to be snapped to it, in edges
+constexpr double kSmallest = 0.05;    // length of curve, in edges, that is worth a seed
+constexpr double kTiniest = 0.002;    // the same in the last rounds
+constexpr double kShortLink = 0.5;    // edges along a curve that are shorter are not divided
+constexpr double kAcute = 0.8;        // gap of two curves from the same corner, in edges, that calls for protection
+constexpr double kLeastStep = 0.3;    // between shells, in edges
+constexpr std::size_t kMostShells = 1000;
+constexpr double kPush = 0.3;         // of its distance, for cells that hold less
+
+struct Fault {
+  Index curve;
+  double from, to;  // where: between these positions
+  Index cell;       // that does not belong there; kNone if a seed is missing
+};
+
+struct Found {
+  std::vector<Fault> faults;
+  FeatureReport report;
+};
+
+// Triangles of the dual at each edge between seeds on features, as often as the diagram has them.
+std::map<std::array<Index, 2>, Index> dual_edge_counts(const Dual& dual, const std::vector<SeedPlace>& places) {
+  const auto placed = [&](Index seed) { return places[seed].kind != Kind::surface; };
+  std::map<std::array<Index, 2>, Index> counts;
+  for (std::size_t k = 0; k < dual.triangles.size(); ++k) {
+    const Triangle& t = dual.triangles[k];
+    for (int m = 0; m < 3; ++m) {
+      const Index a = t[m], b = t[(m + 1) % 3];
+      if (placed(a) && placed(b)) counts[{std::min(a, b), std::max(a, b)}] += dual.multiplicity[k];
+    }
+  }
+  return counts;
+}
+
+Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
+                  const RestrictedPolygons& polygons) {
+  const std::vector<std::vector<CurveInterval>> traces = trace.trace(polygons);
+  const std::map<std::array<Index, 2>, Index> dual_edges = dual_edge_counts(extract_dual(polygons), places);
+  Found found;
+  std::map<std::array<Index, 2>, Index> taken;  // the curve that has an edge of the dual
+  std::vector<Index> visits(places.size(), 0);
+  for (Index c = 0; c < traces.size(); ++c) {
+    const std::vector<CurveInterval>& intervals = traces[c];
+    const std::size_t before = found.faults.size(), count = intervals.size();
+    const bool closed = curves.closed(c);
+    std::vector<char> valid(count, 0);
+    const bool around = closed && count > 1 && intervals.front().cell == intervals.back().cell;
+    for (std::size_t k = 0; k < count; ++k) {
+      const CurveInterval& i = intervals[k];
+      const SeedPlace& place = places[i.cell];
+      const bool own = place.curve == c;
+      const bool corner = !closed && place.corner != kNone && ((k == 0 && place.corner == curves.ends(c)[0]) ||
+                                                               (k + 1 == count && place.corner == curves.ends(c)[1]));
+      valid[k] = own || corner;
+      if (!valid[k]) {
+        found.faults.push_back({c, i.from, i.to, i.cell});
+        continue;
+      }
+      const bool again = visits[i.cell]++ > 0 && !(around && k + 1 == count) && !corner;
+      if (again && !(place.position >= i.from && place.position <= i.to)) found.faults.push_back({c, i.from, i.to, kNone});
+    }
+    // A chain of edges that no other curve has, each with a triangle on every sheet.
+    const std::size_t links = count - (closed && !around ? 0 : 1);
+    for (std::size_t k = 0; k < links && count > 0; ++k) {
+      const CurveInterval &i = intervals[k], &j = intervals[(k + 1) % count];
+      if (i.cell == j.cell || !valid[k] || !valid[(k + 1) % count]) continue;
+      const std::array<Index, 2> edge{std::min(i.cell, j.cell), std::max(i.cell, j.cell)};
+      found.report.edges.push_back(edge);
+      const auto in_dual = dual_edges.find(edge);
+      const bool missing = in_dual == dual_edges.end() || in_dual->second < trace.sheets(c);
+      const auto [other, fresh] = taken.insert({edge, c});
+      if (!missing && fresh) continue;
+      const auto middle = [](const CurveInterval& x) { return 0.5 * (x.from + x.to); };
+      double from = middle(i), to = middle(j);
+      if (places[i.cell].curve == c) from = places[i.cell].position;
+      else if (k == 0 && !closed) from = 0;
+      if (places[j.cell].curve == c) to = places[j.cell].position;
+      else if (k + 2 == count && !closed) to = curves.length(c);
+      if (to < from) to += curves.length(c);
+      found.faults.push_back({c, from, to, kNone});
+    }
+    for (const CurveInterval& i : intervals) visits[i.cell] = 0;
+    if (closed && count < 3 && found.faults.size() == before)
+      for (int part = 0; part < 3; ++part)
+        found.faults.push_back({c, curves.length(c) * part / 3, curves.length(c) * (part + 1) / 3, kNone});
+    if (found.faults.size() > before) found.report.broken.push_back(c);
+  }
+  std::sort(found.report.edges.begin(), found.report.edges.end());
+  found.report.edges.erase(std::unique(found.report.edges.begin(), found.report.edges.end()), found.report.edges.end());
+  return found;
+}
+
+// The first position, from the given end of an open curve, that lies `radius` away from the corner there.
+double position_at_radius(const FeatureCurves& curves, Index curve, int end, double radius) {
+  const Vec3 corner = curves.corner(curves.ends(curve)[end]);
+  const std::size_t count = curves.segments(curve);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t s = end == 0 ? k : count - 1 - k;
+    const Vec3 p = curves.point_of(curve, end == 0 ? s : s + 1), q = curves.point_of(curve, end == 0 ? s + 1 : s);
+    if (norm(q - corner) < radius) continue;
+    // |p + t (q - p) - corner| = radius
+    const Vec3 d = q - p, e = p - corner;
+    const double a = norm2(d), b = dot(d, e), c = norm2(e) - radius * radius;
+    const double t = a > 0 ? std::clamp((-b + std::sqrt(std::max(0.0, b * b - a * c))) / a, 0.0, 1.0) : 0;
+    const double from = curves.position_of(curve, s), to = curves.position_of(curve, s + 1);
+    return end == 0 ? from + t * (to - from) : to - t * (to - from);
+  }
+  return end == 0 ? curves.length(curve) : 0;
+}
+
+// Where on the curve to meet a foreign seed: as far from the corner they share as that seed, else across from it; in the middle
+// of the fault where that is elsewhere.
+double meeting_position(const FeatureCurves& curves, const CvtState& state, const Fault& fault) {
+  const double middle = 0.5 * (fault.from + fault.to), length = fault.to - fault.from;
+  if (fault.cell == kNone || state.places[fault.cell].curve == kNone) return middle;
+  const Index foreign = state.places[fault.cell].curve;
+  double position = middle, nearest = std::numeric_limits<double>::infinity();
+  for (int end : {0, 1}) {
+    const Index corner = curves.ends(fault.curve)[end];
+    if (corner == kNone || (corner != curves.ends(foreign)[0] && corner != curves.ends(foreign)[1])) continue;
+    const double radius = norm(state.seeds[fault.cell] - curves.corner(corner));
+    if (radius > nearest) continue;
+    nearest = radius;
+    position = position_at_radius(curves, fault.curve, end, radius);
+  }
+  if (std::isinf(nearest))
+    position = curves.nearest(fault.curve, state.seeds[fault.cell], curves.wrap(fault.curve, middle), 2 * length);
+  return std::abs(position - middle) <= 2 * length ? position : middle;
+}
+
+void remove(CvtState& state, const std::vector<char>& removed) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < state.seeds.size(); ++i)
+    if (!removed[i]) {
+      state.seeds[kept] = state.seeds[i];
+      state.places[kept++] = state.places[i];
+    }
+  state.seeds.resize(kept);
+  state.places.resize(kept);
+}
+
+// The seeds of each curve.
+std::vector<std::vector<Index>> seeds_by_curve(const FeatureCurves& curves, const CvtState& state) {
+  std::vector<std::vector<Index>> on(curves.size());
+  for (Index i = 0; i < state.seeds.size(); ++i)
+    if (state.places[i].curve != kNone) on[state.places[i].curve].push_back(i);
+  return on;
+}
+
+// Puts the sliding ones of a curve's seeds at equal distances between those that are fixed.
+void space_evenly(const FeatureCurves& curves, const CurveMeasure& measure, Index curve, const std::vector<Index>& seeds,
+                  CvtState& state) {
+  std::vector<std::pair<double, Index>> row;
+  for (Index i : seeds) row.push_back({measure.at(curve, state.places[i].position), i});
+  if (row.empty()) return;
+  std::sort(row.begin(), row.end());
+  const bool closed = curves.closed(curve);
+  const double whole = measure.whole(curve);
+  // Fixed points of the row: corners, protected seeds, and on a closed curve the first seed, before and after a lap.
+  const auto fixed = [&](std::size_t k) { return state.places[row[k].second].kind == Kind::fixed; };
+  std::size_t first = 0;
+  if (closed) {
+    while (first < row.size() && !fixed(first)) ++first;
+    if (first == row.size()) first = 0;
+    std::rotate(row.begin(), row.begin() + static_cast<std::ptrdiff_t>(first), row.end());
+    for (auto& [at, seed] : row)
+      if (at < row.front().first) at += whole;
+    row.push_back({row.front().first + whole, kNone});
+  } else {
+    row.insert(row.begin(), {0.0, kNone});
+    row.push_back({whole, kNone});
+  }
+  for (std::size_t a = 0; a + 1 < row.size();) {
+    std::size_t b = a + 1;
+    while (b + 1 < row.size() && !fixed(b)) ++b;
+    for (std::size_t k = a + 1; k < b; ++k) {
+      const double t = static_cast<double>(k - a) / static_cast<double>(b - a);
+      const double at = row[a].first + t * (row[b].first - row[a].first);
+      SeedPlace& place = state.places[row[k].second];
+      place.position = measure.position(curve, at >= whole ? at - whole : at);
+      state.seeds[row[k].second] = curves.point(curve, place.position);
+    }
+    a = b;
+  }
+}
+
+// Where curves leave a corner close to each other, gives them fixed seeds at the same distances from it, as far as they
+// stay close, in place of those that they have there.
+void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& measure, double c, CvtState& state) {
+  struct Arm {
+    Index curve;
+    int end;
+    double reach = 0;                // as far as seeds are protected
+    std::vector<double> positions;  // of those
+  };
+  std::vector<std::vector<Arm>> arms(curves.graph().corners.size());
+  for (Index k = 0; k < curves.size(); ++k)
+    for (int end : {0, 1})
+      if (!curves.closed(k)) arms[curves.ends(k)[end]].push_back({k, end, 0, {}});
+  std::vector<char> removed(state.seeds.size(), 0);
+  std::vector<std::pair<Index, double>> protected_places;
+  std::vector<std::vector<std::array<double, 2>>> zones(curves.size());
+  for (Index corner = 0; corner < arms.size(); ++corner) {
+    std::vector<Arm>& around = arms[corner];
+    if (around.size() < 2) continue;
+    // The edge length near the corner, by the first arm; shells must be the same for all.
+    const double edge = measure.edge_length(around[0].curve, around[0].end == 0 ? 0 : curves.length(around[0].curve), c);
+    double radius = edge;
+    for (std::size_t shell = 0; shell < kMostShells; ++shell) {
+      std::vector<double> at(around.size(), -1);
+      for (std::size_t a = 0; a < around.size(); ++a) {
+        const double position = position_at_radius(curves, around[a].curve, around[a].end, radius);
+        const double along = around[a].end == 0 ? position : curves.length(around[a].curve) - position;
+        // The other half of a curve belongs to its other end.
+        if (along < 0.5 * curves.length(around[a].curve)) at[a] = position;
+      }
+      std::vector<char> close(around.size(), 0);
+      double narrowest = std::numeric_limits<double>::infinity();
+      for (std::size_t a = 0; a < around.size(); ++a)
+        for (std::size_t b = 0; b < a; ++b) {
+          if (at[a] < 0 || at[b] < 0) continue;
+          const double gap = norm(curves.point(around[a].curve, at[a]) - curves.point(around[b].curve, at[b]));
+          if (gap >= kAcute * edge) continue;
+          close[a] = close[b] = true;
+          narrowest = std::min(narrowest, gap);
+        }
+      if (std::isinf(narrowest)) break;
+      for (std::size_t a = 0; a < around.size(); ++a) {
+        // An arm is protected from the corner on, without gaps.
+        if (!close[a] || around[a].positions.size() < shell) continue;
+        around[a].positions.push_back(at[a]);
+        around[a].reach = (around[a].end == 0 ? at[a] : curves.length(around[a].curve) - at[a]) + 0.5 * edge;
+      }
+      // Between close curves triangles are as large as the gap, if that is not too small.
+      radius += std::clamp(narrowest, kLeastStep * edge, edge);
+    }
+    for (const Arm& arm : around) {
+      if (arm.positions.empty()) continue;
+      const double length = curves.length(arm.curve);
+      zones[arm.curve].push_back(arm.end == 0 ? std::array<double, 2>{0, arm.reach}
+                                              : std::array<double, 2>{length - arm.reach, length});
+      for (double position : arm.positions) protected_places.push_back({arm.curve, position});
+    }
+  }
+  for (std::size_t i = 0; i < state.seeds.size(); ++i) {
+    const SeedPlace& place = state.places[i];
+    if (place.curve == kNone) continue;
+    for (const auto& [from, to] : zones[place.curve])
+      if (place.position >= from && place.position <= to) removed[i] = 1;
+  }
+  remove(state, removed);
+  for (const auto& [curve, position] : protected_places) {
+    state.seeds.push_back(curves.point(curve, position));
+    state.places.push_back({Kind::fixed, curve, kNone, position});
+  }
+  const std::vector<std::vector<Index>> on = seeds_by_curve(curves, state);
+  for (Index k = 0; k < curves.size(); ++k)
+    if (!zones[k].empty()) space_evenly(curves, measure, k, on[k], state);
+}
+
+// True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved away.
+bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<Fault>& faults, bool crowd,
+          bool last, CvtState& state) {
+  std::vector<std::size_t> wanted(curves.size());
+  for (Index k = 0; k < curves.size(); ++k) wanted[k] = measure.edges(k, c) - (curves.closed(k) ? 0 : 1);
+  for (const SeedPlace& place : state.places)
+    if (place.curve != kNone && wanted[place.curve] > 0) --wanted[place.curve];
+  std::vector<char> used(state.seeds.size(), 0), removed(state.seeds.size(), 0);
+  std::set<Index> loosened;
+  // Missing links wait until no foreign seed is left to meet: that may be all they need.
+  const bool meeting = std::any_of(faults.begin(), faults.end(), [](const Fault& f) { return f.cell != kNone; });
+  bool changed = false;
+  const auto put = [&](Index seed, Index curve, double position, Kind kind) {
+    state.seeds[seed] = curves.point(curve, position);
+    state.places[seed] = {kind, curve, kNone, position};
+  };
+  for (const Fault& fault : faults) {
+    const double position = curves.wrap(fault.curve, meeting_position(curves, state, fault));
+    const double length = fault.to - fault.from;
+    if (fault.cell != kNone && state.places[fault.cell].kind == Kind::surface) {
+      if (std::exchange(used[fault.cell], 1)) continue;
+      changed = true;
+      if (last || ((crowd || wanted[fault.curve] > 0) && length >= kRoomToSnap * measure.edge_length(fault.curve, position, c))) {
+        put(fault.cell, fault.curve, position, Kind::curve);
+        if (wanted[fault.curve] > 0) --wanted[fault.curve];
+      } else if (length >= kRoomToSnap * measure.edge_length(fault.curve, position, c)) {
+        removed[fault.cell] = 1;
+        loosened.insert(fault.curve);
+      } else {
+        const Vec3 on = curves.point(fault.curve, curves.wrap(fault.curve, 0.5 * (fault.from + fault.to)));
+        state.seeds[fault.cell] += kPush * (state.seeds[fault.cell] - on);
+      }
+      continue;
+    }
+    if (fault.cell == kNone && meeting && last) continue;
+    // Where curves cross another sheet no seed helps.
+    const double least = last ? kTiniest : fault.cell == kNone ? kShortLink : kSmallest;
+    if (length < least * measure.edge_length(fault.curve, position, c)) continue;
+    changed = true;
+    const bool meets = fault.cell != kNone;
+    if (meets) state.places[fault.cell].kind = Kind::fixed;
+    state.seeds.emplace_back();
+    state.places.emplace_back();
+    removed.push_back(0);
+    put(static_cast<Index>(state.seeds.size() - 1), fault.curve, position, meets ? Kind::fixed : Kind::curve);
+  }
+  remove(state, removed);
+  if (!last && !loosened.empty()) {
+    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, state);
+    for (Index k : loosened) space_evenly(curves, measure, k, on[k], state);
+  }
+  return changed;
+}
+
+}  // namespace
+
+FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
+                             const RestrictedPolygons& polygons) {
+  return find_faults(trace, curves, places, polygons).report;
+}
+
+void clear_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                    const CurveMeasure& measure, OptimiseOptions options, OptimiseTotals& totals, const Context& context) {
+  const std::size_t count = state.seeds.size();
+  options.iterations = kClearingSteps;
+  for (int round = 0; round < kClearingRounds; ++round) {
+    backend.evaluate(state.seeds, state.moments, polygons);
+    std::vector<char> removed(state.seeds.size(), 0);
+    for (const std::vector<CurveInterval>& intervals : trace.trace(polygons))
+      for (const CurveInterval& i : intervals)
+        if (state.places[i.cell].kind == Kind::surface) removed[i.cell] = 1;
+    remove(state, removed);
+    const std::vector<std::vector<Index>> on = seeds_by_curve(*options.curves, state);
+    for (Index c = 0; c < on.size(); ++c) space_evenly(*options.curves, measure, c, on[c], state);
+    if (state.seeds.size() == count) return;
+    backend.evaluate(state.seeds, state.moments, polygons);
+    set_count(polygons, state.moments, count, state.seeds, state.places);
+    optimise(backend, state, options, totals, context);
+  }
+}
+
+FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                               const CurveMeasure& measure, double c, OptimiseOptions options, OptimiseTotals& totals,
+                               const Context& context) {
+  const FeatureCurves& curves = *options.curves;
+  const std::size_t count = state.seeds.size(), most = count + count / 4 + kMostAdded;
+  protect_acute_corners(curves, measure, c, state);
+  PlacedSeeds best;
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  for (int round = 0;; ++round) {
+    context.check();
+    backend.evaluate(state.seeds, state.moments, polygons);
+    const Found found = find_faults(trace, curves, state.places, polygons);
+    if (found.faults.empty()) return found.report;
+    if (found.faults.size() < fewest) {
+      fewest = found.faults.size();
+      best = {state.seeds, state.places};
+    }
+    const bool last = round >= kMovingRounds;
+    if (round == kMovingRounds + kInsertingRounds || state.seeds.size() > most ||
+        !mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, state))
+      break;
+    if (last) continue;
+    if (state.seeds.size() != count) {
+      backend.evaluate(state.seeds, state.moments, polygons);
+      set_count(polygons, state.moments, count, state.seeds, state.places);
+    }
+    options.phase = "features, round " + std::to_string(round + 1);
+    options.iterations = kFirstSteps + (kLastSteps - kFirstSteps) * round / (kMovingRounds - 1);
+    optimise(backend, state, options, totals, context);
+  }
+  // Sheets that intersect, or curves that cross another sheet, cannot all be had.
+  state.seeds = std::move(best.seeds);
+  state.places = std::move(best.places);
+  backend.evaluate(state.seeds, state.moments, polygons);
+  return find_faults(trace, curves, state.places, polygons).report;
+}
+
+}  // namespace bisector

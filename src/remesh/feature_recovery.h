@@ -1,0 +1,39 @@
+// Making the dual contain every feature curve as a chain of edges (thesis 4.4.3).
+//
+// A curve is in the dual if it runs through the cells of its own seeds alone, once through each, and every two that follow
+// each other on it have an edge in the dual with a triangle on each sheet. A foreign cell on a curve is moved away if it
+// hardly touches it, put elsewhere if the curve has its seeds, snapped to the curve if it lacks some, and met with one more
+// seed on the curve if it belongs to another curve: across from the foreign one, or, where the two curves meet at a corner, as
+// far from it: seeds at equal distances do not own parts of each other's curve, however small the angle. Such pairs are fixed.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "cvt/optimise.h"
+#include "remesh/feature_seeds.h"
+#include "remesh/feature_trace.h"
+
+namespace bisector {
+
+struct FeatureReport {
+  std::vector<std::array<Index, 2>> edges;  // pairs of seeds along the curves, lower first, sorted
+  std::vector<Index> broken;                // curves that are not in the dual, ascending
+};
+
+FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
+                             const RestrictedPolygons& polygons);
+
+// Puts seeds on the surface whose cells reach a curve elsewhere, where the energy is high, and optimises again, for a bounded
+// number of rounds: curves have as many seeds of their own as they need.
+void clear_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                    const CurveMeasure& measure, OptimiseOptions options, OptimiseTotals& totals, const Context& context);
+
+// Mends the curves that are broken and optimises again, for a bounded number of rounds. The count is kept in the first rounds;
+// in the last ones seeds are inserted and nothing moves. `c` is the scale of CurveMeasure. `polygons` and
+// state.moments end as those of the final seeds.
+FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                               const CurveMeasure& measure, double c, OptimiseOptions options, OptimiseTotals& totals,
+                               const Context& context);
+
+}  // namespace bisector

@@ -1,0 +1,669 @@
+#include "remesh/improve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "core/parallel.h"
+#include "remesh/feature_recovery.h"
+#include "remesh/improve_patch.h"
+#include "voronoi/dual.h"
+
+namespace bisector {
+namespace {
+
+using Kind = SeedPlace::Kind;
+
+constexpr int kBatches = 10;
+constexpr int kSweeps = 3, kMoreSweeps = 6;  // of a patch: of all trials, and of the best
+constexpr int kSmoothingSweeps = 6;          // of the whole
+constexpr double kHold = 20;                 // of seeds, where all are relaxed: what keeps cells of equal size
+constexpr std::size_t kRings = 2;            // of free seeds around the middle of a patch
+constexpr double kPoor = 1.5;                // cost of a seed's triangles beside the average that makes it poor
+constexpr std::size_t kPoorTried = 30;       // such seeds are tried: this many, and one in kPoorShare
+constexpr std::size_t kPoorShare = 30;
+constexpr double kIrregular = 10;            // average costs, for each triangle at a seed beyond or short of six
+constexpr double kHope = 4;                  // average costs that a trial may be worse by after the first sweeps
+constexpr double kPrice = 20;                // average costs that the right count may take, per seed
+constexpr std::size_t kFlips = 2;            // tried per patch
+constexpr std::size_t kTriesToRestore = 8;   // patches per seed that is missing or too many
+constexpr double kDrift = 0.005;             // of the count, that it may be off on the way
+constexpr int kReverts = 4;
+
+enum class Star : unsigned char { disk, fan, other };
+
+// All that is asked of a diagram, by seed.
+struct Snapshot {
+  std::vector<Vec3> seeds;
+  std::vector<SeedPlace> places;  // as many
+  CellMoments moments;
+  bool covers = false;            // the diagram is one of the whole surface
+  Dual dual;
+  std::vector<double> costs;      // of the dual's triangles
+  std::vector<ShapeExcess> excess;
+  Csr<Index> stars;               // triangles at each seed
+  Csr<Index> rings;               // neighbours of each seed
+  std::vector<Star> kinds;
+  FeatureReport features;
+  long long euler = 0;            // of the dual
+  double average = 0;             // cost
+  ShapeExcess worst;
+};
+
+Csr<Index> stars_of(const Dual& dual, std::size_t seeds) {
+  Csr<Index> stars;
+  stars.offsets.assign(seeds + 1, 0);
+  for (const Triangle& t : dual.triangles)
+    for (const Index v : t) ++stars.offsets[v + 1];
+  std::partial_sum(stars.offsets.begin(), stars.offsets.end(), stars.offsets.begin());
+  stars.values.resize(3 * dual.triangles.size());
+  std::vector<std::size_t> next(stars.offsets.begin(), stars.offsets.end() - 1);
+  for (Index k = 0; k < dual.triangles.size(); ++k)
+    for (const Index v : dual.triangles[k]) stars.values[next[v]++] = k;
+  return stars;
+}
+
+// The neighbours of a seed, each once, and whether its triangles make a disk around it or a fan.
+Star look_around(const Dual& dual, const Csr<Index>& stars, Index v, std::vector<Index>& ring) {
+  ring.clear();
+  std::vector<std::array<Index, 2>> links;
+  bool simple = stars.size(v) > 0;
+  for (const Index* t = stars.begin(v); t != stars.end(v); ++t) {
+    if (dual.multiplicity[*t] > 1) simple = false;
+    const Triangle& w = dual.triangles[*t];
+    const int m = w[0] == v ? 0 : w[1] == v ? 1 : 2;
+    links.push_back({w[(m + 1) % 3], w[(m + 2) % 3]});
+    ring.insert(ring.end(), links.back().begin(), links.back().end());
+  }
+  std::sort(ring.begin(), ring.end());
+  std::size_t single = 0;
+  for (std::size_t k = 0; k < ring.size();) {
+    std::size_t end = k;
+    while (end < ring.size() && ring[end] == ring[k]) ++end;
+    if (end - k > 2) simple = false;
+    single += end - k == 1;
+    k = end;
+  }
+  ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
+  if (!simple || single > 2) return Star::other;
+  // One chain of links that reaches all.
+  Index start = links[0][0];
+  for (const auto& [from, to] : links) {
+    if (single == 0) break;
+    if (std::none_of(links.begin(), links.end(), [&](const auto& link) { return link[1] == from; })) start = from;
+  }
+  std::size_t reached = 0;
+  Index at = start;
+  do {
+    const auto link = std::find_if(links.begin(), links.end(), [&](const auto& l) { return l[0] == at; });
+    if (link == links.end()) break;
+    ++reached;
+    at = (*link)[1];
+  } while (at != start);
+  if (reached != links.size()) return Star::other;
+  return single == 0 ? Star::disk : Star::fan;
+}
+
+// One change of a few seeds.
+struct Change {
+  struct Moved {
+    Index seed;  // kNone: a new one
+    Vec3 x;
+    SeedPlace place;
+  };
+  Index middle = kNone;
+  std::vector<Index> footprint;  // the free seeds of the patch, removed ones too
+  std::vector<Moved> moved;
+  std::vector<Index> removed;
+  std::vector<Index> curves;     // that it could break
+  double gain = 0;
+  std::size_t added = 0;
+  int growth() const { return static_cast<int>(added) - static_cast<int>(removed.size()); }
+};
+
+class Improver {
+ public:
+  Improver(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+           const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context);
+
+  ImproveReport run();
+
+ private:
+  enum class Aim { better, fewer, more };
+
+  bool featured() const { return step_.curves && step_.curves->size() > 0; }
+  double irregular_price() const { return kIrregular * now_.average; }
+  std::size_t wanted() const { return options_.vertices ? options_.vertices : state_.seeds.size(); }
+  void measure(Snapshot& s);
+  ShapeExcess worst_excess(const Snapshot& s, Index seed) const;
+  bool as_good(const Snapshot& next) const;
+  bool newly_broken(const Snapshot& next, Index curve) const;
+  // The seeds up to kRings edges away, nearest first.
+  std::vector<Index> seeds_around(Index middle) const;
+  PatchVertex vertex_of(Index seed, const CellMap& map) const;
+  ImprovePatch patch_of(const std::vector<Index>& seeds, const CellMap& map) const;
+  Change best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const;
+  std::vector<Index> choose_middles(Aim aim);
+  std::vector<char> choose_changes(const std::vector<Change>& changes, Aim aim) const;
+  // Makes changes around some seeds; returns how many hold.
+  std::size_t batch(Aim aim);
+  // The seeds after some changes; the new index of each, and the seeds there of each change.
+  Snapshot assemble(const std::vector<Change>& changes, const std::vector<char>& on, std::vector<Index>& index,
+                    std::vector<std::vector<Index>>& seeds_of) const;
+  bool holds(const Snapshot& next, const Change& change, const std::vector<Index>& index,
+             const std::vector<Index>& seeds) const;
+  // Makes those of the changes that hold; `on` tells which.
+  void make(const std::vector<Change>& changes, std::vector<char>& on);
+  void drop_idle();
+  void smooth();
+  std::vector<std::vector<Index>> colours(const std::vector<PatchVertex>& vertices) const;
+
+  Backend& backend_;
+  CvtState& state_;
+  RestrictedPolygons& polygons_;
+  const FeatureTrace& trace_;
+  const ImproveOptions& options_;
+  OptimiseOptions step_;
+  OptimiseTotals& totals_;
+  const Context& context_;
+  ShapeGoal goal_;
+  std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
+  std::size_t poor_left_ = 0;     // poor seeds that may still be tried
+  std::vector<char> done_;        // by seed: tried in vain, and nothing near it has changed since
+  Snapshot now_;
+  ImproveReport report_;
+};
+
+Improver::Improver(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                   const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context)
+    : backend_(backend), state_(state), polygons_(polygons), trace_(trace), options_(options), step_(std::move(step)),
+      totals_(totals), context_(context), goal_(shape_goal(options.min_angle, options.max_angle)) {
+  if (!featured()) return;
+  corner_curves_.resize(step_.curves->graph().corners.size());
+  for (Index curve = 0; curve < step_.curves->size(); ++curve)
+    for (const Index corner : step_.curves->ends(curve))
+      if (corner != kNone) corner_curves_[corner].push_back(curve);
+}
+
+void Improver::measure(Snapshot& s) {
+  context_.check();
+  backend_.evaluate(s.seeds, s.moments, polygons_);
+  totals_.count(s.moments);
+  const double total = backend_.surface().mass;
+  s.covers = std::abs(s.moments.mass - total) <= backend_.mass_tolerance() * total;
+  const std::size_t n = s.seeds.size();
+  s.dual = extract_dual(polygons_);
+  s.costs.resize(s.dual.triangles.size());
+  s.excess.resize(s.costs.size());
+  parallel_each(s.costs.size(), [&](std::size_t k) {
+    const Triangle& t = s.dual.triangles[k];
+    s.costs[k] = shape_cost(s.seeds[t[0]], s.seeds[t[1]], s.seeds[t[2]], goal_);
+    s.excess[k] = shape_excess(s.seeds[t[0]], s.seeds[t[1]], s.seeds[t[2]], goal_);
+  });
+  s.average = fixed_sum(s.costs.size(), [&](std::size_t k) { return s.costs[k]; });
+  s.average /= static_cast<double>(s.costs.size());
+  for (const ShapeExcess& excess : s.excess) s.worst.take(excess);
+  s.stars = stars_of(s.dual, n);
+  s.kinds.resize(n);
+  std::vector<std::vector<Index>> rings(n);
+  parallel_each(n, [&](std::size_t v) { s.kinds[v] = look_around(s.dual, s.stars, static_cast<Index>(v), rings[v]); });
+  s.rings = {};
+  for (const std::vector<Index>& ring : rings) {
+    s.rings.values.insert(s.rings.values.end(), ring.begin(), ring.end());
+    s.rings.offsets.push_back(s.rings.values.size());
+  }
+  const auto vertices = std::count_if(rings.begin(), rings.end(), [](const auto& ring) { return !ring.empty(); });
+  const auto edges = static_cast<long long>(s.rings.values.size() / 2);
+  s.euler = vertices - edges + static_cast<long long>(s.dual.triangles.size());
+  if (featured()) s.features = check_features(trace_, *step_.curves, s.places, polygons_);
+}
+
+ShapeExcess Improver::worst_excess(const Snapshot& s, Index seed) const {
+  ShapeExcess worst;
+  for (const Index* t = s.stars.begin(seed); t != s.stars.end(seed); ++t) worst.take(s.excess[*t]);
+  return worst;
+}
+
+bool Improver::as_good(const Snapshot& next) const {
+  return next.covers && next.euler == now_.euler && next.worst.within(now_.worst) &&
+         next.features.broken.size() <= now_.features.broken.size();
+}
+
+bool Improver::newly_broken(const Snapshot& next, Index curve) const {
+  const auto in = [&](const Snapshot& s) {
+    return std::binary_search(s.features.broken.begin(), s.features.broken.end(), curve);
+  };
+  return in(next) && !in(now_);
+}
+
+std::vector<Index> Improver::seeds_around(Index middle) const {
+  std::vector<Index> seeds{middle};
+  for (std::size_t ring = 0, begin = 0; ring < kRings; ++ring) {
+    const std::size_t end = seeds.size();
+    for (std::size_t k = begin; k < end; ++k)
+      for (const Index* j = now_.rings.begin(seeds[k]); j != now_.rings.end(seeds[k]); ++j)
+        if (std::find(seeds.begin(), seeds.end(), *j) == seeds.end()) seeds.push_back(*j);
+    begin = end;
+  }
+  return seeds;
+}
+
+// Seeds at a border that is no feature stay, or it would creep inwards.
+PatchVertex Improver::vertex_of(Index seed, const CellMap& map) const {
+  PatchVertex vertex;
+  vertex.x = now_.seeds[seed];
+  vertex.place = now_.places[seed];
+  vertex.owner = vertex.seed = seed;
+  vertex.free = vertex.place.kind != Kind::surface || now_.kinds[seed] == Star::disk;
+  if (vertex.place.kind == Kind::surface && now_.moments.triangles.size(seed) > 0)
+    map.project(vertex.x, vertex.owner, vertex.normal);
+  return vertex;
+}
+
+// The seeds given and their triangles; the seeds come first and are free, as far as they may be.
+ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& map) const {
+  std::vector<Index> triangles;
+  for (const Index v : seeds) triangles.insert(triangles.end(), now_.stars.begin(v), now_.stars.end(v));
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  ImprovePatch patch(map, step_.curves, goal_);
+  std::vector<Index> members = seeds;
+  for (const Index v : seeds) patch.add_vertex(vertex_of(v, map));
+  std::vector<std::array<Index, 2>> locked;
+  for (const Index t : triangles) {
+    const Triangle& corners = now_.dual.triangles[t];
+    Triangle local;
+    for (int m = 0; m < 3; ++m) {
+      const auto member = std::find(members.begin(), members.end(), corners[m]);
+      local[m] = static_cast<Index>(member - members.begin());
+      if (member != members.end()) continue;
+      members.push_back(corners[m]);
+      PatchVertex vertex = vertex_of(corners[m], map);
+      vertex.free = false;
+      patch.add_vertex(vertex);
+    }
+    patch.add_triangle(local);
+    for (int m = 0; m < 3; ++m) {
+      const auto [a, b] = std::minmax({corners[m], corners[(m + 1) % 3]});
+      if (std::binary_search(now_.features.edges.begin(), now_.features.edges.end(), std::array<Index, 2>{a, b}))
+        locked.push_back({std::min(local[m], local[(m + 1) % 3]), std::max(local[m], local[(m + 1) % 3])});
+    }
+  }
+  for (std::size_t k = 0; k < members.size(); ++k)
+    patch.set_outside(static_cast<Index>(k), now_.stars.size(members[k]));
+  patch.lock(std::move(locked));
+  return patch;
+}
+
+// The trial that costs least, if that is less than now. Where the count is the aim, it may cost more.
+Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const {
+  Change change;
+  change.middle = middle;
+  change.footprint = seeds_around(middle);
+  const ImprovePatch start = patch_of(change.footprint, map);
+  const double before = start.cost(now_.average, irregular_price());
+  double least = aim == Aim::better ? before + kHope * now_.average : std::numeric_limits<double>::infinity();
+  std::optional<ImprovePatch> best;
+  const auto attempt = [&](const auto& operation) {
+    ImprovePatch patch = start;
+    if (!operation(patch)) return;
+    ++trials;
+    patch.relax_all(kSweeps);
+    const double cost = patch.cost(now_.average, irregular_price());
+    if (!(cost < least)) return;
+    least = cost;
+    best = std::move(patch);
+  };
+  const Index v = 0;
+  if (aim == Aim::better) {
+    attempt([](ImprovePatch&) { return true; });
+    const std::vector<std::array<Index, 2>> flips = start.wanted_flips(v);
+    for (std::size_t k = 0; k < std::min(kFlips, flips.size()); ++k)
+      attempt([&](ImprovePatch& patch) { return patch.flip(flips[k][0], flips[k][1]); });
+  }
+  if (aim != Aim::more) attempt([&](ImprovePatch& patch) { return patch.remove(v); });
+  if (aim != Aim::fewer) {
+    attempt([&](ImprovePatch& patch) { return patch.split(v, patch.farthest_neighbour(v)); });
+    attempt([&](ImprovePatch& patch) { return patch.insert(patch.largest_triangle(v)); });
+  }
+  if (!best) return change;
+  best->relax_all(kMoreSweeps);
+  change.gain = before - best->cost(now_.average, irregular_price());
+  if (!(change.gain > (aim == Aim::better ? 0 : -kPrice * now_.average))) return change;
+  for (Index k = 0; k < best->vertices().size(); ++k) {
+    const PatchVertex& vertex = best->vertices()[k];
+    if (vertex.place.curve != kNone) change.curves.push_back(vertex.place.curve);
+    if (const Index corner = vertex.place.corner; corner != kNone && featured())
+      change.curves.insert(change.curves.end(), corner_curves_[corner].begin(), corner_curves_[corner].end());
+    if (vertex.removed) {
+      change.removed.push_back(vertex.seed);
+    } else if (vertex.seed == kNone || !(vertex.x == now_.seeds[vertex.seed])) {
+      change.moved.push_back({vertex.seed, vertex.x, vertex.place});
+      change.added += vertex.seed == kNone;
+    }
+  }
+  return change;
+}
+
+// Seeds of triangles beyond the goal, then of poor ones, worst first; their patches share no triangle.
+std::vector<Index> Improver::choose_middles(Aim aim) {
+  struct Candidate {
+    Index seed;
+    double excess, cost;
+  };
+  std::vector<Candidate> candidates;
+  for (Index v = 0; v < now_.seeds.size(); ++v) {
+    if (done_[v] || now_.stars.size(v) == 0 || now_.kinds[v] == Star::other) continue;
+    double sum = 0, worst = 0;
+    for (const Index* t = now_.stars.begin(v); t != now_.stars.end(v); ++t) {
+      sum += now_.costs[*t];
+      worst = std::max(worst, now_.costs[*t]);
+    }
+    const Candidate candidate{v, aim == Aim::better ? worst_excess(now_, v).most() : 0,
+                              sum / static_cast<double>(now_.stars.size(v)) + worst};
+    if (aim != Aim::better || candidate.excess > 0 || candidate.cost > 2 * kPoor * now_.average)
+      candidates.push_back(candidate);
+  }
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.excess != b.excess ? a.excess > b.excess : a.cost != b.cost ? a.cost > b.cost : a.seed < b.seed;
+  });
+  const auto missing = static_cast<long long>(wanted()) - static_cast<long long>(now_.seeds.size());
+  const std::size_t most = aim == Aim::better ? now_.seeds.size()
+                                              : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
+  std::vector<char> taken(now_.dual.triangles.size(), 0);
+  std::vector<Index> middles;
+  for (const Candidate& candidate : candidates) {
+    const bool poor = aim == Aim::better && candidate.excess == 0;
+    if (middles.size() == most || (poor && poor_left_ == 0)) break;
+    const std::vector<Index> seeds = seeds_around(candidate.seed);
+    const auto for_each_triangle = [&](const auto& visit) {
+      for (const Index v : seeds)
+        for (const Index* t = now_.stars.begin(v); t != now_.stars.end(v); ++t) visit(taken[*t]);
+    };
+    bool overlaps = false;
+    for_each_triangle([&](char& t) { overlaps |= t; });
+    if (overlaps) continue;
+    for_each_triangle([](char& t) { t = 1; });
+    middles.push_back(candidate.seed);
+    if (poor) --poor_left_;
+  }
+  return middles;
+}
+
+// The best ones first, as far as the count allows it.
+std::vector<char> Improver::choose_changes(const std::vector<Change>& changes, Aim aim) const {
+  std::vector<std::size_t> order(changes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return changes[a].gain > changes[b].gain; });
+  const auto count = static_cast<long long>(wanted());
+  const auto drift = aim == Aim::better ? static_cast<long long>(kDrift * static_cast<double>(count)) : 0;
+  long long off = static_cast<long long>(now_.seeds.size()) - count;
+  std::vector<char> on(changes.size(), 0);
+  for (const std::size_t k : order) {
+    if (changes[k].moved.empty() && changes[k].removed.empty()) continue;
+    const long long then = off + changes[k].growth();
+    if (std::abs(then) > std::max(drift, std::abs(off)) || (aim != Aim::better && off == 0)) continue;
+    on[k] = 1;
+    off = then;
+  }
+  return on;
+}
+
+std::size_t Improver::batch(Aim aim) {
+  const std::vector<Index> middles = choose_middles(aim);
+  if (middles.empty()) return 0;
+  const CellMap map(backend_.surface(), now_.seeds, now_.moments.triangles, now_.rings);
+  std::vector<Change> changes(middles.size());
+  std::vector<std::size_t> trials(middles.size(), 0);
+  parallel_each(middles.size(), [&](std::size_t k) { changes[k] = best_change(middles[k], map, aim, trials[k]); }, 1);
+  report_.trials += std::accumulate(trials.begin(), trials.end(), std::size_t{0});
+  std::vector<char> on = choose_changes(changes, aim);
+  const std::size_t before = now_.seeds.size();
+  make(changes, on);
+
+  // The marks follow the seeds.
+  std::vector<char> removed(before, 0);
+  std::size_t made = 0;
+  for (const Index v : middles) done_[v] = 1;
+  for (std::size_t k = 0; k < changes.size(); ++k) {
+    if (!on[k]) continue;
+    ++made;
+    report_.inserted += changes[k].added;
+    report_.removed += changes[k].removed.size();
+    for (const Index v : changes[k].footprint) done_[v] = 0;
+    for (const Index v : changes[k].removed) removed[v] = 1;
+  }
+  report_.made += made;
+  std::size_t kept = 0;
+  for (std::size_t v = 0; v < before; ++v)
+    if (!removed[v]) done_[kept++] = done_[v];
+  done_.resize(kept);
+  done_.resize(now_.seeds.size(), 0);
+  return made;
+}
+
+Snapshot Improver::assemble(const std::vector<Change>& changes, const std::vector<char>& on, std::vector<Index>& index,
+                            std::vector<std::vector<Index>>& seeds_of) const {
+  Snapshot next;
+  std::vector<Vec3> seeds = now_.seeds;
+  std::vector<SeedPlace> places = now_.places;
+  index.assign(seeds.size(), 0);
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    if (!on[c]) continue;
+    for (const Index v : changes[c].removed) index[v] = kNone;
+    for (const Change::Moved& m : changes[c].moved)
+      if (m.seed != kNone) {
+        seeds[m.seed] = m.x;
+        places[m.seed] = m.place;
+      }
+  }
+  for (std::size_t v = 0; v < seeds.size(); ++v) {
+    if (index[v] == kNone) continue;
+    index[v] = static_cast<Index>(next.seeds.size());
+    next.seeds.push_back(seeds[v]);
+    next.places.push_back(places[v]);
+  }
+  seeds_of.assign(changes.size(), {});
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    if (!on[c]) continue;
+    for (const Index v : changes[c].footprint)
+      if (index[v] != kNone) seeds_of[c].push_back(index[v]);
+    for (const Change::Moved& m : changes[c].moved)
+      if (m.seed == kNone) {
+        seeds_of[c].push_back(static_cast<Index>(next.seeds.size()));
+        next.seeds.push_back(m.x);
+        next.places.push_back(m.place);
+      }
+  }
+  return next;
+}
+
+// What ImprovePatch::cost gives for the triangles at some seeds.
+double cost_at(const Snapshot& s, std::vector<Index> seeds, double average, double irregular) {
+  std::vector<Index> triangles;
+  for (std::size_t k = 0, count = seeds.size(); k < count; ++k) {
+    const Index v = seeds[k];
+    triangles.insert(triangles.end(), s.stars.begin(v), s.stars.end(v));
+    seeds.insert(seeds.end(), s.rings.begin(v), s.rings.end(v));
+  }
+  for (std::vector<Index>* list : {&triangles, &seeds}) {
+    std::sort(list->begin(), list->end());
+    list->erase(std::unique(list->begin(), list->end()), list->end());
+  }
+  double sum = 0;
+  for (const Index t : triangles) sum += s.costs[t] - average;
+  for (const Index v : seeds)
+    if (s.places[v].kind == Kind::surface) sum += irregular * std::abs(static_cast<double>(s.stars.size(v)) - 6);
+  return sum;
+}
+
+bool Improver::holds(const Snapshot& next, const Change& change, const std::vector<Index>& index,
+                     const std::vector<Index>& seeds) const {
+  const double before = cost_at(now_, change.footprint, now_.average, irregular_price());
+  const double after = cost_at(next, seeds, now_.average, irregular_price());
+  const double price = change.gain < 0 ? -2 * change.gain : 0;  // of the right count
+  if (!(after < before + price)) return false;
+  ShapeExcess worst_before, worst_after;
+  for (const Index v : change.footprint) worst_before.take(worst_excess(now_, v));
+  for (const Index v : seeds) {
+    worst_after.take(worst_excess(next, v));
+    if (next.kinds[v] == Star::other) return false;
+  }
+  if (!worst_after.within(worst_before)) return false;
+  for (const Index v : change.footprint)
+    for (const Index* j = now_.rings.begin(v); j != now_.rings.end(v); ++j)
+      if (index[*j] != kNone && now_.kinds[*j] != next.kinds[index[*j]]) return false;
+  return std::none_of(change.curves.begin(), change.curves.end(), [&](Index c) { return newly_broken(next, c); });
+}
+
+void Improver::make(const std::vector<Change>& changes, std::vector<char>& on) {
+  for (int round = 0; round < kReverts && std::find(on.begin(), on.end(), 1) != on.end(); ++round) {
+    std::vector<Index> index;
+    std::vector<std::vector<Index>> seeds_of;
+    Snapshot next = assemble(changes, on, index, seeds_of);
+    measure(next);
+    std::vector<char> held = on;
+    for (std::size_t c = 0; c < changes.size(); ++c)
+      if (on[c] && !holds(next, changes[c], index, seeds_of[c])) held[c] = 0;
+    if (held != on) {
+      on = std::move(held);
+      continue;
+    }
+    if (!as_good(next)) break;
+    now_ = std::move(next);
+    return;
+  }
+  std::fill(on.begin(), on.end(), 0);
+}
+
+// Seeds of a class share no triangle.
+std::vector<std::vector<Index>> Improver::colours(const std::vector<PatchVertex>& vertices) const {
+  std::vector<std::vector<Index>> classes;
+  std::vector<std::size_t> colour(vertices.size(), vertices.size());
+  std::vector<char> used;
+  for (Index v = 0; v < vertices.size(); ++v) {
+    if (!vertices[v].free || vertices[v].place.kind == Kind::fixed || now_.stars.size(v) == 0) continue;
+    used.assign(classes.size() + 1, 0);
+    for (const Index* j = now_.rings.begin(v); j != now_.rings.end(v); ++j)
+      if (colour[*j] < used.size()) used[colour[*j]] = 1;
+    colour[v] = static_cast<std::size_t>(std::find(used.begin(), used.end(), 0) - used.begin());
+    if (colour[v] == classes.size()) classes.emplace_back();
+    classes[colour[v]].push_back(v);
+  }
+  return classes;
+}
+
+// Relaxes all seeds; those where the dual does not take it well stay.
+void Improver::smooth() {
+  const CellMap map(backend_.surface(), now_.seeds, now_.moments.triangles, now_.rings);
+  const std::size_t n = now_.seeds.size();
+  std::vector<PatchVertex> vertices(n);
+  parallel_each(n, [&](std::size_t v) { vertices[v] = vertex_of(static_cast<Index>(v), map); });
+  ImprovePatch all(map, step_.curves, goal_);
+  for (const PatchVertex& vertex : vertices) all.add_vertex(vertex);
+  for (const Triangle& t : now_.dual.triangles) all.add_triangle(t);
+  const std::vector<std::vector<Index>> classes = colours(vertices);
+  for (int sweep = 0; sweep < kSmoothingSweeps; ++sweep) {
+    context_.check();
+    for (const std::vector<Index>& seeds : classes)
+      parallel_each(seeds.size(), [&](std::size_t k) { all.relax(seeds[k], kHold); }, 256);
+  }
+
+  std::vector<char> back(n, 0);
+  for (int round = 0; round < kReverts; ++round) {
+    Snapshot next;
+    next.seeds = now_.seeds;
+    next.places = now_.places;
+    for (std::size_t v = 0; v < n; ++v)
+      if (!back[v]) {
+        next.seeds[v] = all.vertices()[v].x;
+        next.places[v] = all.vertices()[v].place;
+      }
+    measure(next);
+    std::vector<char> worse(n, 0);
+    parallel_each(n, [&](std::size_t k) {
+      const Index v = static_cast<Index>(k), curve = now_.places[v].curve;
+      worse[v] = next.kinds[v] != now_.kinds[v] || !worst_excess(next, v).within(worst_excess(now_, v)) ||
+                 (curve != kNone && newly_broken(next, curve));
+      if (const Index corner = now_.places[v].corner; corner != kNone && featured())
+        for (const Index c : corner_curves_[corner]) worse[v] |= newly_broken(next, c);
+    });
+    bool changed = false;
+    for (Index v = 0; v < n; ++v) {
+      if (!worse[v]) continue;
+      const auto put_back = [&](Index w) {
+        changed |= !back[w];
+        back[w] = 1;
+      };
+      put_back(v);
+      for (const Snapshot* s : {static_cast<const Snapshot*>(&now_), static_cast<const Snapshot*>(&next)})
+        std::for_each(s->rings.begin(v), s->rings.end(v), put_back);
+    }
+    if (changed) continue;
+    if (as_good(next) && next.average < now_.average) now_ = std::move(next);
+    return;
+  }
+}
+
+// Seeds on the surface without a triangle are no vertices of the mesh.
+void Improver::drop_idle() {
+  Snapshot next;
+  for (Index v = 0; v < now_.seeds.size(); ++v) {
+    if (now_.places[v].kind == Kind::surface && now_.stars.size(v) == 0) continue;
+    next.seeds.push_back(now_.seeds[v]);
+    next.places.push_back(now_.places[v]);
+  }
+  if (next.seeds.size() == now_.seeds.size()) return;
+  measure(next);
+  if (as_good(next)) now_ = std::move(next);
+}
+
+ImproveReport Improver::run() {
+  now_.seeds = state_.seeds;
+  now_.places = state_.places;
+  now_.places.resize(now_.seeds.size());
+  measure(now_);
+  if (now_.dual.triangles.empty()) return report_;
+  drop_idle();
+  const double average = now_.average;
+  poor_left_ = kPoorTried + now_.seeds.size() / kPoorShare;
+  done_.assign(now_.seeds.size(), 0);
+  smooth();
+  for (int round = 0; round < kBatches; ++round) {
+    context_.report({"improving", round + 1, kBatches, now_.moments.energy, 0, 1});
+    if (batch(Aim::better) == 0) break;
+  }
+  done_.assign(now_.seeds.size(), 0);
+  for (int round = 0; round < kBatches && now_.seeds.size() != wanted(); ++round)
+    batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
+  if (report_.made > 0) smooth();
+  if (now_.average > average) {
+    now_.seeds = state_.seeds;
+    now_.places = state_.places;
+    now_.places.resize(now_.seeds.size());
+    measure(now_);
+    report_ = {report_.trials, 0, 0, 0, 0};
+  }
+
+  for (const ShapeExcess& excess : now_.excess) report_.missed += excess.most() > 0;
+  if (!state_.places.empty()) state_.places = now_.places;
+  state_.seeds = std::move(now_.seeds);
+  step_.constrained = true;
+  complete(backend_, state_, step_, totals_);
+  // What was measured last need not be what is left.
+  backend_.evaluate(state_.seeds, state_.moments, polygons_);
+  return report_;
+}
+
+}  // namespace
+
+ImproveReport improve(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
+                      const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context) {
+  return Improver(backend, state, polygons, trace, options, std::move(step), totals, context).run();
+}
+
+}  // namespace bisector

@@ -1,0 +1,513 @@
+#include "remesh/improve_patch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "cvt/constrain.h"
+
+namespace bisector {
+namespace {
+
+using Kind = SeedPlace::Kind;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kAngleWeight = 0.5;                // of the smallest angle's cosine beside Q
+constexpr double kLinear = 10, kQuadratic = 200;  // of what is beyond the goal
+constexpr double kMargin = 2;                       // degrees within the goal, from where on it is felt
+constexpr double kHold = 6;                         // in a patch, for cells of about equal size
+constexpr double kFolded = 20;                      // cost of a triangle that turned over
+constexpr double kFacing = 0.2;                     // least cosine between a triangle and what it replaces
+constexpr double kFirstStep = 0.1, kLastStep = 0.003;  // of the mean edge length
+constexpr double kDelaunaySlack = 1e-9;
+constexpr int kFlipPasses = 8;
+constexpr int kFlipEvery = 3;                       // sweeps
+
+double beyond(double excess) { return excess > 0 ? excess * (kLinear + kQuadratic * excess) : 0; }
+
+Vec3 unit(const Vec3& n) {
+  const double length = norm(n);
+  return length > 0 ? (1 / length) * n : Vec3{};
+}
+
+std::array<Index, 2> key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
+
+bool has(const Triangle& t, Index v) { return t[0] == v || t[1] == v || t[2] == v; }
+
+// The corner of t that is neither a nor b.
+Index opposite(const Triangle& t, Index a, Index b) {
+  for (const Index v : t)
+    if (v != a && v != b) return v;
+  return kNone;
+}
+
+bool turns(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& facing) {
+  const Vec3 n = cross(b - a, c - a);
+  const double along = dot(n, facing);
+  return !(facing == Vec3{}) && !(along > 0 && along * along > kFacing * kFacing * norm2(n));
+}
+
+// The lowest point of the parabola through values at -1, 0 and 1, not too far off.
+double lowest(double behind, double here, double ahead) {
+  const double slope = ahead - behind, bend = ahead + behind - 2 * here;
+  constexpr double kFarthest = 1.5;
+  return bend > 0 ? std::clamp(-0.5 * slope / bend, -kFarthest, kFarthest) : slope > 0 ? -kFarthest : kFarthest;
+}
+
+// Cosines of a triangle's smallest and largest angle, and Q.
+struct Shape {
+  double smallest, largest, q;
+};
+
+Shape shape_of(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 u = b - a, v = c - a;
+  double s = norm2(u), m = norm2(v), l = norm2(c - b);
+  if (s > m) std::swap(s, m);
+  if (m > l) std::swap(m, l);
+  if (s > m) std::swap(s, m);
+  if (!(s > 0)) return {1, -1, 0};
+  const double rs = std::sqrt(s), rm = std::sqrt(m), rl = std::sqrt(l);
+  return {(m + l - s) / (2 * rm * rl), (s + m - l) / (2 * rs * rm),
+          6 / std::numbers::sqrt3 * norm(cross(u, v)) / ((rs + rm + rl) * rl)};
+}
+
+}  // namespace
+
+ShapeGoal shape_goal(double min_angle, double max_angle) {
+  const auto cosine = [](double degrees) { return std::cos(degrees / kDegrees); };
+  return {min_angle, max_angle, cosine(min_angle + kMargin), cosine(max_angle - kMargin)};
+}
+
+double shape_cost(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal) {
+  const Shape shape = shape_of(a, b, c);
+  return (1 - shape.q) + kAngleWeight * (shape.smallest - 0.5) + beyond(shape.smallest - goal.near_min) +
+         beyond(goal.near_max - shape.largest);
+}
+
+ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal) {
+  const Shape shape = shape_of(a, b, c);
+  const auto angle = [](double cosine) { return std::acos(std::clamp(cosine, -1.0, 1.0)) * kDegrees; };
+  return {std::max(0.0, goal.min_angle - angle(shape.smallest)), std::max(0.0, angle(shape.largest) - goal.max_angle)};
+}
+
+Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
+  double nearest = norm2(seeds_[owner] - p);
+  for (Index last = kNone; last != owner;) {
+    last = owner;
+    for (const Index* j = rings_.begin(last); j != rings_.end(last); ++j) {
+      const double squared = norm2(seeds_[*j] - p);
+      if (squared < nearest) {
+        nearest = squared;
+        owner = *j;
+      }
+    }
+  }
+  Vec3 foot = p;
+  double best = std::numeric_limits<double>::infinity();
+  for (const Index* t = cells_.begin(owner); t != cells_.end(owner); ++t) {
+    const Facet& facet = surface_.facets[surface_.facet_of[*t]];
+    const Vec3 q = nearest_on_triangle(p, facet.corners[0], facet.corners[1], facet.corners[2]);
+    const double squared = norm2(q - p);
+    if (squared < best) {
+      best = squared;
+      foot = q;
+      normal = facet.normal;
+    }
+  }
+  return foot;
+}
+
+Index ImprovePatch::add_vertex(const PatchVertex& vertex) {
+  vertices_.push_back(vertex);
+  stars_.emplace_back();
+  return static_cast<Index>(vertices_.size() - 1);
+}
+
+void ImprovePatch::add_triangle(const Triangle& t) {
+  const Index index = static_cast<Index>(triangles_.size());
+  const Vec3 &a = vertices_[t[0]].x, &b = vertices_[t[1]].x, &c = vertices_[t[2]].x;
+  triangles_.push_back({t, unit(cross(b - a, c - a)), 0, true});
+  triangles_.back().cost = cost_of(triangles_.back());
+  for (const Index v : t) stars_[v].push_back(index);
+}
+
+void ImprovePatch::lock(std::vector<std::array<Index, 2>> edges) {
+  locked_ = std::move(edges);
+  std::sort(locked_.begin(), locked_.end());
+}
+
+std::vector<Triangle> ImprovePatch::triangles() const {
+  std::vector<Triangle> alive;
+  for (const PatchTriangle& t : triangles_)
+    if (t.alive) alive.push_back(t.v);
+  return alive;
+}
+
+double ImprovePatch::cost(double average, double irregular) const {
+  double sum = 0;
+  for (const PatchTriangle& t : triangles_)
+    if (t.alive) sum += t.cost - average;
+  for (Index v = 0; v < vertices_.size(); ++v)
+    if (vertices_[v].place.kind == Kind::surface && !vertices_[v].removed)
+      sum += irregular * std::abs(excess_degree(v));
+  return sum;
+}
+
+int ImprovePatch::excess_degree(Index v) const { return static_cast<int>(stars_[v].size() + vertices_[v].outside) - 6; }
+
+double ImprovePatch::cost_of(const PatchTriangle& t) const {
+  const Vec3 &a = vertices_[t.v[0]].x, &b = vertices_[t.v[1]].x, &c = vertices_[t.v[2]].x;
+  return turns(a, b, c, t.facing) ? kFolded : shape_cost(a, b, c, goal_);
+}
+
+double ImprovePatch::star_cost(Index v) const {
+  double sum = 0;
+  for (const Index t : stars_[v]) sum += cost_of(triangles_[t]);
+  return sum;
+}
+
+bool ImprovePatch::is_locked(Index a, Index b) const {
+  return std::binary_search(locked_.begin(), locked_.end(), key(a, b));
+}
+
+void ImprovePatch::set_locked(Index a, Index b, bool locked) {
+  const auto place = std::lower_bound(locked_.begin(), locked_.end(), key(a, b));
+  const bool there = place != locked_.end() && *place == key(a, b);
+  if (locked && !there) locked_.insert(place, key(a, b));
+  if (!locked && there) locked_.erase(place);
+}
+
+bool ImprovePatch::triangles_at(Index a, Index b, std::size_t& left, std::size_t& right) const {
+  std::size_t count = 0;
+  int turned = 0;
+  for (const Index t : stars_[a]) {
+    const Triangle& v = triangles_[t].v;
+    if (!has(v, b)) continue;
+    const bool forward = v[0] == a ? v[1] == b : v[1] == a ? v[2] == b : v[0] == b;
+    turned += forward ? 1 : -1;
+    (forward ? left : right) = t;
+    ++count;
+  }
+  return count == 2 && turned == 0;
+}
+
+void ImprovePatch::replace(std::size_t t, const Triangle& corners, const Vec3& facing) {
+  PatchTriangle& triangle = triangles_[t];
+  for (const Index v : triangle.v)
+    if (!has(corners, v)) std::erase(stars_[v], static_cast<Index>(t));
+  for (const Index v : corners)
+    if (!has(triangle.v, v)) stars_[v].push_back(static_cast<Index>(t));
+  triangle.v = corners;
+  triangle.facing = facing;
+  triangle.cost = cost_of(triangle);
+}
+
+void ImprovePatch::kill(std::size_t t) {
+  for (const Index v : triangles_[t].v) std::erase(stars_[v], static_cast<Index>(t));
+  triangles_[t].alive = false;
+}
+
+bool ImprovePatch::flip(Index a, Index b) {
+  std::size_t left, right;
+  if (is_locked(a, b) || !triangles_at(a, b, left, right)) return false;
+  const Index c = opposite(triangles_[left].v, a, b), d = opposite(triangles_[right].v, a, b);
+  if (c == d) return false;
+  for (const Index t : stars_[c])
+    if (has(triangles_[t].v, d)) return false;
+  const Vec3 facing = unit(triangles_[left].facing + triangles_[right].facing);
+  const Triangle one{a, d, c}, two{d, b, c};
+  for (const Triangle& t : {one, two})
+    if (turns(vertices_[t[0]].x, vertices_[t[1]].x, vertices_[t[2]].x, facing)) return false;
+  replace(left, one, facing);
+  replace(right, two, facing);
+  return true;
+}
+
+void ImprovePatch::make_delaunay() {
+  bool changed = true;
+  for (int pass = 0; pass < kFlipPasses && changed; ++pass) {
+    changed = false;
+    for (std::size_t k = 0; k < triangles_.size(); ++k)
+      for (int m = 0; m < 3 && triangles_[k].alive; ++m) {
+        const Index a = triangles_[k].v[m], b = triangles_[k].v[(m + 1) % 3];
+        std::size_t left, right;
+        if (a > b || !triangles_at(a, b, left, right)) continue;
+        double cotangents = 0;
+        for (const std::size_t t : {left, right}) {
+          const Vec3& apex = vertices_[opposite(triangles_[t].v, a, b)].x;
+          const Vec3 u = vertices_[a].x - apex, v = vertices_[b].x - apex;
+          const double sine = norm(cross(u, v));
+          cotangents += sine > 0 ? dot(u, v) / sine : (dot(u, v) > 0 ? 1e9 : -1e9);
+        }
+        if (cotangents < -kDelaunaySlack) changed |= flip(a, b);
+      }
+  }
+}
+
+bool ImprovePatch::can_collapse(Index v, Index to) const {
+  std::size_t shared = 0, common = 0;
+  std::vector<Index> around;
+  for (const Index t : stars_[v]) {
+    const PatchTriangle& triangle = triangles_[t];
+    if (has(triangle.v, to)) {
+      ++shared;
+      continue;
+    }
+    Triangle moved = triangle.v;
+    for (Index& w : moved)
+      if (w == v) w = to;
+    if (turns(vertices_[moved[0]].x, vertices_[moved[1]].x, vertices_[moved[2]].x, triangle.facing)) return false;
+  }
+  for (const Index t : stars_[v])
+    for (const Index w : triangles_[t].v)
+      if (w != v && w != to && std::find(around.begin(), around.end(), w) == around.end()) around.push_back(w);
+  for (const Index w : around)
+    for (const Index t : stars_[w])
+      if (has(triangles_[t].v, to)) {
+        ++common;
+        break;
+      }
+  return shared > 0 && common == shared;
+}
+
+bool ImprovePatch::collapse(Index v, Index to) {
+  if (!can_collapse(v, to)) return false;
+  const std::vector<Index> star = stars_[v];
+  for (const Index t : star) {
+    if (has(triangles_[t].v, to)) {
+      kill(t);
+      continue;
+    }
+    Triangle moved = triangles_[t].v;
+    for (Index& w : moved)
+      if (w == v) w = to;
+    replace(t, moved, triangles_[t].facing);
+  }
+  return true;
+}
+
+bool ImprovePatch::remove(Index v) {
+  if (vertices_[v].removed || !vertices_[v].free || vertices_[v].place.corner != kNone) return false;
+  const bool surface = vertices_[v].place.kind == Kind::surface;
+  std::vector<std::pair<double, Index>> ends;
+  std::vector<Index> along;  // its neighbours on the curve
+  for (const Index t : stars_[v])
+    for (const Index w : triangles_[t].v) {
+      if (w == v || std::any_of(ends.begin(), ends.end(), [&](const auto& end) { return end.second == w; })) continue;
+      const bool locked = is_locked(v, w);
+      if (locked) along.push_back(w);
+      if (surface || locked) ends.push_back({norm2(vertices_[w].x - vertices_[v].x), w});
+    }
+  if (!surface && along.size() != 2) return false;
+  std::sort(ends.begin(), ends.end());
+  for (const auto& [squared, to] : ends) {
+    if (!collapse(v, to)) continue;
+    vertices_[v].removed = true;
+    for (const Index w : along) set_locked(v, w, false);
+    if (!surface) set_locked(along[0], along[1], true);
+    return true;
+  }
+  return false;
+}
+
+// A vertex in the middle of an edge; on the curve if the edge is locked. Without an owner if that cannot be told.
+PatchVertex ImprovePatch::between(Index a, Index b) const {
+  const PatchVertex &u = vertices_[a], &v = vertices_[b];
+  PatchVertex middle;
+  middle.free = true;
+  middle.x = 0.5 * (u.x + v.x);
+  Index owner = u.owner;
+  if (!is_locked(a, b)) {
+    middle.x = map_->project(middle.x, owner, middle.normal);
+    middle.owner = owner;
+    return middle;
+  }
+  const Index curve = u.place.curve != kNone ? u.place.curve : v.place.curve;
+  if (curve == kNone || (v.place.curve != kNone && v.place.curve != curve)) return middle;
+  const double length = curves_->length(curve);
+  const auto position = [&](const SeedPlace& place, double near) {
+    if (place.curve == curve) return place.position;
+    const auto [first, last] = curves_->ends(curve);
+    if (first == last) return near < 0.5 * length ? 0.0 : length;
+    return place.corner == first ? 0.0 : length;
+  };
+  const double on = u.place.curve == curve ? u.place.position : v.place.position;
+  const double from = position(u.place, on);
+  double to = position(v.place, on);
+  if (curves_->closed(curve) && to - from > 0.5 * length) to -= length;
+  if (curves_->closed(curve) && from - to > 0.5 * length) to += length;
+  middle.place = {Kind::curve, curve, kNone, curves_->wrap(curve, 0.5 * (from + to))};
+  middle.x = curves_->point(curve, middle.place.position);
+  middle.owner = owner;
+  return middle;
+}
+
+bool ImprovePatch::split(Index a, Index b) {
+  const bool locked = is_locked(a, b);
+  std::size_t left, right;
+  if (!locked && !triangles_at(a, b, left, right)) return false;
+  const PatchVertex middle = between(a, b);
+  if (middle.owner == kNone) return false;
+  const Index m = add_vertex(middle);
+  const std::vector<Index> star = stars_[a];
+  for (const Index t : star) {
+    if (!has(triangles_[t].v, b)) continue;
+    Triangle other = triangles_[t].v, kept = triangles_[t].v;
+    const Vec3 facing = triangles_[t].facing;
+    std::replace(kept.begin(), kept.end(), b, m);
+    std::replace(other.begin(), other.end(), a, m);
+    replace(t, kept, facing);
+    add_triangle(other);
+    triangles_.back().facing = facing;
+  }
+  if (locked) {
+    set_locked(a, b, false);
+    set_locked(a, m, true);
+    set_locked(m, b, true);
+  }
+  return true;
+}
+
+bool ImprovePatch::insert(std::size_t triangle) {
+  const Triangle t = triangles_[triangle].v;
+  const Vec3 facing = triangles_[triangle].facing;
+  PatchVertex centre;
+  centre.free = true;
+  centre.owner = vertices_[t[0]].owner;
+  const Vec3 middle = (1.0 / 3) * (vertices_[t[0]].x + vertices_[t[1]].x + vertices_[t[2]].x);
+  centre.x = map_->project(middle, centre.owner, centre.normal);
+  const Index m = add_vertex(centre);
+  replace(triangle, {t[0], t[1], m}, facing);
+  for (const Triangle& other : {Triangle{t[1], t[2], m}, Triangle{t[2], t[0], m}}) {
+    add_triangle(other);
+    triangles_.back().facing = facing;
+  }
+  return true;
+}
+
+std::vector<std::array<Index, 2>> ImprovePatch::wanted_flips(Index v) const {
+  struct Flip {
+    int gain;
+    std::array<Index, 2> edge;
+  };
+  std::vector<Flip> flips;
+  for (const Index t : stars_[v])
+    for (int m = 0; m < 3; ++m) {
+      const Index a = triangles_[t].v[m], b = triangles_[t].v[(m + 1) % 3];
+      std::size_t left, right;
+      if (is_locked(a, b) || !triangles_at(a, b, left, right)) continue;
+      const Index c = opposite(triangles_[left].v, a, b), d = opposite(triangles_[right].v, a, b);
+      const int gain = excess_degree(a) + excess_degree(b) - excess_degree(c) - excess_degree(d) - 2;
+      const std::array<Index, 2> edge = key(a, b);
+      if (gain >= 0 && std::none_of(flips.begin(), flips.end(), [&](const Flip& f) { return f.edge == edge; }))
+        flips.push_back({gain, edge});
+    }
+  std::sort(flips.begin(), flips.end(),
+            [](const Flip& f, const Flip& g) { return f.gain != g.gain ? f.gain > g.gain : f.edge < g.edge; });
+  std::vector<std::array<Index, 2>> edges;
+  for (const Flip& f : flips) edges.push_back(f.edge);
+  return edges;
+}
+
+Index ImprovePatch::farthest_neighbour(Index v) const {
+  Index farthest = kNone;
+  double most = -1;
+  for (const Index t : stars_[v])
+    for (const Index w : triangles_[t].v) {
+      const double squared = norm2(vertices_[w].x - vertices_[v].x);
+      if (w == v || squared < most || (squared == most && w >= farthest)) continue;
+      most = squared;
+      farthest = w;
+    }
+  return farthest;
+}
+
+std::size_t ImprovePatch::largest_triangle(Index v) const {
+  std::size_t largest = 0;
+  double most = -1;
+  for (const Index t : stars_[v]) {
+    const Triangle& w = triangles_[t].v;
+    const double squared = norm2(cross(vertices_[w[1]].x - vertices_[w[0]].x, vertices_[w[2]].x - vertices_[w[0]].x));
+    if (squared < most || (squared == most && t >= largest)) continue;
+    most = squared;
+    largest = t;
+  }
+  return largest;
+}
+
+bool ImprovePatch::relax(Index v, double hold) {
+  if (stars_[v].empty()) return false;
+  PatchVertex& vertex = vertices_[v];
+  double before = 0, length = 0;
+  for (const Index t : stars_[v]) {
+    before += triangles_[t].cost;
+    const Triangle& w = triangles_[t].v;
+    length += norm(vertices_[w[0] == v ? w[1] : w[0]].x - vertices_[v].x);
+  }
+  length /= static_cast<double>(stars_[v].size());
+  if (vertex.step == 0) {
+    vertex.step = kFirstStep * length;
+    vertex.start = vertex.x;
+  }
+  if (vertex.step < kLastStep * length) return false;
+  hold /= length * length;
+  before += hold * norm2(vertex.x - vertex.start);
+
+  const PatchVertex old = vertex;
+  PatchVertex best = old;
+  double least = before;
+  const auto attempt = [&] {
+    const double cost = star_cost(v) + hold * norm2(vertex.x - vertex.start);
+    if (cost < least) {
+      least = cost;
+      best = vertex;
+    }
+    return cost;
+  };
+  const double s = old.step;
+  if (old.place.kind == Kind::curve) {
+    const auto go = [&](double way) {
+      vertex.place.position = curves_->wrap(old.place.curve, old.place.position + way);
+      vertex.x = curves_->point(old.place.curve, vertex.place.position);
+      return attempt();
+    };
+    const double ahead = go(s), behind = go(-s);
+    go(s * lowest(behind, before, ahead));
+  } else {
+    // The trials are in the tangent plane.
+    const auto go = [&](const Vec3& way) {
+      vertex.x = old.x + way;
+      return attempt();
+    };
+    const Vec3& n = old.normal;
+    const Vec3 u = unit(cross(n, std::abs(n.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0})), w = cross(n, u);
+    const double u_ahead = go(s * u), u_behind = go(-s * u), w_ahead = go(s * w), w_behind = go(-s * w);
+    go(s * (lowest(u_behind, before, u_ahead) * u + lowest(w_behind, before, w_ahead) * w));
+    if (least < before) {
+      vertex = best;
+      vertex.x = map_->project(best.x, vertex.owner, vertex.normal);
+      least = before;
+      best = old;
+      attempt();
+    }
+  }
+  vertex = best;
+  if (least >= before) {
+    vertex.step *= 0.5;
+    return false;
+  }
+  for (const Index t : stars_[v]) triangles_[t].cost = cost_of(triangles_[t]);
+  return true;
+}
+
+void ImprovePatch::relax_all(int sweeps) {
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    if (sweep % kFlipEvery == 0) make_delaunay();
+    for (Index v = 0; v < vertices_.size(); ++v)
+      if (vertices_[v].free && !vertices_[v].removed && vertices_[v].place.kind != Kind::fixed) relax(v, kHold);
+  }
+  make_delaunay();
+}
+
+}  // namespace bisector

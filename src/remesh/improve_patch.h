@@ -1,0 +1,136 @@
+// A part of the dual as a triangulation that can be tried out: seeds move, appear and vanish, edges follow by Delaunay flips.
+// It is a guess at the restricted Delaunay triangulation that costs microseconds; the diagram has the last word (improve.h).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/geometry.h"
+#include "features/curves.h"
+#include "voronoi/surface.h"
+
+namespace bisector {
+
+// The angles that triangles should stay between, in degrees, and the cosines from which on they cost more.
+struct ShapeGoal {
+  double min_angle, max_angle, near_min, near_max;
+};
+
+ShapeGoal shape_goal(double min_angle, double max_angle);
+
+// 0 for an equilateral triangle. Grows with 1 - Q (mesh/quality.h), with the smallest angle's cosine, and fast beyond the goal.
+double shape_cost(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
+// By how many degrees the smallest angle is less than it should be and the largest one more.
+struct ShapeExcess {
+  double under = 0, over = 0;
+
+  double most() const { return under > over ? under : over; }
+  bool within(const ShapeExcess& b) const { return under <= b.under && over <= b.over; }
+  // The worse of both in either respect.
+  void take(const ShapeExcess& b) {
+    if (b.under > under) under = b.under;
+    if (b.over > over) over = b.over;
+  }
+};
+ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
+
+// The surface by the cells of a diagram: the nearest seed of a point owns the piece of the surface that the point goes to,
+// which keeps points on their sheet.
+class CellMap {
+ public:
+  // `cells` are the triangles of each cell, `rings` the neighbours of each seed in the dual. All must outlive the object.
+  CellMap(const Surface& surface, const std::vector<Vec3>& seeds, const Csr<Index>& cells, const Csr<Index>& rings)
+      : surface_(surface), seeds_(seeds), cells_(cells), rings_(rings) {}
+
+  // Puts p on the surface near the cell `owner`, which becomes the one that p is in. Sets the unit normal there.
+  Vec3 project(const Vec3& p, Index& owner, Vec3& normal) const;
+
+ private:
+  const Surface& surface_;
+  const std::vector<Vec3>& seeds_;
+  const Csr<Index>& cells_;
+  const Csr<Index>& rings_;
+};
+
+struct PatchVertex {
+  Vec3 x, normal;     // the normal is 0 where the seed is not on the surface alone
+  SeedPlace place;
+  Index owner = kNone;  // cell of the map that it is in
+  Index seed = kNone;   // its index outside, if it has one
+  bool free = false;
+  bool removed = false;
+  Index outside = 0;    // triangles at it that are not in the patch
+  double step = 0;      // length that the next moves are tried with; 0 before the first
+  Vec3 start;           // where it was before that
+};
+
+class ImprovePatch {
+ public:
+  // `curves` may be null if no vertex is on one. Both must outlive the object, and its copies.
+  ImprovePatch(const CellMap& map, const FeatureCurves* curves, const ShapeGoal& goal)
+      : map_(&map), curves_(curves), goal_(goal) {}
+
+  Index add_vertex(const PatchVertex& vertex);
+  void add_triangle(const Triangle& t);
+  // `degree`: triangles at the vertex, here and outside.
+  void set_outside(Index v, std::size_t degree) { vertices_[v].outside = static_cast<Index>(degree - stars_[v].size()); }
+  // Edges that stay, lower vertex first, each pair once; in any order.
+  void lock(std::vector<std::array<Index, 2>> edges);
+
+  const std::vector<PatchVertex>& vertices() const { return vertices_; }
+  std::vector<Triangle> triangles() const;
+  // Sum of the triangles' costs, each less `average`, and so much for each triangle that a vertex on the surface has more or
+  // fewer than six.
+  double cost(double average, double irregular) const;
+
+  // Each is false, and nothing is changed, if the triangulation has no room for it.
+  bool remove(Index v);               // corners and what is not free stay
+  bool split(Index a, Index b);       // inserts a vertex on the edge, on the curve if it is locked
+  bool insert(std::size_t triangle);  // inserts a vertex in the triangle
+  bool flip(Index a, Index b);
+
+  // The edges at v and opposite to it whose flip brings the degrees nearest to six, best first.
+  std::vector<std::array<Index, 2>> wanted_flips(Index v) const;
+  // The vertex at the far end of v's longest edge, and the triangle at v of the largest area.
+  Index farthest_neighbour(Index v) const;
+  std::size_t largest_triangle(Index v) const;
+
+  // Flips edges until all are Delaunay, as far as the locked ones allow.
+  void make_delaunay();
+  // Moves v to where its triangles, and `hold` times the square of its way from the start in edge lengths, cost less; true if it
+  // moved. Touches nothing but v and the costs of its triangles.
+  bool relax(Index v, double hold);
+  // Relaxes the free vertices in order, so many times, with flips in between.
+  void relax_all(int sweeps);
+
+ private:
+  struct PatchTriangle {
+    Triangle v;
+    Vec3 facing;  // unit normal that its own may not turn away from; 0: any
+    double cost = 0;
+    bool alive = true;
+  };
+
+  double cost_of(const PatchTriangle& t) const;
+  double star_cost(Index v) const;
+  int excess_degree(Index v) const;
+  bool is_locked(Index a, Index b) const;
+  void set_locked(Index a, Index b, bool locked);
+  // The triangles at an edge; false unless there are two that agree in orientation.
+  bool triangles_at(Index a, Index b, std::size_t& left, std::size_t& right) const;
+  void replace(std::size_t t, const Triangle& corners, const Vec3& facing);
+  void kill(std::size_t t);
+  bool collapse(Index v, Index to);
+  bool can_collapse(Index v, Index to) const;
+  PatchVertex between(Index a, Index b) const;
+
+  const CellMap* map_;
+  const FeatureCurves* curves_;
+  ShapeGoal goal_;
+  std::vector<PatchVertex> vertices_;
+  std::vector<PatchTriangle> triangles_;
+  std::vector<std::vector<Index>> stars_;  // triangles at each vertex
+  std::vector<std::array<Index, 2>> locked_;  // sorted
+};
+
+}  // namespace bisector

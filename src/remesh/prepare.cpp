@@ -1,0 +1,130 @@
+#include "remesh/prepare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "bisector/error.h"
+#include "features/normals.h"
+#include "mesh/topology.h"
+
+namespace bisector {
+namespace {
+
+// With few seeds to start from the count says nothing about the result's, which topology control finds. The density then is
+// one that a mesh of so many vertices could follow.
+constexpr std::size_t kLeastForDensity = 3000;
+constexpr std::size_t kMostVertices = 100'000'000;
+
+std::size_t non_manifold_edges(const TriangleMesh& mesh) {
+  return analyse_topology(mesh.triangles, mesh.vertices.size()).non_manifold_edges;
+}
+
+WeldResult keep_apart(const TriangleMesh& input, std::size_t borders) {
+  WeldResult result;
+  result.mesh = input;
+  result.vertex_of.resize(input.vertices.size());
+  for (Index v = 0; v < result.vertex_of.size(); ++v) result.vertex_of[v] = v;
+  result.border_before = result.border_after = borders;
+  return result;
+}
+
+std::string plural(std::size_t count, const char* word) {
+  return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
+}
+
+void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const Context& context) {
+  if (welded.merged_vertices + welded.split_edges + welded.degenerate_triangles + welded.duplicate_triangles == 0) return;
+  std::string line = fmt::format("welded {} {}", welded.merged_vertices, welded.merged_vertices == 1 ? "vertex" : "vertices");
+  if (welded.split_edges) line += fmt::format(", split {} at cracks", plural(welded.split_edges, "edge"));
+  if (welded.degenerate_triangles + welded.duplicate_triangles)
+    line += fmt::format(", removed {}", plural(welded.degenerate_triangles + welded.duplicate_triangles, "triangle"));
+  line += fmt::format("; {} of {} left", welded.border_after, plural(welded.border_before, "border edge"));
+  if (!options.weld) line += "; --weld sets how far vertices may be apart";
+  context.warn(line);
+}
+
+void orient_with_warning(TriangleMesh& mesh, const Context& context) {
+  if (analyse_topology(mesh.triangles, mesh.vertices.size()).oriented) return;
+  std::vector<Triangle> turned = mesh.triangles;
+  orient(turned, mesh.vertices.size());
+  if (!analyse_topology(turned, mesh.vertices.size()).oriented) return;
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < turned.size(); ++t) count += turned[t] != mesh.triangles[t];
+  mesh.triangles = std::move(turned);
+  context.warn(fmt::format("turned {} over, to run the same way round as most", plural(count, "triangle")));
+}
+
+SizingTarget target_of(const RemeshOptions& options) {
+  if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
+  return {options.vertices, options.edge_length};
+}
+
+}  // namespace
+
+WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
+  if (tolerance) return weld(input, *tolerance);
+  const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
+  if (topology.boundary_edges == 0) return keep_apart(input, 0);
+  WeldResult welded = weld(input, 0);
+  const bool useful = welded.border_after < welded.border_before &&
+                      non_manifold_edges(welded.mesh) <= topology.non_manifold_edges;
+  return useful ? welded : keep_apart(input, topology.boundary_edges);
+}
+
+PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
+  PreparedInput prepared;
+  prepared.welded = join_borders(input, options.weld);
+  TriangleMesh welded = std::exchange(prepared.welded.mesh, {});
+  const std::vector<Index>& vertex_of = prepared.welded.vertex_of;
+  warn_of_weld(prepared.welded, options, context);
+  orient_with_warning(welded, context);
+
+  FeatureOptions features = options.features;
+  for (auto& [a, b] : features.given) {
+    if (a >= vertex_of.size() || b >= vertex_of.size())
+      throw Error(fmt::format("feature edge {} {} is none of the mesh's; correct it", a, b));
+    a = vertex_of[a];
+    b = vertex_of[b];
+  }
+  std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+  const SizingTarget target = target_of(options);
+  if (options.energy == Energy::automatic) {
+    const std::size_t count = target.vertices ? target.vertices : compute_sizing(welded, {}, target).vertices;
+    prepared.noisy = has_noisy_normals(welded, std::max<std::size_t>(count, 4));
+    // What noise folds is no feature.
+    if (prepared.noisy && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
+  }
+  const FeatureGraph graph = detect_features(welded, features);
+
+  SizingOptions sizing = options.sizing;
+  if (!sizing.attribute.empty()) {
+    if (sizing.attribute.size() != input.vertices.size())
+      throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex", sizing.attribute.size(),
+                              input.vertices.size()));
+    std::vector<double> values(welded.vertices.size());
+    for (std::size_t v = input.vertices.size(); v-- > 0;) values[vertex_of[v]] = sizing.attribute[v];
+    sizing.attribute = std::move(values);
+  }
+  sizing.sharp = graph.edges;
+  SizedMesh sized = refine_for_density(welded, sizing, target);
+  if (sized.sizing.vertices > kMostVertices && options.seeds.empty())
+    throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones", options.edge_length,
+                            static_cast<double>(sized.sizing.vertices), kMostVertices));
+  prepared.features = split_features(graph, sized.splits);
+  prepared.mesh = std::move(sized.mesh);
+  prepared.mesh.feature_edges.clear();
+  prepared.mesh.labels.clear();
+  if (!welded.labels.empty())
+    for (Index t : sized.parent) prepared.mesh.labels.push_back(welded.labels[t]);
+  prepared.density = std::move(sized.sizing.density);
+  prepared.unit_edge = sized.sizing.unit_edge;
+  prepared.vertices = options.seeds.empty() ? sized.sizing.vertices : options.seeds.size();
+  if (prepared.vertices < 4)
+    throw Error(fmt::format("edges of {} make {} vertices, fewer than 4; ask for shorter ones", options.edge_length,
+                            prepared.vertices));
+  return prepared;
+}
+
+}  // namespace bisector

@@ -1,0 +1,532 @@
+#include "remesh/topology_control.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "core/parallel.h"
+#include "cvt/constrain.h"
+#include "remesh/sheets.h"
+#include "voronoi/dual.h"
+
+namespace bisector {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+constexpr int kGrowingRounds = 12, kRefiningRounds = 80;
+constexpr int kFarRounds = 3;            // every third round of refining inserts far points
+constexpr std::size_t kDivergence = 2;   // times the failures at first
+constexpr int kTrims = 8;
+constexpr int kGrowingSteps = 30;        // thesis 4.4.4
+constexpr int kPolishingSteps = 20;
+constexpr int kSmoothingSteps = 20;
+constexpr int kRetreats = 12;            // per step of smoothing
+constexpr std::size_t kCoarse = 8;       // of so many cells one may fail; more say that there are too few seeds
+constexpr std::size_t kMostTrimmed = 8;  // of so many seeds one
+constexpr std::size_t kMostAdded = 100;  // and a quarter of the seeds, if they are many
+// A surface may need more than were asked for: so many are allowed to grow to, and in the end.
+constexpr std::size_t kGrown = 300, kAnyway = 5000;
+// Of a cell's radius: sheets nearer to each other get a vertex each. More of them if fewer do not help.
+constexpr double kCrossing = 0.01, kTouching = 0.1;
+constexpr double kApart = 2;             // squared distance of points inserted together, over that to the seeds there are
+constexpr double kTurned = -0.2;         // cosine of the angle at which a surface faces away
+
+bool is_free(const CvtState& state, Index i) {
+  return state.places.empty() || state.places[i].kind == SeedPlace::Kind::surface;
+}
+
+// A point to insert, and the square of its distance to the nearest seed.
+struct Candidate {
+  Vec3 point;
+  double squared;
+};
+
+// Nearest and farthest points of some part of a cell from its seed.
+struct Extremes {
+  Candidate nearest{{}, kInfinity}, farthest{{}, -1};
+
+  void near(const Vec3& p, const Vec3& seed) {
+    if (const double d = norm2(p - seed); d < nearest.squared) nearest = {p, d};
+  }
+  void far(const Vec3& p, const Vec3& seed) {
+    if (const double d = norm2(p - seed); d > farthest.squared) farthest = {p, d};
+  }
+};
+
+// Points of the diagram where another seed would mend a failure: the nearest to the seed of what is to be split off, which on a
+// thin part is opposite to it, so that the bisector runs between the sides; or, on demand, the farthest from the seeds there
+// are, as in Delaunay refinement, which spreads seeds evenly and so ends.
+class Repair {
+ public:
+  Repair(const Surface& surface, const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds, bool far)
+      : surface_(surface), polygons_(polygons), seeds_(seeds), far_(far) {}
+
+  std::vector<Vec3> points(const BallReport& report) {
+    for (const BallReport::Cell& c : report.cells) split_parts(c);
+    for (const BallReport::Cell& c : report.cells) open_up(c);
+    for (const BallReport::Edge& e : report.edges) cut(e);
+    for (const BallReport::Vertex& v : report.vertices) separate(v);
+    return thinned();
+  }
+
+ private:
+  std::size_t next(std::size_t polygon, std::size_t entry) const {
+    return entry + 1 == polygons_.offsets[polygon + 1] ? polygons_.offsets[polygon] : entry + 1;
+  }
+  std::size_t polygon_with(std::size_t entry) const {
+    const auto after = std::upper_bound(polygons_.offsets.begin(), polygons_.offsets.end(), entry);
+    return static_cast<std::size_t>(after - polygons_.offsets.begin()) - 1;
+  }
+  const Vec3& normal(std::size_t polygon) const {
+    return surface_.facets[surface_.facet_of[polygons_.pairs[polygon].triangle]].normal;
+  }
+
+  Extremes extremes_of_polygon(std::size_t p, const Vec3& seed) const {
+    Extremes x;
+    const std::size_t first = polygons_.offsets[p], end = polygons_.offsets[p + 1];
+    const Vec3& apex = polygons_.vertices[first];
+    for (std::size_t e = first; e < end; ++e) x.far(polygons_.vertices[e], seed);
+    for (std::size_t e = first + 1; e + 1 < end; ++e)
+      x.near(nearest_on_triangle(seed, apex, polygons_.vertices[e], polygons_.vertices[e + 1]), seed);
+    return x;
+  }
+
+  Extremes extremes(const std::vector<std::size_t>& polygons, const Vec3& seed) const {
+    Extremes all;
+    for (const std::size_t p : polygons) {
+      const Extremes x = extremes_of_polygon(p, seed);
+      if (x.nearest.squared < all.nearest.squared) all.nearest = x.nearest;
+      if (x.farthest.squared > all.farthest.squared) all.farthest = x.farthest;
+    }
+    return all;
+  }
+
+  // Of entries: their edges.
+  Extremes extremes_of_edges(const std::vector<std::size_t>& entries, const Vec3& seed) const {
+    Extremes x;
+    for (const std::size_t e : entries) {
+      const Vec3 &a = polygons_.vertices[e], &b = polygons_.vertices[next(polygon_with(e), e)];
+      x.near(nearest_on_triangle(seed, a, b, b), seed);
+      x.far(a, seed);
+      x.far(b, seed);
+    }
+    return x;
+  }
+
+  void add(const Candidate& c) {
+    if (c.squared > 0 && c.squared < kInfinity) candidates_.push_back(c);
+  }
+  void add(const Extremes& x) { add(far_ ? x.farthest : x.nearest); }
+
+  // All of the groups but that nearest to the seed.
+  void add_others(const std::vector<Extremes>& groups) {
+    const auto own = std::min_element(groups.begin(), groups.end(), [](const Extremes& a, const Extremes& b) {
+      return a.nearest.squared < b.nearest.squared;
+    });
+    for (auto group = groups.begin(); group != groups.end(); ++group)
+      if (group != own) add(*group);
+  }
+
+  void split_parts(const BallReport::Cell& c) {
+    std::vector<Extremes> parts;
+    for (const auto& part : c.parts) parts.push_back(extremes(part, seeds_[c.seed]));
+    add_others(parts);
+  }
+
+  // A cell with a part that is not a disk: where it faces away from the seed's side, as on the back of a limb, else the far
+  // points of its loops, else its farthest point.
+  void open_up(const BallReport::Cell& c) {
+    const bool disks = c.euler == static_cast<long long>(c.components) && c.loops == c.components;
+    if (disks && c.components > 1) return;
+    const Vec3& seed = seeds_[c.seed];
+    double best = kInfinity;
+    Vec3 facing;
+    for (const auto& part : c.parts)
+      for (const std::size_t p : part)
+        if (const double d = extremes_of_polygon(p, seed).nearest.squared; d < best) {
+          best = d;
+          facing = normal(p);
+        }
+    Extremes away, all;
+    for (const auto& part : c.parts)
+      for (const std::size_t p : part) {
+        const Extremes x = extremes_of_polygon(p, seed);
+        if (x.farthest.squared > all.farthest.squared) all.farthest = x.farthest;
+        if (dot(normal(p), facing) >= kTurned) continue;
+        if (x.nearest.squared < away.nearest.squared) away.nearest = x.nearest;
+        if (x.farthest.squared > away.farthest.squared) away.farthest = x.farthest;
+      }
+    if (away.farthest.squared >= 0) return add(away);
+    if (c.loops > 1)
+      for (const auto& loop : c.loop_parts) add(extremes_of_edges(loop, seed).farthest);
+    add(all.farthest);
+  }
+
+  void cut(const BallReport::Edge& e) {
+    std::vector<Extremes> parts;
+    for (const auto& part : e.parts) parts.push_back(extremes_of_edges(part, seeds_[e.a]));
+    if (parts.size() == 1) add(parts[0].farthest);
+    add_others(parts);
+  }
+
+  void separate(const BallReport::Vertex& v) {
+    std::vector<Extremes> places;
+    for (const std::size_t e : v.places) {
+      places.emplace_back();
+      places.back().near(polygons_.vertices[e], seeds_[v.seeds[0]]);
+      places.back().farthest = places.back().nearest;
+    }
+    add_others(places);
+  }
+
+  // No two nearer to each other than to the seeds there are, as if each were inserted before the next is looked for.
+  std::vector<Vec3> thinned() const {
+    std::vector<Vec3> kept;
+    for (const Candidate& c : candidates_)
+      if (std::all_of(kept.begin(), kept.end(), [&](const Vec3& p) { return norm2(p - c.point) >= kApart * c.squared; }))
+        kept.push_back(c.point);
+    return kept;
+  }
+
+  const Surface& surface_;
+  const RestrictedPolygons& polygons_;
+  const std::vector<Vec3>& seeds_;
+  bool far_;
+  std::vector<Candidate> candidates_;
+};
+
+// Seeds of the failing cells, edges and vertices.
+std::vector<char> failing_seeds(const BallReport& report, std::size_t count) {
+  std::vector<char> failing(count, 0);
+  for (const auto& c : report.cells) failing[c.seed] = 1;
+  for (const auto& e : report.edges) failing[e.a] = failing[e.b] = 1;
+  for (const auto& v : report.vertices)
+    for (Index i : v.seeds) failing[i] = 1;
+  return failing;
+}
+
+void mark_neighbours(const std::vector<DualEdge>& edges, std::vector<char>& marked) {
+  const std::vector<char> before = marked;
+  for (const DualEdge& e : edges)
+    if (before[e.a] || before[e.b]) marked[e.a] = marked[e.b] = 1;
+}
+
+class Control {
+ public:
+  Control(Backend& backend, CvtState& state, RestrictedPolygons& polygons, OptimiseOptions options, OptimiseTotals& totals,
+          const Context& context)
+      : backend_(backend),
+        state_(state),
+        polygons_(polygons),
+        options_(std::move(options)),
+        totals_(totals),
+        context_(context),
+        wanted_(state.seeds.size()),
+        given_(wanted_),
+        most_(std::max(budget(), kGrown)) {
+    options_.done = 1;
+    options_.share = 0;
+  }
+
+  TopologyOutcome run() {
+    look();
+    keep_best();
+    if (!outcome_.ball.holds) {
+      grow();
+      const Seeds start = best_;
+      most_ = budget();
+      for (const double gap : {kCrossing, kTouching, kInfinity}) {
+        restore(start);
+        gap_ = gap;
+        if (gap == kInfinity) most_ = std::max(budget(), kAnyway);
+        look();
+        keep_best();
+        if (refine()) break;
+      }
+      if (outcome_.ball.holds) {
+        trim();
+        polish();
+        smooth();
+      } else {
+        restore(best_);
+      }
+      complete();
+    }
+    return std::move(outcome_);
+  }
+
+ private:
+  struct Seeds {
+    std::vector<Vec3> positions;
+    std::vector<SeedPlace> places;
+    std::size_t given = 0;
+    double gap = kCrossing;
+  };
+
+  // Seeds that may be added before sheets are taken for what keeps the property from holding.
+  std::size_t budget() const { return wanted_ + std::max(wanted_ / 4 + kMostAdded, std::min(wanted_, kAnyway)); }
+
+  // Evaluates the seeds' diagram, divides cells of sheets that touch, and checks the result.
+  void look() {
+    context_.check();
+    backend_.evaluate(state_.seeds, state_.moments, polygons_);
+    totals_.count(state_.moments);
+    outcome_.ball = check_ball_property(backend_.surface(), polygons_);
+    vertices_ = state_.seeds;
+    if (!outcome_.ball.holds && (!coarse() || gap_ == kInfinity) &&
+        divide_cells(backend_.surface(), outcome_.ball, gap_, polygons_, vertices_))
+      outcome_.ball = check_ball_property(backend_.surface(), polygons_);
+    outcome_.gap = gap_;
+    outcome_.sheets.assign(vertices_.begin() + static_cast<std::ptrdiff_t>(state_.seeds.size()), vertices_.end());
+  }
+
+  // Whether so many cells fail that they are not to be mended one by one.
+  bool coarse() const { return kCoarse * outcome_.ball.cells.size() > state_.seeds.size(); }
+
+  bool insert(bool far) {
+    std::vector<Vec3> points = Repair(backend_.surface(), polygons_, vertices_, far).points(outcome_.ball);
+    if (points.empty() || state_.seeds.size() + points.size() > most_) return false;
+    edit_seeds({}, points, state_);
+    outcome_.inserted += points.size();
+    ++outcome_.rounds;
+    return true;
+  }
+
+  void optimise_again(int steps) {
+    options_.iterations = steps;
+    options_.phase = fmt::format("topology, round {}", outcome_.rounds);
+    optimise(backend_, state_, options_, totals_, context_);
+    look();
+  }
+
+  void grow() {
+    for (int round = 0; round < kGrowingRounds && coarse() && insert(false); ++round) {
+      given_ = wanted_ = state_.seeds.size();
+      optimise_again(kGrowingSteps);
+      keep_best();
+    }
+  }
+
+  // Where sheets cross there is no end to refining: more and more cells fail.
+  bool refine() {
+    const std::size_t hopeless = kDivergence * outcome_.ball.failures() + kMostAdded;
+    for (int round = 0; round < kRefiningRounds && !outcome_.ball.holds; ++round) {
+      if (outcome_.ball.failures() > hopeless || !insert(round % kFarRounds == kFarRounds - 1)) break;
+      look();
+      keep_best();
+    }
+    return outcome_.ball.holds;
+  }
+
+  // Back to the number of seeds asked for, at the cost of places where the energy can spare them.
+  void trim() {
+    for (int trial = 0; trial < kTrims; ++trial) {
+      const std::size_t surplus = vertices_.size() - std::min(vertices_.size(), wanted_);
+      if (surplus == 0 || kMostTrimmed * surplus > wanted_) break;
+      const std::vector<Index> spared = spared_seeds(surplus);
+      given_ -= spared.size();
+      outcome_.removed += spared.size();
+      edit_seeds(spared, {}, state_);
+      look();
+      keep_best();
+      if (!refine()) break;
+    }
+    restore(best_);
+  }
+
+  // Free seeds of the lowest energy, no two of them neighbours, away from those that were inserted; ascending.
+  std::vector<Index> spared_seeds(std::size_t count) const {
+    const std::vector<DualEdge> edges = extract_dual_edges(polygons_, vertices_);
+    std::vector<char> blocked(vertices_.size(), 0);
+    std::fill(blocked.begin() + static_cast<std::ptrdiff_t>(given_), blocked.end(), char{1});
+    for (int ring = 0; ring < 2; ++ring) mark_neighbours(edges, blocked);
+    std::vector<std::vector<Index>> around(vertices_.size());
+    for (const DualEdge& e : edges) {
+      around[e.a].push_back(e.b);
+      around[e.b].push_back(e.a);
+    }
+    std::vector<Index> order(given_);
+    std::iota(order.begin(), order.end(), Index{0});
+    std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
+      return state_.moments.cells[a].second < state_.moments.cells[b].second;
+    });
+    std::vector<Index> spared;
+    for (Index i : order) {
+      if (spared.size() == count) break;
+      if (blocked[i] || !is_free(state_, i)) continue;
+      spared.push_back(i);
+      for (Index j : around[i]) blocked[j] = 1;
+    }
+    std::sort(spared.begin(), spared.end());
+    return spared;
+  }
+
+  // Of two states that hold, the one with fewer vertices is better; as long as too many cells fail, the later.
+  void keep_best() {
+    const std::size_t failures = outcome_.ball.failures();
+    const std::size_t surplus = vertices_.size() - std::min(vertices_.size(), wanted_);
+    const bool better = failures != fewest_ ? failures < fewest_ : failures == 0 && surplus < least_surplus_;
+    if (!best_coarse_ && (coarse() || !better)) return;
+    best_coarse_ = coarse();
+    fewest_ = failures;
+    least_surplus_ = surplus;
+    best_ = {state_.seeds, state_.places, given_, gap_};
+  }
+
+  void restore(const Seeds& seeds) {
+    state_.seeds = seeds.positions;
+    state_.places = seeds.places;
+    given_ = seeds.given;
+    gap_ = seeds.gap;
+    look();
+  }
+
+  // Seeds of what fails, and their neighbours.
+  std::vector<char> failing_neighbourhood() const {
+    std::vector<char> failing = failing_seeds(outcome_.ball, vertices_.size());
+    mark_neighbours(extract_dual_edges(polygons_, vertices_), failing);
+    failing.resize(state_.seeds.size());
+    return failing;
+  }
+
+  // Moves the seeds that are not held as far as the property goes on holding: where it would not, seeds go back, and are held
+  // from then on. False, and nothing is moved, if that does not help.
+  bool move(const CvtState& before, const std::vector<Vec3>& next, std::vector<char>& held) {
+    state_.places = before.places;
+    for (int retreat = 0; retreat <= kRetreats; ++retreat) {
+      for (std::size_t i = 0; i < next.size(); ++i) state_.seeds[i] = held[i] ? before.seeds[i] : next[i];
+      look();
+      if (outcome_.ball.holds) return true;
+      const std::vector<char> failing = failing_neighbourhood();
+      for (std::size_t i = 0; i < held.size(); ++i) held[i] |= failing[i];
+    }
+    state_ = before;
+    look();
+    return false;
+  }
+
+  std::vector<char> held_seeds() const {
+    std::vector<char> held(state_.seeds.size());
+    for (Index i = 0; i < held.size(); ++i) held[i] = !is_free(state_, i);
+    return held;
+  }
+
+  // The optimiser's steps.
+  void polish() {
+    const CvtState before = state_;
+    options_.iterations = kPolishingSteps;
+    options_.phase = "topology, polishing";
+    optimise(backend_, state_, options_, totals_, context_);
+    const std::vector<Vec3> next = state_.seeds;
+    std::vector<char> held = held_seeds();
+    move(before, next, held);
+  }
+
+  // Lloyd's steps, for they move a seed by its own cell alone.
+  void smooth() {
+    std::vector<char> held = held_seeds();
+    for (int step = 0; step < kSmoothingSteps; ++step) {
+      const CvtState before = state_;
+      std::vector<Vec3> next = state_.seeds, normals(next.size());
+      for (std::size_t i = 0; i < next.size(); ++i)
+        if (const Moments& m = state_.moments.cells[i]; m.mass > 0) next[i] += (1 / m.mass) * m.first;
+      if (options_.constrained) project_to_cells(backend_.surface(), state_.moments.triangles, {}, next, normals);
+      if (!move(before, next, held)) return;
+    }
+  }
+
+  // What the optimiser leaves in the state, for seeds that it did not place.
+  void complete() {
+    options_.iterations = 0;
+    optimise(backend_, state_, options_, totals_, context_);
+    look();
+  }
+
+  Backend& backend_;
+  CvtState& state_;
+  RestrictedPolygons& polygons_;
+  OptimiseOptions options_;
+  OptimiseTotals& totals_;
+  const Context& context_;
+  std::size_t wanted_;       // vertices
+  std::size_t given_;        // seeds before those inserted by refining
+  std::size_t most_;         // seeds
+  double gap_ = kCrossing;   // see divide_cells
+  TopologyOutcome outcome_;
+  std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells
+  Seeds best_;
+  std::size_t fewest_ = 0;      // failures of the best seeds
+  std::size_t least_surplus_ = 0;
+  bool best_coarse_ = true;
+};
+
+}  // namespace
+
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons& polygons) {
+  TriangleMesh mesh;
+  mesh.triangles = extract_dual(polygons).triangles;
+  std::vector<Index> index(seeds.size(), kNone);
+  for (const Triangle& t : mesh.triangles)
+    for (Index v : t) index[v] = 0;
+  for (std::size_t v = 0; v < seeds.size(); ++v)
+    if (index[v] != kNone) {
+      index[v] = static_cast<Index>(mesh.vertices.size());
+      mesh.vertices.push_back(seeds[v]);
+    }
+  for (Triangle& t : mesh.triangles)
+    for (Index& v : t) v = index[v];
+  return mesh;
+}
+
+bool same_topology(const MeshTopology& dual, const MeshTopology& input) {
+  return dual.manifold == input.manifold && dual.oriented == input.oriented && dual.closed == input.closed && dual.euler == input.euler &&
+         dual.components == input.components;
+}
+
+std::vector<TopologyFault> topology_faults(const BallReport& report, const std::vector<Vec3>& seeds) {
+  std::vector<TopologyFault> faults;
+  for (const BallReport::Cell& c : report.cells)
+    faults.push_back({{c.seed}, seeds[c.seed],
+                      fmt::format("cell of {} components and Euler characteristic {}, with {} loops and {} parts of the border",
+                                  c.components, c.euler, c.loops, c.border_parts)});
+  for (const BallReport::Edge& e : report.edges)
+    faults.push_back({{e.a, e.b}, seeds[e.a],
+                      fmt::format("edge of {} components with {} ends, {} of them on the border", e.components, e.ends,
+                                  e.border_points)});
+  for (const BallReport::Vertex& v : report.vertices)
+    faults.push_back({{v.seeds[0], v.seeds[1], v.seeds[2]}, seeds[v.seeds[0]],
+                      fmt::format("three cells that meet in {} points", v.places.size())});
+  return faults;
+}
+
+void edit_seeds(const std::vector<Index>& removed, const std::vector<Vec3>& added, CvtState& state) {
+  std::size_t n = 0, r = 0;
+  for (Index i = 0; i < state.seeds.size(); ++i) {
+    if (r < removed.size() && removed[r] == i) {
+      ++r;
+      continue;
+    }
+    if (!state.places.empty()) state.places[n] = state.places[i];
+    state.seeds[n++] = state.seeds[i];
+  }
+  const bool placed = !state.places.empty();
+  state.seeds.resize(n);
+  state.seeds.insert(state.seeds.end(), added.begin(), added.end());
+  if (placed) state.places.resize(n);
+  if (placed) state.places.resize(state.seeds.size());
+}
+
+TopologyOutcome enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
+                                 OptimiseOptions options, OptimiseTotals& totals, const Context& context) {
+  if (input.manifold && input.oriented)
+    return Control(backend, state, polygons, std::move(options), totals, context).run();
+  backend.evaluate(state.seeds, state.moments, polygons);
+  return {check_ball_property(backend.surface(), polygons), 0, 0, 0, {}, 0};
+}
+
+}  // namespace bisector

@@ -1,0 +1,55 @@
+// Seeds for the places where the dual is not homeomorphic to the surface (thesis 4.4.4).
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "cvt/optimise.h"
+#include "mesh/topology.h"
+#include "voronoi/ball_property.h"
+
+namespace bisector {
+
+// The restricted Delaunay triangulation with the seeds that have triangles as vertices, in their order.
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons& polygons);
+
+// Whether `dual` is manifold, oriented, closed and of Euler characteristic and components as the input.
+bool same_topology(const MeshTopology& dual, const MeshTopology& input);
+
+// A cell, edge or vertex of the diagram that breaks the topological ball property.
+struct TopologyFault {
+  std::vector<Index> seeds;  // one, two or three
+  Vec3 position;             // of the first seed
+  std::string what;          // "2 components", "closed", ...
+};
+std::vector<TopologyFault> topology_faults(const BallReport& report, const std::vector<Vec3>& seeds);
+
+// Removes the seeds named (ascending) and appends free ones, with the places kept parallel. Every change of the number of seeds
+// for the sake of topology goes through here.
+void edit_seeds(const std::vector<Index>& removed, const std::vector<Vec3>& added, CvtState& state);
+
+struct TopologyOutcome {
+  BallReport ball;           // of the final diagram
+  int rounds = 0;            // of insertion
+  std::size_t inserted = 0;  // seeds, where the property failed, over all rounds
+  std::size_t removed = 0;   // seeds, elsewhere, so as to come back to the number asked for
+  std::vector<Vec3> sheets;  // vertices of the dual beyond the seeds: see divide_cells
+  double gap = 0;            // at which cells were divided: to do the same again for the diagram of changed seeds
+};
+
+// Inserts seeds until the topological ball property holds:
+// - While an eighth of the cells fail there are too few seeds, and the optimisation runs again after each round (thesis 4.4.4).
+// - Then without optimising, for a density that makes cells larger than the surface is thick would draw the new seeds away.
+// - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are optimised as
+//   far as the property goes on holding.
+// Cells of sheets that cross or nearly touch are divided (sheets.h): `polygons` and the report then name the sheets in
+// TopologyOutcome::sheets by indices after those of the seeds.
+//
+// Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to the seeds
+// with the fewest failures, which topology_faults lists. Surfaces that are not manifold and oriented are only checked.
+// `polygons` and state.moments are those of the final seeds.
+TopologyOutcome enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
+                                 OptimiseOptions options, OptimiseTotals& totals, const Context& context);
+
+}  // namespace bisector

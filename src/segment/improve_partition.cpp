@@ -1,0 +1,365 @@
+#include "segment/improve_partition.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <set>
+#include <tuple>
+
+
+#include "segment/flood.h"
+
+namespace bisector {
+namespace {
+
+constexpr int kFirstSteps = 2, kMoreSteps = 4;  // of Lloyd's iteration in a region that is divided
+constexpr int kTrialSteps = 8;     // of Lloyd's iteration, before a teleportation is judged
+constexpr std::size_t kMostEvaluations = 100;  // of distances for each triangle, in all teleportations
+constexpr int kMostRefusals = 10;    // teleportations in a row that do not lower the energy
+constexpr double kLeastShare = 0.1;  // of what a removal costs before iterating, that a division must gain
+constexpr double kWorthwhile = 1e-3;  // part of the energy that a teleportation must gain
+
+Index farthest_triangle(const Partition& partition, Index region) {
+  return *std::max_element(partition.triangles.begin(region), partition.triangles.end(region),
+                           [&](Index a, Index b) { return partition.distances[a] < partition.distances[b]; });
+}
+
+Index nearest_triangle(const SegmentDomain& domain, const std::vector<Index>& triangles, const Proxy& proxy) {
+  Index best = triangles[0];
+  double least = std::numeric_limits<double>::infinity();
+  for (const Index t : triangles) {
+    if (!(domain.areas[t] > 0)) continue;
+    const double d = distance_to(domain, t, proxy) / domain.areas[t];
+    if (d < least) {
+      least = d;
+      best = t;
+    }
+  }
+  return best;
+}
+
+Proxy plane_of(const SegmentDomain& domain, Index triangle) {
+  const Vec3& n = domain.normals[triangle];
+  return Proxy::of(Quadric::plane(n, dot(n, domain.barycentres[triangle])));
+}
+
+// In two across the longest direction.
+std::array<std::vector<Index>, 2> halves(const SegmentDomain& domain, const Index* begin, const Index* end) {
+  double area = 0;
+  Vec3 centroid;
+  for (const Index* t = begin; t != end; ++t) {
+    area += domain.areas[*t];
+    centroid += domain.areas[*t] * domain.barycentres[*t];
+  }
+  std::array<std::vector<Index>, 2> parts;
+  if (!(area > 0)) return parts;
+  centroid *= 1 / area;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const Index* t = begin; t != end; ++t) {
+    const Vec3 d = domain.barycentres[*t] - centroid;
+    const Eigen::Vector3d e(d.x, d.y, d.z);
+    covariance += domain.areas[*t] * e * e.transpose();
+  }
+  const Eigen::Vector3d axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors().col(2);
+  for (const Index* t = begin; t != end; ++t)
+    parts[dot(Vec3{axis(0), axis(1), axis(2)}, domain.barycentres[*t] - centroid) < 0 ? 0 : 1].push_back(*t);
+  return parts;
+}
+
+// What is nearest to a plane, by trimmed least squares, and what is farthest from it: takes a plane out of a region that a
+// curved proxy was bent around. Signed distances are averaged over neighbours, so that noise does not decide.
+std::array<std::vector<Index>, 2> flat_and_rest(const SegmentDomain& domain, const Index* begin, const Index* end) {
+  constexpr double kFlatShare = 0.6, kRestShare = 0.1;  // of the triangles
+  constexpr int kSteps = 4, kAverages = 4;
+  const auto n = static_cast<std::size_t>(end - begin);
+  std::array<std::vector<Index>, 2> parts;
+  const auto flat = static_cast<std::size_t>(kFlatShare * static_cast<double>(n));
+  const auto rest = static_cast<std::size_t>(kRestShare * static_cast<double>(n));
+  if (flat < 3 || rest < 3) return parts;
+  std::vector<Index> order(begin, end);
+  std::vector<double> off(n), averaged(n);
+  for (int k = 0; k < kSteps; ++k) {
+    const auto count = static_cast<std::ptrdiff_t>(k == 0 ? n : flat);
+    const PlaneFit plane = fit_plane(sum_of_moments(domain, order.data(), order.data() + count));
+    for (std::size_t i = 0; i < n; ++i) off[i] = dot(plane.normal, domain.barycentres[begin[i]]) - plane.offset;
+    for (int round = 0; round < kAverages; ++round) {
+      for (std::size_t i = 0; i < n; ++i) {
+        double sum = off[i], weight = 1;
+        for (const Index* t = domain.graph.neighbours.begin(begin[i]); t != domain.graph.neighbours.end(begin[i]); ++t) {
+          const Index* at = std::lower_bound(begin, end, *t);
+          if (at == end || *at != *t) continue;
+          sum += off[static_cast<std::size_t>(at - begin)];
+          ++weight;
+        }
+        averaged[i] = sum / weight;
+      }
+      off.swap(averaged);
+    }
+    std::vector<std::size_t> by_distance(n);
+    std::iota(by_distance.begin(), by_distance.end(), std::size_t{0});
+    std::stable_sort(by_distance.begin(), by_distance.end(),
+                     [&](std::size_t a, std::size_t b) { return std::abs(off[a]) < std::abs(off[b]); });
+    for (std::size_t i = 0; i < n; ++i) order[i] = begin[by_distance[i]];
+  }
+  parts[0].assign(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(flat));
+  parts[1].assign(order.end() - static_cast<std::ptrdiff_t>(rest), order.end());
+  return parts;
+}
+
+// Pairs of regions that share an edge, the lower first.
+std::set<std::pair<Index, Index>> neighbouring(const SegmentDomain& domain, const std::vector<Index>& labels) {
+  std::set<std::pair<Index, Index>> pairs;
+  const auto& neighbours = domain.graph.neighbours;
+  for (Index t = 0; t < labels.size(); ++t)
+    for (const Index* n = neighbours.begin(t); n != neighbours.end(t); ++n)
+      if (labels[t] < labels[*n]) pairs.emplace(labels[t], labels[*n]);
+  return pairs;
+}
+
+}  // namespace
+
+void PartitionEditor::divide(const Partition& partition, Index region, int steps, Division& division) {
+  const SegmentDomain& domain = lloyd_.domain();
+  constexpr Index kBlocked = 2;
+  const Index *begin = partition.triangles.begin(region), *end = partition.triangles.end(region);
+  std::vector<Index> labels;
+  std::vector<double> distances(domain.triangles.size());
+  std::array<Proxy, 2> proxies = division.proxies;
+  std::array<Index, 2> seeds = division.seeds;
+  for (int k = 0; k < steps && seeds[0] != seeds[1]; ++k) {
+    labels.assign(domain.triangles.size(), kBlocked);
+    for (const Index* t = begin; t != end; ++t) labels[*t] = kNone;
+    flood(domain, {proxies[0], proxies[1]}, {{seeds[0], 0}, {seeds[1], 1}}, labels, distances, lloyd_.counts.evaluations);
+    std::array<std::vector<Index>, 2> parts;
+    for (const Index* t = begin; t != end; ++t) parts[labels[*t]].push_back(*t);
+    double energy = 0;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Index *first = parts[i].data(), *last = first + parts[i].size();
+      const RegionProxy fit = lloyd_.refit(first, last, sum_of_moments(domain, first, last), nullptr, distances, k % 2 == 1);
+      energy += fit.energy;
+      proxies[i] = fit.proxy;
+      seeds[i] = nearest_triangle(domain, parts[i], fit.proxy);
+    }
+    const double gain = partition.regions[region].energy - energy;
+    if (!(gain > division.gain)) break;
+    division = {gain, std::move(parts[1]), proxies, seeds};
+  }
+}
+
+const PartitionEditor::Division& PartitionEditor::division(const Partition& partition, Index region) {
+  const auto [at, fresh] = divisions_.try_emplace(partition.regions[region].version);
+  Division& best = at->second;
+  if (!fresh || partition.triangles.size(region) < 2) return best;
+  const SegmentDomain& domain = lloyd_.domain();
+  const Index *begin = partition.triangles.begin(region), *end = partition.triangles.end(region);
+  // A few steps from each start, and more from where the best has come to.
+  const auto start = [&](const std::array<Proxy, 2>& proxies, const std::array<Index, 2>& seeds) {
+    Division division{0, {}, proxies, seeds};
+    divide(partition, region, kFirstSteps, division);
+    if (division.gain > best.gain) best = std::move(division);
+  };
+  const Index worst = farthest_triangle(partition, region);
+  start({partition.regions[region].proxy, plane_of(domain, worst)}, {lloyd_.seed(partition, region), worst});
+  for (const auto& parts : {halves(domain, begin, end), flat_and_rest(domain, begin, end)}) {
+    if (parts[0].empty() || parts[1].empty()) continue;
+    std::array<Proxy, 2> proxies;
+    std::array<Index, 2> seeds;
+    std::vector<double> distances(domain.triangles.size());
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Index *first = parts[i].data(), *last = first + parts[i].size();
+      proxies[i] = lloyd_.refit(first, last, sum_of_moments(domain, first, last), nullptr, distances, false).proxy;
+      seeds[i] = nearest_triangle(domain, parts[i], proxies[i]);
+    }
+    start(proxies, seeds);
+  }
+  if (best.gain > 0) divide(partition, region, kMoreSteps, best);
+  return best;
+}
+
+Partition PartitionEditor::divided(const Partition& partition, Index region) {
+  std::vector<Index> labels = partition.labels;
+  const auto count = static_cast<Index>(partition.regions.size());
+  for (const Index t : division(partition, region).part) labels[t] = count;
+  return lloyd_.fit(std::move(labels), count + 1, &partition);
+}
+
+double PartitionEditor::merging_cost(const Partition& partition, Index a, Index b) {
+  const RegionProxy &x = partition.regions[a], &y = partition.regions[b];
+  const auto [at, fresh] = merging_.try_emplace(std::minmax(x.version, y.version));
+  if (!fresh) return at->second;
+  std::vector<Index> both(partition.triangles.begin(a), partition.triangles.end(a));
+  both.insert(both.end(), partition.triangles.begin(b), partition.triangles.end(b));
+  std::sort(both.begin(), both.end());
+  std::vector<double> distances(partition.labels.size());
+  const SurfaceMoments moments = merged(x.moments, y.moments);
+  const RegionProxy fit = lloyd_.refit(both.data(), both.data() + both.size(), moments, nullptr, distances);
+  at->second = fit.energy - x.energy - y.energy;
+  return at->second;
+}
+
+double PartitionEditor::deletion_cost(const Partition& partition, Index region) {
+  const SegmentDomain& domain = lloyd_.domain();
+  const auto& neighbours = domain.graph.neighbours;
+  std::set<Index> around;
+  for (const Index* t = partition.triangles.begin(region); t != partition.triangles.end(region); ++t)
+    for (const Index* n = neighbours.begin(*t); n != neighbours.end(*t); ++n)
+      if (partition.labels[*n] != region) around.insert(partition.labels[*n]);
+  if (around.empty()) return std::numeric_limits<double>::infinity();
+  double sum = -partition.regions[region].energy;
+  for (const Index* t = partition.triangles.begin(region); t != partition.triangles.end(region); ++t) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Index r : around) least = std::min(least, distance_to(domain, *t, partition.regions[r].proxy));
+    lloyd_.counts.evaluations += around.size();
+    sum += least;
+  }
+  return sum;
+}
+
+std::vector<PartitionEditor::Removal> PartitionEditor::removals(const Partition& partition) {
+  std::vector<Removal> all;
+  for (const auto& [a, b] : neighbouring(lloyd_.domain(), partition.labels)) {
+    // The smaller one is what goes.
+    const bool first = partition.triangles.size(a) < partition.triangles.size(b);
+    all.push_back({merging_cost(partition, a, b), first ? a : b, first ? b : a});
+  }
+  for (Index r = 0; r < partition.regions.size(); ++r)
+    if (const double cost = deletion_cost(partition, r); cost < std::numeric_limits<double>::infinity())
+      all.push_back({cost, r, kNone});
+  std::sort(all.begin(), all.end(), [](const Removal& x, const Removal& y) {
+    return std::tuple(x.cost, x.region, x.into) < std::tuple(y.cost, y.region, y.into);
+  });
+  return all;
+}
+
+Partition PartitionEditor::without(const Partition& partition, const Removal& removal) {
+  const auto last = static_cast<Index>(partition.regions.size() - 1);
+  std::vector<Index> labels = partition.labels;
+  if (removal.into != kNone) {
+    for (Index& l : labels)
+      if (l == removal.region) l = removal.into;
+  } else {
+    // Flooded by its neighbours from their seeds.
+    std::set<Index> around;
+    for (const auto& [a, b] : neighbouring(lloyd_.domain(), partition.labels))
+      if (a == removal.region || b == removal.region) around.insert(a == removal.region ? b : a);
+    std::vector<FloodSeed> seeds;
+    for (const Index r : around) seeds.push_back({lloyd_.seed(partition, r), r});
+    for (Index& l : labels)
+      if (l == removal.region || around.count(l)) l = kNone;
+    std::vector<double> distances(labels.size());
+    flood(lloyd_.domain(), lloyd_.proxies(partition), seeds, labels, distances, lloyd_.counts.evaluations);
+  }
+  for (Index& l : labels)
+    if (l == last) l = removal.region;
+  return lloyd_.fit(std::move(labels), last, &partition);
+}
+
+bool PartitionEditor::insert_farthest(Partition& partition) {
+  const SegmentDomain& domain = lloyd_.domain();
+  Index region = kNone;
+  for (Index r = 0; r < partition.regions.size(); ++r) {
+    if (partition.triangles.size(r) < 2 || !(partition.regions[r].energy > 0)) continue;
+    const auto rank = [&](Index q) { return std::pair(partition.regions[q].invalid, partition.regions[q].energy); };
+    if (region == kNone || rank(r) > rank(region)) region = r;
+  }
+  if (region == kNone) return false;
+  const Index worst = farthest_triangle(partition, region);
+  const auto count = static_cast<Index>(partition.regions.size());
+  std::vector<FloodSeed> seeds;
+  for (Index r = 0; r < count; ++r) seeds.push_back({lloyd_.seed(partition, r), r});
+  if (seeds[region].triangle == worst) return false;
+  seeds.push_back({worst, count});
+  std::vector<Proxy> proxies = lloyd_.proxies(partition);
+  proxies.push_back(plane_of(domain, worst));
+  std::vector<Index> labels(partition.labels.size(), kNone);
+  std::vector<double> distances(labels.size());
+  flood(domain, proxies, seeds, labels, distances, lloyd_.counts.evaluations);
+  partition = lloyd_.fit(std::move(labels), proxies.size());
+  lloyd_.iterate(partition, iterations_);
+  ++insertions;
+  return true;
+}
+
+bool PartitionEditor::merge_redundant(Partition& partition) {
+  double largest = 0;
+  for (const RegionProxy& region : partition.regions) largest = std::max(largest, region.energy);
+  for (const Removal& removal : removals(partition)) {
+    if (removal.into == kNone) continue;
+    if (!(removal.cost < 0.5 * largest)) return false;
+    partition = without(partition, removal);
+    lloyd_.iterate(partition, iterations_);
+    ++merges;
+    return true;
+  }
+  return false;
+}
+
+bool PartitionEditor::divide_best(Partition& partition) {
+  Index best = kNone;
+  double most = 0;
+  for (Index r = 0; r < partition.regions.size(); ++r)
+    if (const double gain = division(partition, r).gain; gain > most) {
+      most = gain;
+      best = r;
+    }
+  if (best == kNone) return false;
+  partition = divided(partition, best);
+  lloyd_.iterate(partition, iterations_);
+  ++insertions;
+  return true;
+}
+
+bool PartitionEditor::remove_cheapest(Partition& partition, double most_energy) {
+  const std::vector<Removal> all = removals(partition);
+  if (all.empty() || partition.energy() + all[0].cost > most_energy) return false;
+  Partition next = without(partition, all[0]);
+  lloyd_.try_out(next, std::min(kTrialSteps, iterations_), most_energy);
+  if (next.energy() > most_energy) return false;
+  partition = std::move(next);
+  ++(all[0].into == kNone ? deletions : merges);
+  return true;
+}
+
+void PartitionEditor::teleport(Partition& partition) {
+  std::set<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> refused;
+  const auto most = 4 * partition.regions.size();
+  const std::size_t budget = lloyd_.counts.evaluations + kMostEvaluations * partition.labels.size();
+  int refusals = 0;
+  for (std::size_t k = 0; k < most && refusals < kMostRefusals && lloyd_.counts.evaluations < budget; ++k) {
+    lloyd_.context().check();
+    // The removal and the division that gain most together, unless they were tried.
+    const std::vector<Removal> all = removals(partition);
+    const auto version = [&](Index r) { return r == kNone ? 0 : partition.regions[r].version; };
+    double best = -std::numeric_limits<double>::infinity();
+    const Removal* removal = nullptr;
+    Index region = kNone;
+    for (const Removal& r : all)
+      for (Index d = 0; d < partition.regions.size(); ++d) {
+        if (d == r.region || d == r.into) continue;
+        const double divided = division(partition, d).gain, gain = divided - r.cost;
+        if (!(divided > 0) || divided < kLeastShare * r.cost || divided < kWorthwhile * partition.energy()) continue;
+        if (gain > best && !refused.count({version(r.region), version(r.into), version(d)})) {
+          best = gain;
+          removal = &r;
+          region = d;
+        }
+      }
+    if (!removal) break;
+    refused.insert({version(removal->region), version(removal->into), version(region)});
+    Partition next = divided(partition, region);
+    next = without(next, *removal);
+    const double goal = (1 - kWorthwhile) * partition.energy();
+    lloyd_.try_out(next, std::min(kTrialSteps, iterations_), goal);
+    if (next.energy() < goal) {
+      partition = std::move(next);
+      ++teleportations;
+      refusals = 0;
+    } else {
+      ++refusals;
+    }
+  }
+}
+
+}  // namespace bisector

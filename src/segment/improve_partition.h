@@ -1,0 +1,61 @@
+// More, fewer and better placed regions: insertion, merging, deletion and teleportation (thesis 2.3.2; Cohen-Steiner, Alliez
+// and Desbrun 2004).
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "core/geometry.h"
+#include "segment/lloyd.h"
+
+namespace bisector {
+
+class PartitionEditor {
+ public:
+  explicit PartitionEditor(Lloyd& lloyd, int iterations) : lloyd_(lloyd), iterations_(iterations) {}
+
+  // Adds a region about the triangle that is farthest from its proxy, in an invalid region or else the one of most energy
+  // (thesis, "Proxy insertion"), and iterates. False: every region is a single triangle or exact.
+  bool insert_farthest(Partition& partition);
+  // Merges the pair of neighbours that costs least if that is below half the largest energy of a region and the union has a
+  // valid proxy (thesis, "Proxy merging"), and iterates.
+  bool merge_redundant(Partition& partition);
+  // Divides the region that gains most by it, and iterates. False: none gains.
+  bool divide_best(Partition& partition);
+  // Removes the region that costs least while the energy stays at most so large, and iterates a little. False: none can go.
+  bool remove_cheapest(Partition& partition, double most_energy);
+  // Moves regions from where they are hardly missed to where they gain most, as long as the energy falls.
+  void teleport(Partition& partition);
+
+  std::size_t insertions = 0, merges = 0, deletions = 0, teleportations = 0;
+
+ private:
+  struct Division {
+    double gain = 0;
+    std::vector<Index> part;  // the triangles of the new region
+    std::array<Proxy, 2> proxies;
+    std::array<Index, 2> seeds{};
+  };
+  struct Removal {
+    double cost = 0;
+    Index region = kNone, into = kNone;  // kNone: shared out among the neighbours
+  };
+
+  const Division& division(const Partition& partition, Index region);
+  // Lloyd's iteration in one region from the division's proxies and seeds, as long as it gains.
+  void divide(const Partition& partition, Index region, int steps, Division& division);
+  double merging_cost(const Partition& partition, Index a, Index b);
+  double deletion_cost(const Partition& partition, Index region);
+  std::vector<Removal> removals(const Partition& partition);  // the cheapest first
+  Partition without(const Partition& partition, const Removal& removal);
+  Partition divided(const Partition& partition, Index region);
+
+  Lloyd& lloyd_;
+  int iterations_;
+  std::map<std::uint64_t, Division> divisions_;                          // by version
+  std::map<std::pair<std::uint64_t, std::uint64_t>, double> merging_;    // by versions, the lower first
+};
+
+}  // namespace bisector

@@ -1,0 +1,77 @@
+// Lloyd's iteration for regions and their proxies (thesis 2.3.2).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "bisector/context.h"
+#include "core/geometry.h"
+#include "segment/proxy.h"
+#include "segment/segment_domain.h"
+
+namespace bisector {
+
+struct RegionProxy {
+  Proxy proxy;
+  double energy = 0;          // sum of distance_to over the region
+  bool invalid = false;       // the best quadric is none (is_invalid)
+  SurfaceMoments moments;     // of the region
+  std::uint64_t version = 0;  // unlike that of any other pair of a set of triangles and a proxy
+};
+
+struct Partition {
+  std::vector<Index> labels;
+  std::vector<double> distances;  // distance_to of each triangle and its region's proxy
+  std::vector<RegionProxy> regions;
+  std::vector<char> changed;      // of each region: its triangles or its proxy, since floods took account of it
+  Csr<Index> triangles;           // of each region
+
+  double energy() const;
+};
+
+// What a run counts.
+struct SegmentCounts {
+  int iterations = 0;
+  std::size_t evaluations = 0;
+  std::uint64_t versions = 0;
+  std::vector<std::vector<double>> energies;  // of each Lloyd iteration, after each step
+};
+
+class Lloyd {
+ public:
+  Lloyd(const SegmentDomain& domain, SegmentSurfaces surfaces, const Context& context)
+      : domain_(domain), surfaces_(surfaces), context_(context) {}
+
+  // Regions and proxies for labels 0 .. count - 1. Regions of the same triangles as one of `known` take its proxy.
+  Partition fit(std::vector<Index> labels, std::size_t count, const Partition* known = nullptr);
+  // The best proxy for some triangles, of which these are the moments; `old`, where there is one, if none has less energy.
+  // `distances`, of all triangles, are read for `old` and written. `tori`: whether to try those, which are dear.
+  RegionProxy refit(const Index* begin, const Index* end, const SurfaceMoments& moments, const RegionProxy* old,
+                    std::vector<double>& distances, bool tori = true);
+  // Flooding and fitting, at most so many times, as long as the energy falls. It falls at each step: a flooding that would
+  // raise it is replaced by moves of single triangles at borders, and a proxy is exchanged only for a better one. Regions
+  // that neither changed nor border on such are left out.
+  void iterate(Partition& partition, int iterations);
+  // The same with one flooding only, and moves at borders after that; gives up where steps as large as the last would not
+  // bring the energy below `goal`.
+  void try_out(Partition& partition, int iterations, double goal);
+  // The triangle of a region nearest its proxy.
+  Index seed(const Partition& partition, Index region) const;
+  std::vector<Proxy> proxies(const Partition& partition) const;
+
+  const SegmentDomain& domain() const { return domain_; }
+  const Context& context() const { return context_; }
+  SegmentSurfaces surfaces() const { return surfaces_; }
+  SegmentCounts counts;
+
+ private:
+  bool step(Partition& partition, bool flooding);
+
+  const SegmentDomain& domain_;
+  SegmentSurfaces surfaces_;
+  const Context& context_;
+};
+
+}  // namespace bisector

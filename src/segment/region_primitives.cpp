@@ -1,0 +1,335 @@
+#include "segment/region_primitives.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "core/parallel.h"
+#include "segment/flood.h"
+#include "segment/primitive_fit.h"
+#include "segment/quadric_fit.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kEnoughInside = 24;  // vertices
+constexpr std::uint8_t kDeep = 4;          // edges away from borders
+constexpr std::size_t kTrialSamples = 400;  // vertices that types are tried on
+constexpr double kExact = 2e-6;            // distances in the unit-sized model that do not tell types apart
+// From the simplest to the most general.
+constexpr std::array kSpecialTypes{SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder, SurfaceType::cone,
+                                   SurfaceType::torus};
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kMuchWorse = 1.5;         // between energies of Eq. 2.3
+constexpr double kHardlyWorse = 1.07;
+constexpr double kOneSided = 0.98;         // least Candidate::side
+
+// How many edges each vertex is away from the borders between regions: 0 on them, at most kDeep.
+std::vector<std::uint8_t> vertex_depths(const SegmentDomain& domain, const std::vector<Index>& labels) {
+  std::vector<Index> region(domain.vertices.size(), kNone);
+  std::vector<std::uint8_t> depth(domain.vertices.size(), kDeep);
+  for (std::size_t t = 0; t < labels.size(); ++t)
+    for (const Index v : domain.triangles[t]) {
+      if (region[v] != kNone && region[v] != labels[t]) depth[v] = 0;
+      region[v] = labels[t];
+    }
+  for (std::uint8_t level = 0; level + 1 < kDeep; ++level)
+    for (const Triangle& t : domain.triangles)
+      if (std::any_of(t.begin(), t.end(), [&](Index v) { return depth[v] == level; }))
+        for (const Index v : t) depth[v] = std::min<std::uint8_t>(depth[v], static_cast<std::uint8_t>(level + 1));
+  return depth;
+}
+
+struct VertexSum {
+  Index vertex;
+  double weight;
+  Vec3 normal;
+};
+
+struct VertexSamples {
+  SurfaceSamples samples;
+  std::size_t corners = 0;  // vertices of the region, whatever their depth
+};
+
+// The vertices that are deepest inside, where those are enough to tell the surface: near borders that no crease marks, and on
+// borders, are vertices of other surfaces.
+VertexSamples vertex_samples(const SegmentDomain& domain, const Index* begin, const Index* end,
+                             const std::vector<std::uint8_t>& depths) {
+  std::vector<VertexSum> sums;
+  sums.reserve(3 * static_cast<std::size_t>(end - begin));
+  for (const Index* t = begin; t != end; ++t)
+    for (const Index v : domain.triangles[*t]) sums.push_back({v, domain.areas[*t] / 3, domain.areas[*t] * domain.normals[*t]});
+  std::stable_sort(sums.begin(), sums.end(), [](const VertexSum& a, const VertexSum& b) { return a.vertex < b.vertex; });
+  std::size_t n = 0;
+  for (std::size_t k = 0; k < sums.size(); ++k) {
+    if (n > 0 && sums[n - 1].vertex == sums[k].vertex) {
+      sums[n - 1].weight += sums[k].weight;
+      sums[n - 1].normal += sums[k].normal;
+    } else {
+      sums[n++] = sums[k];
+    }
+  }
+  sums.resize(n);
+  VertexSamples result;
+  result.corners = n;
+  int least = 0;
+  for (int depth = kDeep; depth > 0 && least == 0; --depth) {
+    const auto inside = [&](const VertexSum& s) { return depths[s.vertex] >= depth; };
+    const auto count = static_cast<std::size_t>(std::count_if(sums.begin(), sums.end(), inside));
+    if (count >= (depth == 1 ? kEnoughInside : std::max(2 * kEnoughInside, 2 * n / 5))) least = depth;
+  }
+  for (const VertexSum& s : sums) {
+    const double length = norm(s.normal);
+    if (!(length > 0) || depths[s.vertex] < least) continue;
+    result.samples.points.push_back(domain.vertices[s.vertex]);
+    result.samples.normals.push_back((1 / length) * s.normal);
+    result.samples.weights.push_back(s.weight);
+  }
+  return result;
+}
+
+struct Candidate {
+  Primitive primitive;
+  double energy = 0;    // Eq. 2.3
+  double vertices = 0;  // weighted squared exact distances of some of the vertices
+  double tilt = 0;      // squared sines between its normals and the triangles', times the areas
+  double side = 1;      // mean cosine between them over the mean absolute cosine: 1 if all are on one side
+};
+
+SurfaceSamples thinned(const SurfaceSamples& samples, std::size_t limit) {
+  const std::size_t n = samples.points.size();
+  if (n <= limit) return samples;
+  SurfaceSamples few;
+  for (std::size_t k = 0; k < limit; ++k) {
+    const std::size_t i = k * n / limit;
+    few.points.push_back(samples.points[i]);
+    few.normals.push_back(samples.normals[i]);
+    few.weights.push_back(samples.weights[i]);
+  }
+  return few;
+}
+
+constexpr int kQuadricParameters = 9;
+
+int free_parameters(SurfaceType type) {
+  switch (type) {
+    case SurfaceType::plane: return 3;
+    case SurfaceType::sphere: return 4;
+    case SurfaceType::cylinder: return 5;
+    case SurfaceType::cone: return 6;
+    case SurfaceType::torus: return 7;
+    default: return kQuadricParameters;
+  }
+}
+
+// What the sum of squared distances of n points may be larger by, as a factor, for so many parameters fewer: the Bayesian
+// information criterion (Schwarz 1978) with twice its penalty, since each type is the best of several fits.
+double simplicity_allowance(std::size_t n, int fewer) {
+  const double points = std::max<double>(10, static_cast<double>(n));
+  return std::exp(2 * fewer * std::log(points) / points);
+}
+
+class RegionSurface {
+ public:
+  RegionSurface(const SegmentDomain& domain, const Index* begin, const Index* end, const std::vector<std::uint8_t>& depths)
+      : domain_(domain), begin_(begin), end_(end) {
+    VertexSamples inside = vertex_samples(domain, begin, end, depths);
+    corners_ = inside.corners;
+    vertices_ = std::move(inside.samples);
+    all_ = vertices_;
+    for (const Index* t = begin; t != end; ++t) {
+      if (!(domain.areas[*t] > 0)) continue;
+      area_ += domain.areas[*t];
+      all_.points.push_back(domain.barycentres[*t]);
+      all_.normals.push_back(domain.normals[*t]);
+      all_.weights.push_back(domain.areas[*t]);
+    }
+    few_vertices_ = thinned(vertices_, kTrialSamples);
+    few_ = thinned(all_, 2 * kTrialSamples);
+  }
+
+  std::size_t vertices() const { return vertices_.points.size(); }
+  double area() const { return area_; }
+  std::size_t corners() const { return corners_; }  // vertices, those on the border too
+  // Of those vertices.
+  double weight() const { return std::accumulate(few_vertices_.weights.begin(), few_vertices_.weights.end(), 0.0); }
+  // Whether the triangles are all on one of its sides: it is no pair of sheets with the data between.
+  static bool is_sound(const Candidate& c) { return c.side >= kOneSided; }
+
+  Candidate measured(const Primitive& primitive) const {
+    Candidate c{primitive, 0, 0, 0, 1};
+    double signed_sum = 0, sum = 0;
+    const Proxy proxy = Proxy::of(primitive);
+    for (const Index* t = begin_; t != end_; ++t) {
+      c.energy += distance_to(domain_, *t, proxy);
+      const Vec3 gradient = proxy.gradient(domain_.barycentres[*t]);
+      const double length = norm(gradient);
+      const Vec3 normal = length > 0 ? (1 / length) * gradient : Vec3{};
+      c.tilt += domain_.areas[*t] * norm2(cross(normal, domain_.normals[*t]));
+      const double cosine = domain_.areas[*t] * dot(normal, domain_.normals[*t]);
+      signed_sum += cosine;
+      sum += std::abs(cosine);
+    }
+    if (sum > 0) c.side = std::abs(signed_sum) / sum;
+    for (std::size_t k = 0; k < few_vertices_.points.size(); ++k) {
+      const Vec3& p = few_vertices_.points[k];
+      c.vertices += few_vertices_.weights[k] * norm2(foot_point(primitive, p) - p);
+    }
+    // Approximate distances are far too small beyond the rim of a quadric that is flat like a lens.
+    if (weight() > 0) c.energy = std::max(c.energy, c.vertices * area_ / weight());
+    return c;
+  }
+  // Vertices lie on the surface that was tessellated and barycentres below it, but a few circles of vertices alone are
+  // those of many surfaces.
+  template <class Fit>
+  std::optional<Candidate> best(const Fit& fit) const {
+    const auto first = fit(few_vertices_);
+    std::optional<Candidate> by_vertices, by_all;
+    if (first) by_vertices = measured(first->primitive);
+    if (const auto second = fit(few_)) by_all = measured(second->primitive);
+    if (!by_vertices || (by_all && kMuchWorse * by_all->energy < by_vertices->energy)) return by_all;
+    return by_vertices;
+  }
+
+  // Fitted to all vertices, if that is no worse.
+  Primitive refined(const Candidate& candidate) const {
+    const bool special = free_parameters(candidate.primitive.type) < kQuadricParameters;
+    const auto fit = special ? refine_primitive(candidate.primitive, vertices_)
+                             : std::optional(refine_quadric(candidate.primitive, vertices_));
+    if (!fit || fit->primitive.type == SurfaceType::plane_pair) return candidate.primitive;
+    const Candidate better = measured(fit->primitive);
+    const bool exact = better.vertices <= weight() * kExact * kExact && better.tilt <= kMuchWorse * candidate.tilt;
+    const bool kept = is_sound(better) && (exact || better.energy <= kHardlyWorse * candidate.energy);
+    return kept ? better.primitive : candidate.primitive;
+  }
+
+ private:
+  const SegmentDomain& domain_;
+  const Index *begin_, *end_;
+  double area_ = 0;
+  std::size_t corners_ = 0;
+  SurfaceSamples vertices_, all_, few_vertices_, few_;
+};
+
+Primitive primitive_of(const SegmentDomain& domain, const Index* begin, const Index* end,
+                       const std::vector<std::uint8_t>& depths, const Proxy& proxy, SegmentSurfaces surfaces) {
+  const SurfaceMoments moments = sum_of_moments(domain, begin, end);
+  const PlaneFit flat = fit_plane(moments);
+  const RegionSurface region(domain, begin, end, depths);
+  if (region.vertices() < 3 || surfaces == SegmentSurfaces::planes) return make_plane(flat.normal, flat.offset);
+
+  std::vector<Candidate> candidates{region.measured(make_plane(flat.normal, flat.offset))};
+  for (const SurfaceType type : kSpecialTypes) {
+    if (type == SurfaceType::torus && surfaces != SegmentSurfaces::all) continue;
+    const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
+    if (candidate) candidates.push_back(*candidate);
+  }
+  if (proxy.torus)
+    candidates.push_back(region.measured(make_torus(proxy.centre, proxy.axis, proxy.radius, proxy.minor_radius)));
+  // The proxy, or the quadric nearest to what it covers.
+  const Quadric quadric = proxy.torus ? fit_proxy(moments, surfaces).proxy.quadric : proxy.quadric;
+  const Primitive start = classify(quadric, moments.centroid(), std::sqrt(moments.area()), kExact);
+  candidates.push_back(region.measured(start));
+  const auto refined = region.best([&](const SurfaceSamples& samples) { return std::optional(refine_quadric(start, samples)); });
+  if (refined) candidates.push_back(*refined);
+
+  // What passes through all vertices and is no more tilted than others may be as far off between them as tessellation makes it.
+  const double exact = kExact * kExact, weight = region.weight();
+  const auto through_vertices = [&](const Candidate& c) { return c.vertices <= weight * exact; };
+  // The plane is left by the first of these, and something by the second.
+  std::erase_if(candidates, [&](const Candidate& c) {
+    const bool general = free_parameters(c.primitive.type) == kQuadricParameters;
+    return c.primitive.type == SurfaceType::plane_pair || (general && is_invalid(c.primitive.quadric, moments));
+  });
+  if (std::any_of(candidates.begin(), candidates.end(), RegionSurface::is_sound))
+    std::erase_if(candidates, [](const Candidate& c) { return !RegionSurface::is_sound(c); });
+  Candidate least{{}, kInfinity, kInfinity, kInfinity, 1};
+  for (const Candidate& c : candidates) {
+    least.energy = std::min(least.energy, c.energy);
+    if (through_vertices(c)) least.tilt = std::min(least.tilt, c.tilt);
+  }
+  std::erase_if(candidates, [&](const Candidate& c) {
+    return c.energy > kMuchWorse * least.energy + region.area() * exact &&
+           !(through_vertices(c) && c.tilt <= kMuchWorse * least.tilt + region.area() * exact);
+  });
+  const auto exact_one = std::find_if(candidates.begin(), candidates.end(), through_vertices);
+  if (exact_one != candidates.end()) return region.refined(*exact_one);
+  // From the simplest on, a more general one has to pay for its parameters.
+  const Candidate* chosen = &candidates[0];
+  for (const Candidate& c : candidates) {
+    const int more = free_parameters(c.primitive.type) - free_parameters(chosen->primitive.type);
+    if (c.energy * simplicity_allowance(region.corners(), more) < chosen->energy) chosen = &c;
+  }
+  return region.refined(*chosen);
+}
+
+}  // namespace
+
+std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::size_t count,
+                                         const std::vector<Proxy>& proxies, SegmentSurfaces surfaces) {
+  const Csr<Index> triangles = region_triangles(labels, count);
+  const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
+  std::vector<Primitive> primitives(count);
+  parallel_each(count, [&](std::size_t r) {
+    primitives[r] = primitive_of(domain, triangles.begin(r), triangles.end(r), depths, proxies[r], surfaces);
+  }, 1);
+  return primitives;
+}
+
+void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, std::vector<Index>& labels,
+                         std::vector<Primitive>& primitives, std::size_t& evaluations) {
+  if (surfaces == SegmentSurfaces::planes) return;
+  std::vector<double> distances(labels.size());
+  std::vector<Proxy> proxies;
+  for (const Primitive& p : primitives) proxies.push_back(Proxy::of(p));
+  for (Index t = 0; t < labels.size(); ++t) distances[t] = distance_to(domain, t, proxies[labels[t]]);
+  evaluations += labels.size();
+  Csr<Index> triangles = region_triangles(labels, primitives.size());
+  std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
+  for (Index r = 0; r < primitives.size(); ++r) {
+    const Index *begin = triangles.begin(r), *end = triangles.end(r);
+    const RegionSurface region(domain, begin, end, depths);
+    double energy = 0;
+    for (const Index* t = begin; t != end; ++t) energy += distances[*t];
+    for (const SurfaceType type : kSpecialTypes) {
+      if (type == primitives[r].type) break;
+      if (type == SurfaceType::torus && surfaces != SegmentSurfaces::all) continue;
+      const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
+      if (!candidate || !RegionSurface::is_sound(*candidate)) continue;
+      std::vector<Proxy> tried = proxies;
+      tried[r] = Proxy::of(candidate->primitive);
+      std::vector<Index> moved = labels;
+      std::vector<double> changed = distances;
+      for (const Index* t = begin; t != end; ++t) changed[*t] = distance_to(domain, *t, tried[r]);
+      evaluations += static_cast<std::size_t>(end - begin);
+      relax_borders(domain, tried, {begin, end}, moved, changed, evaluations);
+      double rise = 0;
+      for (std::size_t t = 0; t < labels.size(); ++t) rise += changed[t] - distances[t];
+      const int fewer = free_parameters(primitives[r].type) - free_parameters(type);
+      const double allowance = std::max(kHardlyWorse, simplicity_allowance(region.corners(), fewer));
+      if (rise > (allowance - 1) * energy + region.area() * kExact * kExact) continue;
+      primitives[r] = candidate->primitive;
+      proxies = std::move(tried);
+      labels = std::move(moved);
+      distances = std::move(changed);
+      triangles = region_triangles(labels, primitives.size());
+      depths = vertex_depths(domain, labels);
+      break;
+    }
+  }
+}
+
+void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::vector<Primitive>& primitives) {
+  const Csr<Index> triangles = region_triangles(labels, primitives.size());
+  const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
+  parallel_each(primitives.size(), [&](std::size_t r) {
+    const RegionSurface region(domain, triangles.begin(r), triangles.end(r), depths);
+    primitives[r] = region.refined(region.measured(primitives[r]));
+  }, 1);
+}
+
+}  // namespace bisector

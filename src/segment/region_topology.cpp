@@ -1,0 +1,243 @@
+#include "segment/region_topology.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+namespace bisector {
+
+namespace {
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t n) : parent_(n), count_(n) {
+    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
+  }
+
+  std::size_t count() const { return count_; }
+  std::size_t root(std::size_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  // The new root; the other one is left.
+  std::size_t join(std::size_t i, std::size_t j) {
+    i = root(i);
+    j = root(j);
+    if (i != j) --count_;
+    parent_[std::max(i, j)] = std::min(i, j);
+    return std::min(i, j);
+  }
+
+ private:
+  std::vector<std::size_t> parent_;
+  std::size_t count_;
+};
+
+template <class T>
+void sort_once(std::vector<T>& list) {
+  std::sort(list.begin(), list.end());
+  list.erase(std::unique(list.begin(), list.end()), list.end());
+}
+
+void forget(std::map<Index, std::size_t>& contacts, Index region) {
+  const auto at = contacts.find(region);
+  if (--at->second == 0) contacts.erase(at);
+}
+
+}  // namespace
+
+RegionTopology::RegionTopology(const DualGraph& graph, const std::vector<Triangle>& triangles,
+                               std::vector<Index>& labels)
+    : graph_(graph), labels_(labels), triangles_(triangles), front_(triangles.size(), kNone) {
+  std::size_t regions = 0;
+  for (const Index label : labels) regions = std::max(regions, label + std::size_t{1});
+  sizes_.resize(regions, 0);
+  contacts_.resize(regions);
+  for (std::size_t t = 0; t < labels.size(); ++t) {
+    ++sizes_[labels[t]];
+    for (const Index* u = graph.neighbours.begin(t); u != graph.neighbours.end(t); ++u)
+      if (labels[*u] != labels[t]) ++contacts_[labels[t]][labels[*u]];
+  }
+
+  std::size_t vertices = 0;
+  for (const Triangle& triangle : triangles)
+    for (const Index v : triangle) vertices = std::max(vertices, v + std::size_t{1});
+  table_ = edge_table(triangles, vertices);
+  seen_.resize(table_.edges.size(), 0);
+  edge_of_.resize(3 * triangles.size());
+  for (std::size_t e = 0; e < table_.edges.size(); ++e)
+    for (const std::size_t* h = table_.half_edges.begin(e); h != table_.half_edges.end(e); ++h) edge_of_[*h] = e;
+
+  at_vertex_.offsets.assign(vertices + 1, 0);
+  for (const Triangle& triangle : triangles)
+    for (const Index v : triangle) ++at_vertex_.offsets[v + std::size_t{1}];
+  std::partial_sum(at_vertex_.offsets.begin(), at_vertex_.offsets.end(), at_vertex_.offsets.begin());
+  at_vertex_.values.resize(3 * triangles.size());
+  std::vector<std::size_t> slot(at_vertex_.offsets.begin(), at_vertex_.offsets.end() - 1);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (const Index v : triangles[t]) at_vertex_.values[slot[v]++] = static_cast<Index>(t);
+}
+
+void RegionTopology::relabel(Index triangle, Index label) {
+  const Index before = labels_[triangle];
+  --sizes_[before];
+  ++sizes_[label];
+  labels_[triangle] = label;
+  for (const Index* u = graph_.neighbours.begin(triangle); u != graph_.neighbours.end(triangle); ++u) {
+    const Index other = labels_[*u];
+    if (other != before) {
+      forget(contacts_[before], other);
+      forget(contacts_[other], before);
+    }
+    if (other != label) {
+      ++contacts_[label][other];
+      ++contacts_[other][label];
+    }
+  }
+}
+
+// Searches from all the region's triangles about the changes at once, until only one front is left that has met neither
+// the others nor its end: what is behind the others are the crumbs.
+std::vector<Index> RegionTopology::crumbs(Index region, const std::vector<Index>& changed) {
+  std::vector<Index> found;  // also the queue
+  const auto start = [&](Index t) {
+    if (labels_[t] != region || front_[t] != kNone) return;
+    front_[t] = static_cast<Index>(found.size());
+    found.push_back(t);
+  };
+  for (const Index t : changed) start(t);
+  const std::size_t joined = found.size();
+  for (const Index t : changed)
+    for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u) start(*u);
+  // Where no other triangle of the region is next to a change, the rest of it is whole and a front of its own.
+  const bool rest_apart = found.size() == joined && joined < sizes_[region];
+
+  DisjointSets fronts(found.size());
+  std::vector<std::size_t> queued(found.size(), 1), size(found.size(), 1);
+  std::size_t open = found.size() + rest_apart;
+  for (std::size_t next = 0; next < found.size() && open > 1; ++next) {
+    const Index t = found[next];
+    std::size_t front = fronts.root(front_[t]);
+    for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u) {
+      if (labels_[*u] != region) continue;
+      if (front_[*u] == kNone) {
+        front_[*u] = static_cast<Index>(front);
+        found.push_back(*u);
+        ++queued[front];
+        ++size[front];
+        continue;
+      }
+      const std::size_t other = fronts.root(front_[*u]);
+      if (other == front) continue;
+      const std::size_t both = fronts.join(front, other), gone = front + other - both;
+      queued[both] += queued[gone];
+      size[both] += size[gone];
+      front = both;
+      --open;
+    }
+    if (--queued[front] == 0) --open;
+  }
+
+  // Most of the region is behind the front that is still open, or is the largest part.
+  const auto rank = [&](std::size_t front) { return std::pair(queued[front] > 0, size[front]); };
+  std::size_t rest = found.size();
+  for (std::size_t f = 0; f < size.size() && !rest_apart; ++f)
+    if (fronts.root(f) == f && (rest == found.size() || rank(f) > rank(rest))) rest = f;
+  std::vector<Index> result;
+  for (const Index t : found)
+    if (fronts.root(front_[t]) != rest) result.push_back(t);
+  for (const Index t : found) front_[t] = kNone;
+  return result;
+}
+
+RegionTopology::Local RegionTopology::local(Index region, const std::vector<Index>& changed) {
+  std::vector<Index> vertices;
+  for (const Index t : changed) vertices.insert(vertices.end(), triangles_[t].begin(), triangles_[t].end());
+  sort_once(vertices);
+  return {euler(region, changed, vertices), loops(region, vertices)};
+}
+
+long long RegionTopology::euler(Index region, const std::vector<Index>& changed,
+                                const std::vector<Index>& vertices) const {
+  long long sum = 0;
+  std::vector<std::size_t> edges;
+  for (const Index t : changed) {
+    sum += labels_[t] == region;
+    for (std::size_t k = 0; k < 3; ++k) edges.push_back(edge_of_[3 * std::size_t{t} + k]);
+  }
+  sort_once(edges);
+  for (const std::size_t edge : edges) sum -= triangles_at(edge, region) > 0;
+  std::vector<Fan> fans;
+  for (const Index v : vertices) sum += static_cast<long long>(find_fans(v, region, fans));
+  return sum;
+}
+
+std::size_t RegionTopology::loops(Index region, const std::vector<Index>& vertices) {
+  std::vector<std::size_t> starts, followed;
+  std::vector<Fan> fans;
+  for (const Index v : vertices)
+    for (const Index* t = at_vertex_.begin(v); t != at_vertex_.end(v); ++t) add_border_edges(v, region, *t, starts);
+  std::size_t count = 0;
+  for (const std::size_t start : starts) {
+    if (seen_[start]) continue;
+    ++count;
+    std::vector<std::size_t> stack{start};
+    while (!stack.empty()) {
+      const std::size_t edge = stack.back();
+      stack.pop_back();
+      if (std::exchange(seen_[edge], 1)) continue;
+      followed.push_back(edge);
+      const std::size_t* h = table_.half_edges.begin(edge);
+      while (labels_[*h / 3] != region) ++h;
+      for (const Index v : table_.edges[edge]) {
+        find_fans(v, region, fans);
+        const auto mine = std::find_if(fans.begin(), fans.end(), [&](const Fan& f) { return f.triangle == *h / 3; });
+        for (const Fan& fan : fans)
+          if (fan.root == mine->root) add_border_edges(v, region, fan.triangle, stack);
+      }
+    }
+  }
+  for (const std::size_t edge : followed) seen_[edge] = 0;
+  return count;
+}
+
+// The region's triangles about a vertex, ascending, joined across the edges that end there; the number of fans.
+std::size_t RegionTopology::find_fans(Index vertex, Index region, std::vector<Fan>& fans) const {
+  fans.clear();
+  std::vector<std::pair<std::size_t, std::size_t>> spokes;  // edge, position in `fans`
+  for (const Index* t = at_vertex_.begin(vertex); t != at_vertex_.end(vertex); ++t) {
+    if (labels_[*t] != region || (!fans.empty() && fans.back().triangle == *t)) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t edge = edge_of_[3 * std::size_t{*t} + k];
+      if (table_.edges[edge][0] == vertex || table_.edges[edge][1] == vertex) spokes.push_back({edge, fans.size()});
+    }
+    fans.push_back({*t, fans.size()});
+  }
+  std::sort(spokes.begin(), spokes.end());
+  DisjointSets sets(fans.size());
+  for (std::size_t i = 1; i < spokes.size(); ++i)
+    if (spokes[i].first == spokes[i - 1].first) sets.join(spokes[i].second, spokes[i - 1].second);
+  for (Fan& fan : fans) fan.root = sets.root(fan.root);
+  return sets.count();
+}
+
+// The edges of a triangle of the region, if it is one, that end at a vertex and have no other triangle of the region.
+void RegionTopology::add_border_edges(Index vertex, Index region, Index triangle,
+                                      std::vector<std::size_t>& edges) const {
+  if (labels_[triangle] != region) return;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t edge = edge_of_[3 * std::size_t{triangle} + k];
+    const auto [a, b] = table_.edges[edge];
+    if ((a == vertex || b == vertex) && triangles_at(edge, region) == 1) edges.push_back(edge);
+  }
+}
+
+std::size_t RegionTopology::triangles_at(std::size_t edge, Index region) const {
+  const std::size_t *begin = table_.half_edges.begin(edge), *end = table_.half_edges.end(edge);
+  std::size_t count = 0;
+  for (const std::size_t* h = begin; h != end; ++h)
+    count += labels_[*h / 3] == region && (h == begin || *h / 3 != *(h - 1) / 3);
+  return count;
+}
+
+}  // namespace bisector

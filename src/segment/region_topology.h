@@ -1,0 +1,65 @@
+// The topology of regions of triangles while some of these change sides, at a cost that depends on how many do.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <vector>
+
+#include "core/geometry.h"
+#include "mesh/topology.h"
+#include "segment/dual_graph.h"
+
+namespace bisector {
+
+// A region counts as the surface glued from its triangles along their edges: where it touches itself in a vertex only,
+// it has two vertices there.
+class RegionTopology {
+ public:
+  // Refers to all three; from here on `labels` are changed through relabel() only.
+  RegionTopology(const DualGraph& graph, const std::vector<Triangle>& triangles, std::vector<Index>& labels);
+
+  std::size_t regions() const { return contacts_.size(); }
+  void relabel(Index triangle, Index label);
+
+  std::size_t triangle_count(Index region) const { return sizes_[region]; }
+  // The regions across an edge, with the number of pairs of triangles.
+  const std::map<Index, std::size_t>& contacts(Index region) const { return contacts_[region]; }
+
+  // The triangles of a region that was connected through edges, and no longer hang together with most of it since the
+  // given triangles joined or left it.
+  std::vector<Index> crumbs(Index region, const std::vector<Index>& changed);
+
+  // What the given triangles contribute to a region's topology: differences of these are differences of the whole.
+  struct Local {
+    long long euler = 0;    // Euler characteristic of what is incident to them
+    std::size_t loops = 0;  // border loops, those of the mesh included, that pass through their vertices
+    friend bool operator==(const Local&, const Local&) = default;
+  };
+  Local local(Index region, const std::vector<Index>& changed);
+
+ private:
+  // A triangle and the fan about a vertex that it is part of.
+  struct Fan {
+    Index triangle;
+    std::size_t root;
+  };
+
+  long long euler(Index region, const std::vector<Index>& changed, const std::vector<Index>& vertices) const;
+  std::size_t loops(Index region, const std::vector<Index>& vertices);
+  std::size_t find_fans(Index vertex, Index region, std::vector<Fan>& fans) const;
+  void add_border_edges(Index vertex, Index region, Index triangle, std::vector<std::size_t>& edges) const;
+  std::size_t triangles_at(std::size_t edge, Index region) const;
+
+  const DualGraph& graph_;
+  std::vector<Index>& labels_;
+  const std::vector<Triangle>& triangles_;
+  std::vector<std::size_t> sizes_;
+  std::vector<std::map<Index, std::size_t>> contacts_;
+  EdgeTable table_;
+  std::vector<std::size_t> edge_of_;  // of half-edge 3 t + k
+  Csr<Index> at_vertex_;              // triangles, ascending
+  std::vector<Index> front_;          // of a triangle: where the search for crumbs came from, or kNone
+  std::vector<char> seen_;            // of an edge, while loops are followed
+};
+
+}  // namespace bisector

@@ -1,0 +1,336 @@
+#include "segment/segment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "segment/flood.h"
+#include "segment/improve_partition.h"
+#include "segment/lloyd.h"
+#include "segment/merge_regions.h"
+#include "segment/region_primitives.h"
+#include "segment/segment_domain.h"
+#include "segment/smooth_borders.h"
+
+namespace bisector {
+namespace {
+
+constexpr double kFarFoot = 2;  // times the largest distance in a region
+
+class Clock {
+ public:
+  // Seconds since the last call.
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+void check_options(const SegmentOptions& options) {
+  if (options.proxies == 0 && !(options.error > 0 && std::isfinite(options.error)))
+    throw Error(fmt::format("an error of {} percent is asked for; it must be positive", options.error));
+  if (options.iterations < 0) throw Error(fmt::format("{} iterations are asked for; ask for 0 or more", options.iterations));
+  if (!(options.smooth >= 0) || !std::isfinite(options.smooth))
+    throw Error(fmt::format("the smoothing weight is {}; it must be 0 or positive", options.smooth));
+  if (options.fuzzy_rings < 1) throw Error(fmt::format("{} fuzzy rings are asked for; ask for 1 or more", options.fuzzy_rings));
+}
+
+void check_count(const SegmentDomain& domain, std::size_t proxies) {
+  if (proxies == 0) return;
+  if (proxies > domain.triangles.size())
+    throw Error(fmt::format("{} proxies are asked for, but the mesh has {} triangles only; ask for fewer", proxies,
+                            domain.triangles.size()));
+  if (proxies < domain.component_count)
+    throw Error(fmt::format("{} proxies are asked for, but the mesh has {} components, of which each needs one; ask for as many",
+                            proxies, domain.component_count));
+}
+
+// The root mean square distance that SegmentOptions::error allows, in the unit-sized model.
+double allowed_rms(const SegmentDomain& domain, double percent) {
+  return percent / 100 * bounding_box(domain.vertices).diagonal();
+}
+
+Partition fit_all(Lloyd& lloyd, std::vector<Index> labels) {
+  const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
+  return lloyd.fit(std::move(labels), count);
+}
+
+Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double allowed) {
+  const SegmentDomain& domain = lloyd.domain();
+  const std::size_t n = domain.triangles.size();
+  if (options.surfaces == SegmentSurfaces::planes && options.proxies > 0)
+    return fit_all(lloyd, merge_into_planes(domain, options.proxies, lloyd.context()));
+  // So many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to all pairs.
+  constexpr std::size_t kFewest = 200, kMost = 1000;
+  const std::size_t enough = std::max(10 * options.proxies, std::clamp(n / 40, kFewest, kMost));
+  const std::size_t pieces = std::min(n, std::max(enough, domain.component_count));
+  Lloyd planar(domain, SegmentSurfaces::planes, lloyd.context());
+  Partition small = fit_all(planar, merge_into_planes(domain, pieces, lloyd.context()));
+  constexpr int kPlanarSteps = 4;
+  planar.iterate(small, std::min(kPlanarSteps, options.iterations));
+  lloyd.counts.evaluations += planar.counts.evaluations;
+  lloyd.counts.iterations += planar.counts.iterations;
+  // Some more than wanted: which of them can be spared shows better after Lloyd's iteration.
+  const std::size_t count = options.proxies > 0 ? std::min(options.proxies + options.proxies / 5 + 1, pieces) : 0;
+  const RegionMerging merging{count, allowed, options.surfaces};
+  return fit_all(lloyd, merge_regions(domain, std::move(small.labels), merging, lloyd.context()));
+}
+
+// Around random triangles, at least one of each component, the others all over the mesh.
+Partition start_at_random(Lloyd& lloyd, std::size_t count, std::uint64_t random_seed) {
+  const SegmentDomain& domain = lloyd.domain();
+  const Csr<Index> parts = region_triangles(domain.components, domain.component_count);
+  std::vector<FloodSeed> seeds;
+  std::vector<Proxy> proxies;
+  std::vector<char> taken(domain.triangles.size(), 0);
+  Random random(random_seed);
+  const auto draw = [&](const Index* from, std::size_t n) {
+    const Index t = from[static_cast<std::size_t>(random.uniform() * static_cast<double>(n))];
+    if (std::exchange(taken[t], 1)) return;
+    seeds.push_back({t, static_cast<Index>(seeds.size())});
+    proxies.push_back(Proxy::of(Quadric::plane(domain.normals[t], dot(domain.normals[t], domain.barycentres[t]))));
+  };
+  for (std::size_t c = 0; c < domain.component_count; ++c) draw(parts.begin(c), parts.size(c));
+  while (seeds.size() < count) draw(parts.values.data(), parts.values.size());
+  std::vector<Index> labels(domain.triangles.size(), kNone);
+  std::vector<double> distances(labels.size());
+  flood(domain, proxies, seeds, labels, distances, lloyd.counts.evaluations);
+  return lloyd.fit(std::move(labels), seeds.size());
+}
+
+void report(const Context& context, const char* phase, double fraction, double energy = 0) {
+  Progress progress;
+  progress.phase = phase;
+  progress.fraction = fraction;
+  progress.energy = energy;
+  context.report(progress);
+  context.check();
+}
+
+Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& options, SegmentSeconds& seconds) {
+  const Context& context = lloyd.context();
+  const std::size_t wanted = options.proxies;
+  const double most_rms = wanted > 0 ? 0 : allowed_rms(lloyd.domain(), options.error);
+  const double allowed = most_rms * most_rms * lloyd.domain().area;
+  const auto enough = [&](const Partition& p) { return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed; };
+  Clock clock;
+  report(context, "start", 0);
+  const bool merging = options.start == SegmentStart::merging;
+  const std::size_t at_random = options.start == SegmentStart::random ? wanted : 1;
+  Partition partition = merging ? start_by_merging(lloyd, options, allowed)
+                                : start_at_random(lloyd, at_random, options.random_seed);
+  seconds.start = clock.lap();
+
+  report(context, "Lloyd", 0.2, partition.energy());
+  lloyd.iterate(partition, options.iterations);
+  while (!enough(partition)) {
+    report(context, "inserting regions", 0.3, partition.energy());
+    if (!(merging ? editor.divide_best(partition) : editor.insert_farthest(partition))) break;
+    if (!merging && enough(partition) && editor.merge_redundant(partition)) editor.insert_farthest(partition);
+  }
+  seconds.lloyd = clock.lap();
+
+  report(context, "moving regions", 0.6, partition.energy());
+  constexpr double kAnyEnergy = std::numeric_limits<double>::infinity();
+  while (wanted > 0 && partition.regions.size() > wanted && editor.remove_cheapest(partition, kAnyEnergy)) context.check();
+  editor.teleport(partition);
+  if (wanted == 0)
+    while (editor.remove_cheapest(partition, allowed)) report(context, "removing regions", 0.7, partition.energy());
+  lloyd.iterate(partition, options.iterations);
+  seconds.improve = clock.lap();
+  return partition;
+}
+
+// Numbers the regions in descending order of area.
+void sort_regions(const SegmentDomain& domain, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
+  const std::size_t count = primitives.size();
+  std::vector<double> area(count, 0);
+  for (std::size_t t = 0; t < labels.size(); ++t) area[labels[t]] += domain.areas[t];
+  std::vector<Index> order(count), number(count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return area[a] > area[b]; });
+  std::vector<Primitive> sorted;
+  for (std::size_t k = 0; k < count; ++k) {
+    number[order[k]] = static_cast<Index>(k);
+    sorted.push_back(primitives[order[k]]);
+  }
+  primitives = std::move(sorted);
+  for (Index& l : labels) l = number[l];
+}
+
+double mean_square(const SegmentDomain& domain, const std::vector<Index>& labels, const std::vector<Proxy>& proxies) {
+  return fixed_sum(labels.size(), [&](std::size_t t) { return distance_to(domain, static_cast<Index>(t), proxies[labels[t]]); }) /
+         domain.area;
+}
+
+std::vector<Proxy> proxies_of(const std::vector<Primitive>& primitives) {
+  std::vector<Proxy> proxies;
+  for (const Primitive& p : primitives) proxies.push_back(Proxy::of(p));
+  return proxies;
+}
+
+// With the final primitives.
+void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxies, std::vector<Index>& labels,
+                    std::size_t& evaluations) {
+  std::vector<Index> all(labels.size());
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<double> distances(labels.size());
+  for (const Index t : all) distances[t] = distance_to(domain, t, proxies[labels[t]]);
+  relax_borders(domain, proxies, std::move(all), labels, distances, evaluations);
+}
+
+// Smooths the borders and fits the primitives anew. Returns the weight, 0 if every one raised the distance too far.
+double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
+                     double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
+  constexpr double kMostGrowth = 1.05, kNegligible = 1e-9;
+  constexpr int kHalvings = 6;
+  // Distances that differ by rounding only say nothing about where a border belongs.
+  const auto distance = [&](Index t, Index r) {
+    return distance_to(domain, t, proxies[r]) + kNegligible * kNegligible * domain.areas[t];
+  };
+  SmoothBordersOptions smoothing;
+  smoothing.lambda = options.smooth;
+  smoothing.rings = options.fuzzy_rings;
+  for (int k = 0; k < kHalvings; ++k, smoothing.lambda /= 2) {
+    std::vector<Index> smoothed = labels;
+    std::vector<Primitive> refined = primitives;
+    smooth_borders(domain.graph, domain.triangles, distance, smoothing, smoothed);
+    refine_primitives(domain, smoothed, refined);
+    if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > kMostGrowth * rms + kNegligible) continue;
+    labels = std::move(smoothed);
+    primitives = std::move(refined);
+    return smoothing.lambda;
+  }
+  return 0;
+}
+
+SegmentRegion measure_region(const SegmentDomain& domain, const Primitive& primitive, const Index* begin, const Index* end) {
+  SegmentRegion region;
+  region.triangles = static_cast<std::size_t>(end - begin);
+  double sum = 0;
+  for (const Index* t = begin; t != end; ++t) {
+    if (!(domain.areas[*t] > 0)) continue;
+    const Triangle& v = domain.triangles[*t];
+    double squares = 0;
+    for (const Vec3& p : {domain.vertices[v[0]], domain.vertices[v[1]], domain.vertices[v[2]], domain.barycentres[*t]}) {
+      const double d = distance(primitive, p);
+      squares += d * d;
+      region.max = std::max(region.max, d);
+    }
+    sum += 0.25 * domain.areas[*t] * squares;
+    region.area += domain.areas[*t];
+  }
+  region.rms = region.area > 0 ? std::sqrt(sum / region.area) : 0;
+  region.proxy = from_local(primitive, domain.origin, domain.scale);
+  region.area *= domain.scale * domain.scale;
+  region.rms *= domain.scale;
+  region.max *= domain.scale;
+  return region;
+}
+
+std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDomain& domain, const std::vector<Index>& labels,
+                                     const std::vector<Primitive>& primitives, const std::vector<SegmentRegion>& measured) {
+  std::vector<std::vector<Index>> regions(mesh.vertices.size());
+  for (std::size_t t = 0; t < labels.size(); ++t)
+    for (const Index v : domain.triangles[t])
+      if (std::find(regions[v].begin(), regions[v].end(), labels[t]) == regions[v].end()) regions[v].push_back(labels[t]);
+  std::vector<Vec3> result = mesh.vertices;
+  parallel_each(result.size(), [&](std::size_t v) {
+    if (regions[v].empty()) return;
+    Vec3 sum;
+    for (const Index r : regions[v]) {
+      // A surface that ends before the region's rim has its foot points elsewhere.
+      const Vec3& p = domain.vertices[v];
+      const Vec3 foot = foot_point(primitives[r], p);
+      sum += norm(foot - p) <= kFarFoot * measured[r].max / domain.scale ? foot : p;
+    }
+    result[v] = domain.origin + (domain.scale / static_cast<double>(regions[v].size())) * sum;
+  });
+  return result;
+}
+
+SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& domain, const SegmentOptions& options,
+                             const Context& context) {
+  Clock clock;
+  SegmentResult result;
+  Lloyd lloyd(domain, options.surfaces, context);
+  PartitionEditor editor(lloyd, options.iterations);
+  Partition partition = partition_of(lloyd, editor, options, result.seconds);
+  const std::size_t count = partition.regions.size();
+
+  report(context, "classifying", 0.9, partition.energy());
+  clock.lap();
+  std::vector<Primitive> primitives =
+      region_primitives(domain, partition.labels, count, lloyd.proxies(partition), options.surfaces);
+  std::vector<Proxy> proxies = proxies_of(primitives);
+  std::vector<Index> labels = std::move(partition.labels);
+  polish_borders(domain, proxies, labels, lloyd.counts.evaluations);
+  simplify_primitives(domain, options.surfaces, labels, primitives, lloyd.counts.evaluations);
+  refine_primitives(domain, labels, primitives);
+  proxies = proxies_of(primitives);
+  result.seconds.classify = clock.lap();
+  result.border_before = result.border_after = border_length(domain.graph, labels);
+  result.rms_before = domain.scale * std::sqrt(mean_square(domain, labels, proxies));
+  if (options.smooth > 0) {
+    report(context, "smoothing borders", 0.95);
+    result.smooth = smooth_within(domain, options, proxies, result.rms_before / domain.scale, labels, primitives);
+    result.border_after = border_length(domain.graph, labels);
+  }
+  sort_regions(domain, labels, primitives);
+  result.seconds.smooth = clock.lap();
+  result.rms = domain.scale * std::sqrt(mean_square(domain, labels, proxies_of(primitives)));
+
+  const Csr<Index> triangles = region_triangles(labels, count);
+  for (std::size_t r = 0; r < count; ++r)
+    result.regions.push_back(measure_region(domain, primitives[r], triangles.begin(r), triangles.end(r)));
+  if (options.project) result.projected = projected_vertices(mesh, domain, labels, primitives, result.regions);
+  result.seconds.project = clock.lap();
+  result.labels = std::move(labels);
+  result.iterations = lloyd.counts.iterations;
+  result.evaluations = lloyd.counts.evaluations;
+  result.energies = std::move(lloyd.counts.energies);
+  result.insertions = editor.insertions;
+  result.merges = editor.merges;
+  result.deletions = editor.deletions;
+  result.teleportations = editor.teleportations;
+  return result;
+}
+
+}  // namespace
+
+SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
+  Clock clock;
+  check_options(options);
+  const SegmentDomain domain = make_segment_domain(mesh);
+  check_count(domain, options.proxies);
+  // Types and smooth borders cost some of the error; where they take more than was left, less is aimed at.
+  constexpr int kAttempts = 4;
+  const double most = domain.scale * allowed_rms(domain, options.error);
+  SegmentOptions aimed = options;
+  SegmentResult result;
+  for (int k = 0; k < kAttempts; ++k) {
+    result = segment_domain(mesh, domain, aimed, context);
+    if (options.proxies > 0 || result.rms <= most) break;
+    aimed.error *= 0.97 * most / result.rms;
+  }
+  if (options.proxies == 0 && result.rms > most)
+    context.warn(fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
+                             "a number of proxies", result.rms, most));
+  result.seconds.total = clock.lap();
+  return result;
+}
+
+}  // namespace bisector

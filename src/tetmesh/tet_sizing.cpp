@@ -1,0 +1,435 @@
+#include "tetmesh/tet_sizing.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <queue>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "mesh/degenerate.h"
+#include "features/size_field.h"
+#include "tetmesh/locate.h"
+
+namespace bisector {
+namespace {
+
+// Cubic cells of side a have 2 vertices, 8 edges of length a sqrt(3) / 2 and 6 of length a at each: mean 0.9235 a.
+constexpr double kPerVolume = 2 * 0.9235 * 0.9235 * 0.9235;
+constexpr double kPerArea = 1 / std::numbers::sqrt3;  // half of 2 / sqrt 3
+constexpr double kMostVertices = 1e8;
+constexpr double kLongest = 2;       // edge length by h above which an edge is bisected
+constexpr std::size_t kMostTets = 2'000'000;
+constexpr int kRounds = 6;           // of refinement and calibration
+constexpr int kTrials = 40;          // of a calibration
+constexpr double kSettled = 1e-3;    // relative error of the calibration
+
+double volume_of(const TetMesh& mesh, const Tetrahedron& t) {
+  const Vec3 a = mesh.vertices[t[0]];
+  return std::abs(dot(mesh.vertices[t[1]] - a, cross(mesh.vertices[t[2]] - a, mesh.vertices[t[3]] - a))) / 6;
+}
+
+// What a count is an integral over.
+struct Extent {
+  Extent(const TetMesh& mesh, const TriangleMesh& boundary) : volumes(mesh.tets.size()), areas(boundary.triangles.size()) {
+    parallel_each(volumes.size(), [&](std::size_t t) { volumes[t] = volume_of(mesh, mesh.tets[t]); });
+    parallel_each(areas.size(), [&](std::size_t t) {
+      const auto [a, b, c] = boundary.triangles[t];
+      areas[t] = triangle_area(boundary.vertices[a], boundary.vertices[b], boundary.vertices[c]);
+    });
+    volume = fixed_sum(volumes.size(), [&](std::size_t t) { return volumes[t]; });
+    area = fixed_sum(areas.size(), [&](std::size_t t) { return areas[t]; });
+    if (!(volume > 0)) throw Error("sizing: the solid has no volume; check the mesh");
+  }
+
+  std::vector<double> volumes, areas;
+  double volume = 0, area = 0;
+};
+
+struct TetEstimate {
+  double vertices = 0, mean_edge = 0;
+};
+
+TetEstimate estimate(const Extent& extent, const TetMesh& mesh, const TriangleMesh& boundary, const std::vector<double>& h) {
+  const auto over_tets = [&](auto&& f) {
+    return fixed_sum(extent.volumes.size(), [&](std::size_t t) {
+      double sum = 0;
+      for (Index v : mesh.tets[t]) sum += f(h[v]);
+      return extent.volumes[t] * sum / 4;
+    });
+  };
+  const double cubes = over_tets([](double x) { return 1 / (x * x * x); });
+  const double squares = over_tets([](double x) { return 1 / (x * x); });
+  const double surface = fixed_sum(extent.areas.size(), [&](std::size_t t) {
+    double sum = 0;
+    for (Index v : boundary.triangles[t]) sum += 1 / (h[v] * h[v]);
+    return extent.areas[t] * sum / 3;
+  });
+  return {kPerVolume * cubes + kPerArea * surface, squares / cubes};
+}
+
+double uniform_edge(const Extent& extent, double vertices) {
+  double low = 0, high = std::cbrt(kPerVolume * extent.volume / vertices) + std::sqrt(kPerArea * extent.area / vertices);
+  while (estimate_tet_vertices(extent.volume, extent.area, high) > vertices) high *= 2;
+  for (int k = 0; k < 200 && high - low > 1e-12 * high; ++k) {
+    const double h = 0.5 * (low + high);
+    (estimate_tet_vertices(extent.volume, extent.area, h) > vertices ? low : high) = h;
+  }
+  return high;
+}
+
+void check(const TetMesh& mesh, const TetSizingOptions& options, const SizingTarget& target) {
+  const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
+  if ((target.vertices > 0) == (target.edge_length != 0) || (target.vertices == 0 && !positive(target.edge_length)))
+    throw Error("sizing: give either a number of vertices or a positive edge length");
+  const SizingOptions& field = options.field;
+  if (!positive(field.gradation)) throw Error("sizing: the gradation inside a solid must be positive; correct it");
+  for (const double bound : {field.min_edge, field.max_edge})
+    if (bound != 0 && !positive(bound)) throw Error("sizing: the least and largest edge length must be positive; correct them");
+  if (field.max_edge > 0 && field.min_edge > field.max_edge)
+    throw Error(fmt::format("sizing: the least edge length {:g} is larger than the largest {:g}; correct them", field.min_edge,
+                            field.max_edge));
+  if (options.sizes.points.size() != options.sizes.lengths.size())
+    throw Error(fmt::format("sizing: {} lengths for {} points; give one per point", options.sizes.lengths.size(),
+                            options.sizes.points.size()));
+  for (const Tetrahedron& tet : options.sizes.tets)
+    for (Index v : tet)
+      if (v >= options.sizes.points.size()) throw Error(fmt::format("sizing: the background mesh has no vertex {}; correct it", v));
+  for (std::size_t k = 0; k < options.sizes.lengths.size(); ++k)
+    if (!positive(options.sizes.lengths[k]))
+      throw Error(fmt::format("sizing: the edge length {:g} of point {} is not positive; correct it", options.sizes.lengths[k], k));
+  if (field.kind != DensityKind::attribute || !options.sizes.points.empty()) return;
+  if (field.attribute.empty() || field.attribute.size() > mesh.vertices.size())
+    throw Error(fmt::format("sizing: {} densities for {} vertices; give one per vertex", field.attribute.size(),
+                            mesh.vertices.size()));
+  for (std::size_t v = 0; v < field.attribute.size(); ++v)
+    if (!(field.attribute[v] >= 1e-100 && field.attribute[v] <= 1e100))
+      throw Error(fmt::format("sizing: the density {:g} of vertex {} is not within 1e-100 and 1e100; correct it",
+                              field.attribute[v], v));
+}
+
+// The samples that the field grows from, up to a factor.
+SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options, double uniform) {
+  if (!options.sizes.points.empty()) return options.sizes;
+  SizeSamples samples;
+  if (options.field.kind == DensityKind::attribute) {
+    samples.points.assign(mesh.vertices.begin(), mesh.vertices.begin() + static_cast<std::ptrdiff_t>(options.field.attribute.size()));
+    for (double rho : options.field.attribute) samples.lengths.push_back(std::pow(rho, -0.2));
+    if (samples.points.size() == mesh.vertices.size()) samples.tets = mesh.tets;
+    return samples;
+  }
+  // On the surface where edges are as long as they will be here, refined until it shows the field.
+  SizingTarget target;
+  target.edge_length = uniform;
+  SizingOptions field = options.field;
+  field.min_edge = field.max_edge = 0;
+  const SizedMesh sized = refine_for_density(boundary, field, target);
+  std::vector<char> used(sized.mesh.vertices.size(), 0);
+  for (const Triangle& t : sized.mesh.triangles)
+    for (Index v : t) used[v] = 1;
+  for (Index v = 0; v < used.size(); ++v) {
+    if (!used[v]) continue;
+    samples.points.push_back(sized.mesh.vertices[v]);
+    samples.lengths.push_back(target_edge_length(sized.sizing, v));
+  }
+  return samples;
+}
+
+// The samples' lengths by a factor, within bounds, as a field.
+class Scaled {
+ public:
+  Scaled(const SizeSamples& samples, const SizingOptions& bounds) : samples_(samples), bounds_(bounds) {
+    if (samples.tets.empty()) return;
+    background_.vertices = samples.points;
+    background_.tets = samples.tets;
+    locator_.emplace(background_);
+  }
+  Scaled(const Scaled&) = delete;
+
+  void scale(double factor) {
+    lengths_ = samples_.lengths;
+    for (double& h : lengths_) h = bounded(h * factor);
+    field_.emplace(samples_.points, lengths_, bounds_.gradation);
+  }
+  double at(const Vec3& x) const { return bounded(std::min((*field_)(x), linear(x, locate(x)))); }
+  std::vector<double> at(const std::vector<Vec3>& points) {
+    std::vector<double> h = field_->at(points, near_);
+    const std::size_t known = tet_of_.size();
+    tet_of_.resize(points.size(), kNone);
+    parallel_each(points.size(), [&](std::size_t k) {
+      if (k >= known) tet_of_[k] = locate(points[k]);
+      h[k] = bounded(std::min(h[k], linear(points[k], tet_of_[k])));
+    });
+    return h;
+  }
+
+ private:
+  double bounded(double h) const {
+    h = std::max(h, bounds_.min_edge);
+    return bounds_.max_edge > 0 ? std::min(h, bounds_.max_edge) : h;
+  }
+
+  Index locate(const Vec3& x) const { return locator_ ? locator_->nearest(x) : kNone; }
+  // On the background mesh; infinite beside it.
+  double linear(const Vec3& x, Index tet) const {
+    const double nothing = std::numeric_limits<double>::infinity();
+    if (tet == kNone) return nothing;
+    const std::array<double, 4> w = locator_->weights(tet, x);
+    if (!(*std::min_element(w.begin(), w.end()) > -1e-6)) return nothing;
+    double h = 0;
+    for (std::size_t k = 0; k < 4; ++k) h += w[k] * lengths_[background_.tets[tet][k]];
+    return h;
+  }
+
+  const SizeSamples& samples_;
+  const SizingOptions& bounds_;
+  std::optional<SizeField> field_;
+  std::vector<double> lengths_;
+  TetMesh background_;
+  std::optional<TetLocator> locator_;
+  std::vector<Index> near_, tet_of_;  // of the points asked for last, of which the next are a continuation
+};
+
+// Finds the factor with which the estimate meets the target; h at the vertices.
+std::vector<double> calibrate(const Extent& extent, const TetMesh& mesh, const TriangleMesh& boundary,
+                              const SizingTarget& target, Scaled& field, double& factor) {
+  double low = 0, high = 0;
+  std::vector<double> h;
+  for (int k = 0; k < kTrials; ++k) {
+    field.scale(factor);
+    h = field.at(mesh.vertices);
+    const TetEstimate e = estimate(extent, mesh, boundary, h);
+    const double off = target.vertices ? std::log(static_cast<double>(target.vertices) / e.vertices) / 3
+                                       : std::log(e.mean_edge / target.edge_length);
+    if (std::abs(off) < kSettled || (low > 0 && high > 0 && std::log(high / low) < 1e-9)) break;
+    (off < 0 ? low : high) = factor;
+    const double next = factor * std::exp(-off);
+    factor = low > 0 && high > 0 && !(next > low && next < high) ? std::sqrt(low * high) : next;
+  }
+  return h;
+}
+
+// Bisection of edges with all their tetrahedra and marked triangles.
+class Refiner {
+ public:
+  Refiner(SizedSolid& sized, TriangleMesh& boundary, const Scaled& field, std::vector<double>& lengths)
+      : mesh_(sized.mesh), boundary_(boundary), splits_(sized.splits), field_(field), lengths_(lengths) {
+    for (Index t = 0; t < mesh_.tets.size(); ++t) index_tet(t);
+    for (Index t = 0; t < mesh_.boundary.size(); ++t) index_triangle(mesh_.boundary[t], t, marked_);
+    for (Index t = 0; t < boundary_.triangles.size(); ++t) index_triangle(boundary_.triangles[t], t, outer_);
+    for (const auto& [a, b] : mesh_.feature_edges) features_.insert({key(a, b), 1});
+  }
+
+  // False if nothing had to be bisected.
+  bool run(std::size_t limit) {
+    for (const Tetrahedron& t : mesh_.tets)
+      for (int i = 0; i < 4; ++i)
+        for (int j = i + 1; j < 4; ++j) push(t[i], t[j]);
+    if (queue_.empty()) return false;
+    bool any = false;
+    while (!queue_.empty() && mesh_.tets.size() < limit) {
+      const Edge edge = queue_.top();
+      queue_.pop();
+      const Edge longest = longest_beyond(edge);
+      if (!bisect(std::get<1>(longest), std::get<2>(longest))) continue;
+      any = true;
+      if (longest != edge) queue_.push(edge);
+    }
+    collect_features();
+    return any;
+  }
+
+ private:
+  using Edge = std::tuple<double, Index, Index>;  // squared length, lower and upper end
+  using Around = std::unordered_map<std::uint64_t, std::vector<Index>>;
+  struct Later {
+    bool operator()(const Edge& e, const Edge& f) const {
+      if (std::get<0>(e) != std::get<0>(f)) return std::get<0>(e) < std::get<0>(f);
+      return std::tie(std::get<1>(e), std::get<2>(e)) > std::tie(std::get<1>(f), std::get<2>(f));
+    }
+  };
+
+  static std::uint64_t key(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
+
+  Edge edge(Index a, Index b) const {
+    return {norm2(mesh_.vertices[b] - mesh_.vertices[a]), std::min(a, b), std::max(a, b)};
+  }
+
+  void index_tet(Index t) {
+    const Tetrahedron& v = mesh_.tets[t];
+    for (int i = 0; i < 4; ++i)
+      for (int j = i + 1; j < 4; ++j) tets_[key(v[i], v[j])].push_back(t);
+  }
+  static void index_triangle(const Triangle& v, Index t, Around& around) {
+    for (int k = 0; k < 3; ++k) around[key(v[k], v[(k + 1) % 3])].push_back(t);
+  }
+
+  Edge longest_beyond(Edge longest) const {
+    for (bool moved = true; moved;) {
+      moved = false;
+      const auto found = tets_.find(key(std::get<1>(longest), std::get<2>(longest)));
+      if (found == tets_.end()) break;
+      for (const Index t : found->second)
+        for (int i = 0; i < 4; ++i)
+          for (int j = i + 1; j < 4; ++j) {
+            const Edge other = edge(mesh_.tets[t][i], mesh_.tets[t][j]);
+            if (!Later()(longest, other)) continue;
+            longest = other;
+            moved = true;
+          }
+    }
+    return longest;
+  }
+
+  void push(Index a, Index b) {
+    const Edge e = edge(a, b);
+    const double most = kLongest * std::min(lengths_[a], lengths_[b]);
+    if (std::get<0>(e) > most * most) queue_.push(e);
+  }
+
+  bool bisect(Index a, Index b) {
+    const Vec3 middle = 0.5 * mesh_.vertices[a] + 0.5 * mesh_.vertices[b];
+    if (middle == mesh_.vertices[a] || middle == mesh_.vertices[b]) return false;
+    const auto found = tets_.find(key(a, b));
+    if (found == tets_.end()) return false;  // queued by several tetrahedra and bisected already
+    const std::vector<Index> around = std::move(found->second);
+    tets_.erase(found);
+    const auto m = static_cast<Index>(mesh_.vertices.size());
+    mesh_.vertices.push_back(middle);
+    lengths_.push_back(field_.at(middle));
+    splits_.push_back({std::min(a, b), std::max(a, b), m});
+    for (const Index t : around) {
+      const auto added = static_cast<Index>(mesh_.tets.size());
+      Tetrahedron &first = mesh_.tets[t], second = first;
+      std::replace(first.begin(), first.end(), b, m);
+      std::replace(second.begin(), second.end(), a, m);
+      std::vector<Index> others;
+      for (Index v : first)
+        if (v != a && v != m) others.push_back(v);
+      mesh_.tets.push_back(second);
+      if (!mesh_.regions.empty()) mesh_.regions.push_back(mesh_.regions[t]);
+      tets_[key(a, m)].push_back(t);
+      tets_[key(m, b)].push_back(added);
+      tets_[key(others[0], others[1])].push_back(added);
+      for (Index c : others) {
+        std::vector<Index>& beyond = tets_[key(b, c)];
+        std::replace(beyond.begin(), beyond.end(), t, added);
+        std::vector<Index>& between = tets_[key(m, c)];
+        const bool fresh = between.empty();
+        between.insert(between.end(), {t, added});
+        if (fresh) push(m, c);
+      }
+    }
+    split_triangles(a, b, m, mesh_.boundary, mesh_.boundary_labels, marked_);
+    split_triangles(a, b, m, boundary_.triangles, boundary_.labels, outer_);
+    if (features_.erase(key(a, b))) {
+      features_.insert({key(a, m), 1});
+      features_.insert({key(m, b), 1});
+    }
+    push(a, m);
+    push(m, b);
+    return true;
+  }
+
+  static void split_triangles(Index a, Index b, Index m, std::vector<Triangle>& triangles, std::vector<std::int32_t>& labels,
+                              Around& at) {
+    const auto found = at.find(key(a, b));
+    if (found == at.end()) return;
+    const std::vector<Index> around = std::move(found->second);
+    at.erase(found);
+    for (const Index t : around) {
+      const auto added = static_cast<Index>(triangles.size());
+      Triangle &first = triangles[t], second = first;
+      const Index c = *std::find_if(first.begin(), first.end(), [&](Index v) { return v != a && v != b; });
+      std::replace(first.begin(), first.end(), b, m);
+      std::replace(second.begin(), second.end(), a, m);
+      triangles.push_back(second);
+      if (!labels.empty()) labels.push_back(labels[t]);
+      at[key(a, m)].push_back(t);
+      at[key(m, b)].push_back(added);
+      std::vector<Index>& beyond = at[key(b, c)];
+      std::replace(beyond.begin(), beyond.end(), t, added);
+      std::vector<Index>& between = at[key(m, c)];
+      between.insert(between.end(), {t, added});
+    }
+  }
+
+  void collect_features() {
+    mesh_.feature_edges.clear();
+    for (const auto& [k, one] : features_)
+      mesh_.feature_edges.push_back({static_cast<Index>(k >> 32), static_cast<Index>(k & 0xffffffffu)});
+    std::sort(mesh_.feature_edges.begin(), mesh_.feature_edges.end());
+  }
+
+  TetMesh& mesh_;
+  TriangleMesh& boundary_;
+  EdgeSplits& splits_;
+  const Scaled& field_;
+  std::vector<double>& lengths_;
+  Around tets_, marked_, outer_;  // at each edge
+  std::unordered_map<std::uint64_t, char> features_;
+  std::priority_queue<Edge, std::vector<Edge>, Later> queue_;
+};
+
+std::vector<double> powers(const std::vector<double>& lengths, double unit, int exponent) {
+  std::vector<double> rho(lengths.size());
+  for (std::size_t v = 0; v < rho.size(); ++v) {
+    const double r = unit / lengths[v];
+    rho[v] = exponent == 4 ? r * r * r * r : r * r * r * r * r;
+  }
+  return rho;
+}
+
+}  // namespace
+
+std::vector<double> SizedSolid::volume_density() const { return powers(lengths, edge_length, 5); }
+std::vector<double> SizedSolid::surface_density() const { return powers(lengths, edge_length, 4); }
+
+double estimate_tet_vertices(double volume, double area, double h) {
+  return kPerVolume * volume / (h * h * h) + kPerArea * area / (h * h);
+}
+
+SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
+                            const SizingTarget& target) {
+  check(mesh, options, target);
+  SizedSolid sized;
+  sized.mesh = mesh;
+  const Extent whole(mesh, boundary);
+  const double uniform =
+      target.vertices ? uniform_edge(whole, static_cast<double>(target.vertices)) : target.edge_length;
+  const double wanted =
+      target.vertices ? static_cast<double>(target.vertices) : estimate_tet_vertices(whole.volume, whole.area, uniform);
+  if (wanted > kMostVertices)
+    throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones", uniform, kMostVertices));
+  sized.edge_length = uniform;
+  sized.vertices = static_cast<std::size_t>(std::llround(wanted));
+  if (options.field.kind == DensityKind::uniform && options.sizes.points.empty()) return sized;
+
+  const SizeSamples samples = samples_of(mesh, boundary, options, uniform);
+  Scaled field(samples, options.field);
+  TriangleMesh surface = boundary;
+  double factor = 1;
+  const std::size_t limit = std::max(kMostTets, mesh.tets.size());
+  for (int round = 0;; ++round) {
+    surface.vertices = sized.mesh.vertices;
+    const Extent extent(sized.mesh, surface);
+    sized.lengths = calibrate(extent, sized.mesh, surface, target, field, factor);
+    const TetEstimate e = estimate(extent, sized.mesh, surface, sized.lengths);
+    sized.edge_length = e.mean_edge;
+    if (target.vertices == 0) sized.vertices = static_cast<std::size_t>(std::llround(e.vertices));
+    if (round == kRounds || !Refiner(sized, surface, field, sized.lengths).run(limit)) break;
+  }
+  if (static_cast<double>(sized.vertices) > kMostVertices)
+    throw Error(fmt::format("sizing: such edges make more than {:.0f} vertices; ask for longer ones", kMostVertices));
+  std::sort(sized.splits.begin(), sized.splits.end());
+  return sized;
+}
+
+}  // namespace bisector

@@ -1,0 +1,38 @@
+// Tetrahedra of a closed surface by TetGen (Si, TetGen, a Delaunay-based quality tetrahedral mesh generator, ACM TOMS
+// 2015), which runs in a child process: it is AGPL, and it crashes on some inputs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bisector/context.h"
+#include "core/geometry.h"
+
+namespace bisector {
+
+struct TetgenOptions {
+  double time_limit = 600;  // seconds; 0: none
+  std::string program;      // path of bisector-tetgen; empty: find_tetgen
+};
+
+struct TetgenResult {
+  // The surface's vertices, then TetGen's own, all inside; a region number from 1 for each part of the
+  // solid if there are several; the surface's triangles, labels and feature edges as marks.
+  TetMesh mesh;
+  std::size_t steiner_points = 0;
+  std::size_t zero_volume = 0;  // tetrahedra whose corners are exactly coplanar
+};
+
+// Where the child program is: $BISECTOR_TETGEN, else `bisector-tetgen` beside the running executable, else where the
+// build put it; empty if it is nowhere.
+std::string find_tetgen();
+
+// Tetrahedra inside a closed surface, as check_surface gives it, whose boundary facets are exactly the surface's
+// triangles, with no point added on it (TetGen's -pY). Coordinates stay the same bits; vertices that no triangle uses
+// are kept at their index without tetrahedra.
+//
+// Throws Cancelled, and Error if the program is missing, crashes, takes longer or more memory than there is, or gives
+// what is not such a mesh; each tells what to do.
+TetgenResult tetgen_tets(const TriangleMesh& surface, const TetgenOptions& options = {}, const Context& context = {});
+
+}  // namespace bisector

@@ -1,0 +1,82 @@
+#include "tree/coverage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "spatial/nearest.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kAxisSamples = 100;  // intervals of the axis' parameter
+
+void check_labels(const TriangleMesh& mesh, std::size_t surfaces) {
+  if (mesh.labels.size() != mesh.triangles.size())
+    throw Error(
+        fmt::format("coverage: {} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
+  for (const std::int32_t label : mesh.labels)
+    if (label < 0 || static_cast<std::size_t>(label) >= surfaces)
+      throw Error(fmt::format("coverage: label {} with {} surfaces; give each triangle its surface", label, surfaces));
+}
+
+// Points along each axis, one after the other.
+std::vector<Vec3> sample_axes(const std::vector<BranchSurface>& surfaces) {
+  std::vector<Vec3> samples(surfaces.size() * (kAxisSamples + 1));
+  parallel_each(
+      surfaces.size(),
+      [&](std::size_t b) {
+        for (std::size_t k = 0; k <= kAxisSamples; ++k)
+          samples[b * (kAxisSamples + 1) + k] = surfaces[b].axis.point(static_cast<double>(k) / kAxisSamples);
+      },
+      8);
+  return samples;
+}
+
+double radius_near(const BranchSurface& surface, const Vec3* axis, const Vec3& p) {
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k <= kAxisSamples; ++k)
+    if (const double d = norm2(axis[k] - p); d < least) {
+      least = d;
+      best = k;
+    }
+  return surface.radius(static_cast<double>(best) / kAxisSamples);
+}
+
+template <class Condition>
+double share(const std::vector<PointCoverage>& points, const Condition& condition) {
+  if (points.empty()) return 0;
+  return static_cast<double>(std::count_if(points.begin(), points.end(), condition)) /
+         static_cast<double>(points.size());
+}
+
+}  // namespace
+
+std::vector<PointCoverage> cover_points(const std::vector<Vec3>& points, const std::vector<BranchSurface>& surfaces,
+                                        const TriangleMesh& mesh) {
+  check_labels(mesh, surfaces.size());
+  const NearestOnMesh nearest(mesh);
+  const std::vector<Vec3> axes = sample_axes(surfaces);
+  std::vector<PointCoverage> covered(points.size());
+  parallel_each(points.size(), [&](std::size_t p) {
+    const NearestPoint foot = nearest.nearest(points[p]);
+    const auto branch = static_cast<std::size_t>(mesh.labels[foot.triangle]);
+    covered[p] = {norm(foot.point - points[p]), static_cast<Index>(branch),
+                  radius_near(surfaces[branch], &axes[branch * (kAxisSamples + 1)], foot.point)};
+  });
+  return covered;
+}
+
+double share_within(const std::vector<PointCoverage>& points, double distance) {
+  return share(points, [&](const PointCoverage& p) { return p.distance <= distance; });
+}
+
+double share_within_radii(const std::vector<PointCoverage>& points, double radii) {
+  return share(points, [&](const PointCoverage& p) { return p.distance <= radii * p.radius; });
+}
+
+}  // namespace bisector

@@ -1,0 +1,344 @@
+#include "tree/tree.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "bisector/error.h"
+#include "core/parallel.h"
+#include "tree/branches.h"
+#include "tree/clusters.h"
+#include "tree/level_sections.h"
+#include "tree/point_graph.h"
+#include "tree/polyline.h"
+#include "tree/refine.h"
+#include "tree/skeleton.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kLeastPoints = 20;     // of a tree
+constexpr double kSliceSpacings = 3;         // thickness of the slices that clusters start from
+constexpr double kLeastSlice = 0.006;        // but at least so much of the unit cube
+constexpr double kSlender = 4;               // clusters so many times thicker than their rms tell the noise
+constexpr double kAxisTolerance = 0.3;       // of fitted curves, in the branch's median radius
+
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    start_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// The points that the tree is made from, in the unit cube.
+struct Scan {
+  std::vector<Vec3> points;      // distinct
+  std::vector<Index> of_input;   // point of each input point, or kNone
+  Vec3 origin;
+  double unit = 1;               // length in the input of 1 here
+};
+
+void check_options(const TreeOptions& options) {
+  if (!(options.delta > 0 && options.delta < 1))
+    throw Error(fmt::format("delta is {}; give a number above 0 and below 1", options.delta));
+  if (std::isnan(options.ground)) throw Error("the ground's height is not a number; give its z");
+}
+
+bool on_one_line(const std::vector<Vec3>& points) {
+  Vec3 way;
+  for (const Vec3& p : points)
+    if (const Vec3 d = p - points.front(); norm2(d) > norm2(way)) way = d;
+  const double tolerance = 1e-6 * norm2(way);
+  return std::all_of(points.begin(), points.end(),
+                     [&](const Vec3& p) { return norm(cross(p - points.front(), way)) <= tolerance; });
+}
+
+Scan prepare(const std::vector<Vec3>& input, const TreeOptions& options, TreeResult& result) {
+  Scan scan;
+  scan.of_input.assign(input.size(), kNone);
+  std::vector<Index> order;
+  for (std::size_t i = 0; i < input.size(); ++i) {
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(input[i][k]))
+        throw Error(fmt::format("point {}: a coordinate is not finite; remove the point", i));
+    if (input[i].z < options.ground) ++result.ground_points;
+    else order.push_back(static_cast<Index>(i));
+  }
+  if (order.empty() && result.ground_points > 0)
+    throw Error(fmt::format("all {} points are below the ground ({}); lower it", input.size(), options.ground));
+  const auto key = [&](Index i) { return std::tie(input[i].x, input[i].y, input[i].z); };
+  sort_in_parallel(order, [&](Index a, Index b) { return std::tuple_cat(key(a), std::tie(a)) < std::tuple_cat(key(b), std::tie(b)); });
+  std::vector<Index> twin(input.size());
+  for (std::size_t k = 0; k < order.size(); ++k)
+    twin[order[k]] = k > 0 && key(order[k - 1]) == key(order[k]) ? twin[order[k - 1]] : order[k];
+  std::sort(order.begin(), order.end());
+  for (const Index i : order) {
+    if (twin[i] == i) {
+      scan.of_input[i] = static_cast<Index>(scan.points.size());
+      scan.points.push_back(input[i]);
+    } else {
+      scan.of_input[i] = scan.of_input[twin[i]];
+      ++result.duplicate_points;
+    }
+  }
+  if (scan.points.size() < kLeastPoints)
+    throw Error(fmt::format("{} distinct points{} are too few for a tree; give at least {}", scan.points.size(),
+                            result.ground_points > 0 ? " above the ground" : "", kLeastPoints));
+  if (on_one_line(scan.points)) throw Error("all points lie on one line; give the surface of a tree");
+
+  const Box box = bounding_box(scan.points);
+  scan.origin = box.lo;
+  scan.unit = std::max({box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z});
+  for (Vec3& p : scan.points) p = (1 / scan.unit) * (p - scan.origin);
+  return scan;
+}
+
+// A plate of points at the bottom is taken for the ground, which this does not remove by itself.
+void warn_of_ground(const Scan& scan, const Context& context) {
+  const Box box = bounding_box(scan.points);
+  std::vector<Vec3> low;
+  for (const Vec3& p : scan.points)
+    if (p.z < 0.02 * box.hi.z) low.push_back(p);
+  const Box plate = bounding_box(low);
+  const double wide = std::min(plate.hi.x - plate.lo.x, plate.hi.y - plate.lo.y);
+  if (10 * low.size() > scan.points.size() && wide > 0.5 * std::max(box.hi.x, box.hi.y))
+    context.warn(fmt::format("the lowest 2 % of the height hold {} of {} points, as wide as the tree: if they are the "
+                             "ground, give its height",
+                             low.size(), scan.points.size()));
+}
+
+struct Network {
+  PointGraph graph;
+  Csr<Index> neighbours;      // with bridges, if wanted
+  std::vector<Index> lowest;  // point of each tree
+};
+
+Network connect(const Scan& scan, const TreeOptions& options, TreeResult& result) {
+  Network network;
+  network.graph = build_point_graph(scan.points);
+  result.components = network.graph.components;
+  network.neighbours = network.graph.neighbours;
+  const std::vector<Index>& component = network.graph.component;
+  std::vector<Index> lowest(network.graph.components, kNone);
+  std::vector<std::size_t> size(network.graph.components, 0);
+  for (std::size_t i = 0; i < component.size(); ++i) {
+    Index& low = lowest[component[i]];
+    if (low == kNone || scan.points[i].z < scan.points[low].z) low = static_cast<Index>(i);
+    ++size[component[i]];
+  }
+  const auto higher = [&](Index a, Index b) { return scan.points[a].z < scan.points[b].z; };
+  if (options.components == TreeComponents::bridge) {
+    std::vector<std::array<Index, 2>> edges;
+    for (const Bridge& b : shortest_bridges(scan.points, network.graph)) {
+      edges.push_back({b.from, b.to});
+      result.bridges.push_back(scan.unit * b.length);
+    }
+    network.neighbours = add_edges(network.neighbours, edges);
+    network.lowest = {*std::min_element(lowest.begin(), lowest.end(), higher)};
+    return network;
+  }
+  for (std::size_t c = 0; c < size.size(); ++c) {
+    if (size[c] >= kLeastPoints) network.lowest.push_back(lowest[c]);
+    else result.small_component_points += size[c];
+  }
+  if (network.lowest.empty())
+    throw Error(fmt::format("none of the {} components has {} points; bridge them", size.size(), kLeastPoints));
+  return network;
+}
+
+Clusters make_clusters(const Scan& scan, const Network& network, const TreeOptions& options, const Context& context) {
+  double width = std::max(kSliceSpacings * network.graph.spacing, kLeastSlice);
+  LevelSections sections = level_sections(scan.points, network.neighbours, network.lowest, width);
+  while (options.clusters > 0 && sections.count > options.clusters && width < 1) {
+    width *= 1.3;
+    sections = level_sections(scan.points, network.neighbours, network.lowest, width);
+  }
+  ClusterOptions cluster_options;
+  cluster_options.most = options.clusters;
+  cluster_options.delta = options.delta;
+  cluster_options.max_points = options.max_cluster_points;
+  return cluster_points(scan.points, network.neighbours, sections.section, sections.distance, cluster_options, context);
+}
+
+// Standard deviation of points off cylinders that are much thicker than it.
+double measure_noise(const std::vector<Cylinder>& cylinders) {
+  std::vector<double> rms;
+  for (const Cylinder& c : cylinders)
+    if (c.rms > 0 && c.radius > kSlender * c.rms) rms.push_back(c.rms);
+  if (rms.empty()) return 0;
+  const auto middle = rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2);
+  std::nth_element(rms.begin(), middle, rms.end());
+  return *middle;
+}
+
+std::vector<Limb> rough_limbs(const Scan& scan, const Network& network, const Clusters& clusters,
+                              const TreeOptions& options) {
+  std::vector<ClusterLink> links = link_clusters(scan.points, network.neighbours, clusters.label, clusters.cylinders);
+  if (options.components == TreeComponents::bridge)
+    link_across_gaps(scan.points, clusters.label, network.graph.component, clusters.cylinders, links);
+  weigh_links(clusters.cylinders, links);
+  std::vector<Index> roots;
+  for (const Index i : network.lowest) roots.push_back(clusters.label[i]);
+  const std::vector<SkeletonNode> nodes = make_skeleton(links, clusters.cylinders, roots);
+  const std::vector<SkeletonBranch> branches = find_branches(nodes);
+
+  std::vector<Limb> limbs;
+  std::vector<Index> limb_of(clusters.cylinders.size(), kNone);
+  for (const SkeletonBranch& branch : branches) {
+    Limb limb;
+    limb.parent = branch.parent;
+    for (std::size_t k = 0; k < branch.nodes.size(); ++k) {
+      const SkeletonNode& node = nodes[branch.nodes[k]];
+      limb.axis.push_back(node.position);
+      if (node.cluster != kNone && (k > 0 || branch.parent == kNone)) limb_of[node.cluster] = static_cast<Index>(limbs.size());
+    }
+    limbs.push_back(std::move(limb));
+  }
+  for (std::size_t i = 0; i < scan.points.size(); ++i)
+    if (const Index c = clusters.label[i]; c != kNone && limb_of[c] != kNone)
+      limbs[limb_of[c]].points.push_back(static_cast<Index>(i));
+  return limbs;
+}
+
+// Cone frusta along the axis from where it leaves the parent.
+void measure(const std::vector<Limb>& limbs, std::size_t b, TreeBranch& branch) {
+  const Limb& limb = limbs[b];
+  branch.length = polyline_length(limb.axis);
+  branch.tip_radius = limb.radii.back();
+  branch.base_radius = limb.radii.front();
+  bool free = limb.parent == kNone;
+  for (std::size_t k = 0; k + 1 < limb.axis.size(); ++k) {
+    double share = 1;
+    if (!free) {
+      const Limb& parent = limbs[limb.parent];
+      const auto depth = [&](const Vec3& p) {
+        const PolylineFoot foot = nearest_on_polyline(parent.axis, p);
+        return value_at(parent.radii, foot) - foot.distance;
+      };
+      const double here = depth(limb.axis[k]), next = depth(limb.axis[k + 1]);
+      if (next > 0) continue;
+      free = true;
+      share = here > 0 ? -next / (here - next) : 1;
+      branch.base_radius = share * limb.radii[k] + (1 - share) * limb.radii[k + 1];
+    }
+    const double r = share * limb.radii[k] + (1 - share) * limb.radii[k + 1], q = limb.radii[k + 1];
+    const double height = share * norm(limb.axis[k + 1] - limb.axis[k]);
+    branch.volume += std::numbers::pi / 3 * height * (r * r + r * q + q * q);
+    branch.area += std::numbers::pi * (r + q) * std::hypot(height, r - q);
+  }
+}
+
+void describe_branches(const std::vector<Limb>& limbs, TreeResult& result) {
+  for (std::size_t b = 0; b < limbs.size(); ++b) {
+    const Limb& limb = limbs[b];
+    TreeBranch branch;
+    branch.parent = limb.parent;
+    branch.points = limb.points.size();
+    Index previous = kNone;
+    if (limb.parent != kNone) {
+      const TreeBranch& parent = result.branches[limb.parent];
+      branch.order = parent.order + 1;
+      previous = parent.nodes[nearest_on_polyline(limbs[limb.parent].axis, limb.axis.front()).segment];
+    }
+    for (std::size_t k = 0; k < limb.axis.size(); ++k) {
+      branch.nodes.push_back(static_cast<Index>(result.skeleton.size()));
+      result.skeleton.push_back({limb.axis[k], limb.radii[k], previous, static_cast<Index>(b)});
+      previous = branch.nodes.back();
+    }
+    measure(limbs, b, branch);
+    result.branches.push_back(std::move(branch));
+  }
+}
+
+void loft(const std::vector<Limb>& limbs, TreeResult& result) {
+  parallel_each(limbs.size(), [&](std::size_t b) {
+    std::vector<double> radii = limbs[b].radii;
+    std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2), radii.end());
+    result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, kAxisTolerance * radii[radii.size() / 2]);
+  }, 1);
+}
+
+}  // namespace
+
+TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
+  check_options(options);
+  TreeResult result;
+  Stopwatch total, watch;
+  const auto phase = [&](const char* name, double fraction) {
+    context.check();
+    context.report({.phase = name, .fraction = fraction});
+  };
+  phase("connecting points", 0);
+  const Scan scan = prepare(points, options, result);
+  if (result.ground_points == 0) warn_of_ground(scan, context);
+  const Network network = connect(scan, options, result);
+  result.seconds.graph = watch.lap();
+
+  phase("clusters", 0.15);
+  const Clusters clusters = make_clusters(scan, network, options, context);
+  result.clusters = clusters.cylinders.size();
+  result.fixed_clusters = static_cast<std::size_t>(std::count(clusters.fixed.begin(), clusters.fixed.end(), 1));
+  const double noise = measure_noise(clusters.cylinders);
+  result.seconds.clusters = watch.lap();
+
+  phase("skeleton", 0.5);
+  std::vector<Limb> limbs = rough_limbs(scan, network, clusters, options);
+  result.seconds.skeleton = watch.lap();
+
+  phase("fitting branches", 0.55);
+  limbs = refine_limbs(scan.points, network.neighbours, std::move(limbs), {.noise = noise}, context);
+  result.seconds.refine = watch.lap();
+
+  phase("surfaces", 0.85);
+  std::vector<Index> branch_of(scan.points.size(), kNone);
+  for (std::size_t b = 0; b < limbs.size(); ++b)
+    for (const Index i : limbs[b].points) branch_of[i] = static_cast<Index>(b);
+  for (Limb& limb : limbs) {
+    for (Vec3& p : limb.axis) p = scan.origin + scan.unit * p;
+    for (double& r : limb.radii) r *= scan.unit;
+  }
+  describe_branches(limbs, result);
+  loft(limbs, result);
+  result.noise = scan.unit * noise;
+  result.cluster.assign(points.size(), kNone);
+  result.branch.assign(points.size(), kNone);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (const Index p = scan.of_input[i]; p != kNone) {
+      result.cluster[i] = clusters.label[p];
+      result.branch[i] = branch_of[p];
+    }
+  result.seconds.surfaces = watch.lap();
+  result.seconds.total = total.lap();
+  return result;
+}
+
+TriangleMesh tree_mesh(const TreeResult& tree, double tolerance) {
+  if (!(tolerance > 0)) throw Error(fmt::format("the tolerance is {}; give a positive number", tolerance));
+  std::vector<TriangleMesh> parts(tree.branches.size());
+  parallel_each(parts.size(), [&](std::size_t b) {
+    const TreeBranch& branch = tree.branches[b];
+    parts[b] = branch_mesh(branch.surface, tolerance * std::max(branch.tip_radius, 0.3 * branch.base_radius));
+  }, 1);
+  TriangleMesh mesh;
+  for (std::size_t b = 0; b < parts.size(); ++b) {
+    const auto first = static_cast<Index>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), parts[b].vertices.begin(), parts[b].vertices.end());
+    for (const Triangle& t : parts[b].triangles) {
+      mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+      mesh.labels.push_back(static_cast<std::int32_t>(b));
+    }
+  }
+  return mesh;
+}
+
+}  // namespace bisector

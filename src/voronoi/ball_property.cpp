@@ -1,0 +1,611 @@
+#include "voronoi/ball_property.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "core/parallel.h"
+#include "mesh/topology.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kChunk = 64;  // cells
+
+// Disjoint sets over indices of a shared array; a root is the lowest of its set.
+Index root_of(std::vector<Index>& parent, Index i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+void join(std::vector<Index>& parent, Index i, Index j) {
+  i = root_of(parent, i);
+  j = root_of(parent, j);
+  parent[std::max(i, j)] = std::min(i, j);
+}
+
+std::vector<Index> singletons(std::size_t n) {
+  std::vector<Index> parent(n);
+  std::iota(parent.begin(), parent.end(), Index{0});
+  return parent;
+}
+
+// First polygon of each triangle, and the end.
+std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles) {
+  std::vector<std::size_t> begin(triangles + 1, 0);
+  for (const auto& pair : polygons.pairs) ++begin[pair.triangle + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  return begin;
+}
+
+bool distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
+
+// Divides collinear triangles as the cells cross their edges. A cell is convex and so meets a line in one interval; the cells
+// along an edge are a list without repeats, and a vertex between the ends splits that list at its owner.
+class Strips {
+ public:
+  Strips(const Surface& surface, const RestrictedPolygons& polygons) : surface_(surface), polygons_(polygons) {
+    const std::vector<Triangle>& triangles = surface.mesh.triangles;
+    for (Index t = 0; t < triangles.size(); ++t)
+      if (surface.facet_of[t] == kNone && distinct(triangles[t])) flat_.push_back(t);
+    if (flat_.empty()) return;
+    read_facets();
+    place_loose_vertices();
+    read_flat();
+  }
+
+  std::size_t unread() const { return flat_.size() - chains_.size(); }
+  bool empty() const { return chains_.empty(); }
+
+  // The diagram with the strips among its polygons, without positions; `source` receives the given polygon of each, or
+  // kNone for a strip.
+  RestrictedPolygons merged(std::vector<Index>& source) const {
+    RestrictedPolygons all;
+    std::size_t k = 0;
+    const auto copy_below = [&](std::size_t triangle) {
+      for (; k < polygons_.pairs.size() && polygons_.pairs[k].triangle < triangle; ++k) {
+        all.pairs.push_back(polygons_.pairs[k]);
+        all.labels.insert(all.labels.end(), polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[k]),
+                          polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[k + 1]));
+        all.offsets.push_back(all.labels.size());
+        source.push_back(static_cast<Index>(k));
+      }
+    };
+    for (const auto& [triangle, chain] : chains_) {
+      copy_below(triangle);
+      std::vector<std::size_t> order(chain.cells.size());
+      std::iota(order.begin(), order.end(), std::size_t{0});
+      std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return chain.cells[a] < chain.cells[b]; });
+      for (const std::size_t r : order) {
+        append_strip(chain, r, all.labels);
+        all.pairs.push_back({triangle, chain.cells[r]});
+        all.offsets.push_back(all.labels.size());
+        source.push_back(kNone);
+      }
+    }
+    copy_below(kNone);
+    return all;
+  }
+
+ private:
+  using Edge = std::array<Index, 2>;  // lower vertex first
+  using Cells = std::vector<Index>;
+
+  // A triangle's corners along its line, and the cells from the low end to the high one.
+  struct Chain {
+    Index low, middle, high;  // corners
+    Cells cells;
+    std::size_t split = 0;    // the middle corner lies in cells[split]
+  };
+
+  static Edge edge_of(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
+
+  // The cells along an edge from a to b, if known.
+  std::optional<Cells> along(Index a, Index b) const {
+    const auto at = cells_.find(edge_of(a, b));
+    if (at == cells_.end()) return std::nullopt;
+    Cells cells = at->second;
+    if (a > b) std::reverse(cells.begin(), cells.end());
+    return cells;
+  }
+
+  bool know(Index a, Index b, Cells cells) {
+    if (a > b) std::reverse(cells.begin(), cells.end());
+    return cells_.try_emplace(edge_of(a, b), std::move(cells)).second;
+  }
+
+  // What facets say of the edges and vertices of collinear triangles.
+  void read_facets() {
+    const std::vector<Triangle>& triangles = surface_.mesh.triangles;
+    std::vector<char> wanted(surface_.mesh.vertices.size(), 0);
+    for (Index t : flat_)
+      for (Index v : triangles[t]) wanted[v] = 1;
+    const std::vector<std::size_t> begin = first_polygons(polygons_, triangles.size());
+    for (Index t = 0; t < triangles.size(); ++t) {
+      if (surface_.facet_of[t] == kNone) continue;
+      for (Index k = 0; k < 3; ++k) {
+        const Index a = triangles[t][k], b = triangles[t][(k + 1) % 3];
+        if (!wanted[a] && !wanted[b]) continue;
+        const Cells cells = walk(begin[t], begin[t + 1], k);
+        if (cells.empty()) continue;
+        owner_.try_emplace(a, cells.front());
+        owner_.try_emplace(b, cells.back());
+        if (wanted[a] && wanted[b]) know(a, b, cells);
+      }
+    }
+  }
+
+  // The cells along edge k of a facet whose polygons are given.
+  Cells walk(std::size_t begin, std::size_t end, Index k) const {
+    const Index edge = kEdgeLabel | k;
+    std::map<Index, std::array<Index, 2>> ends;  // of each cell: labels before and after the edge
+    Index cell = kNone;
+    for (std::size_t p = begin; p < end; ++p) {
+      const std::size_t first = polygons_.offsets[p], size = polygons_.offsets[p + 1] - first;
+      for (std::size_t e = 0; e < size; ++e) {
+        if (polygons_.labels[first + e] != edge) continue;
+        const Index before = polygons_.labels[first + (e + size - 1) % size];
+        ends[polygons_.pairs[p].cell] = {before, polygons_.labels[first + (e + 1) % size]};
+        if (is_edge(before)) cell = polygons_.pairs[p].cell;
+      }
+    }
+    Cells cells;
+    while (cells.size() < ends.size() && ends.count(cell)) {
+      cells.push_back(cell);
+      cell = ends[cell][1];
+    }
+    return cells;
+  }
+
+  // Vertices that no facet uses are taken to be where the vertex is from which they are reached first: that changes nothing
+  // but the division of triangles without area.
+  void place_loose_vertices() {
+    for (const auto& [v, cell] : owner_) position_[v] = surface_.mesh.vertices[v];
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (Index t : flat_)
+        for (Index v : surface_.mesh.triangles[t]) {
+          if (owner_.count(v)) continue;
+          for (Index from : surface_.mesh.triangles[t])
+            if (!owner_.count(v) && owner_.count(from)) {
+              owner_[v] = owner_[from];
+              position_[v] = position_[from];
+              changed = true;
+            }
+        }
+    }
+  }
+
+  void read_flat() {
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (Index t : flat_)
+        if (!chains_.count(t) && read(t)) changed = true;
+    }
+  }
+
+  bool read(Index t) {
+    const Triangle& v = surface_.mesh.triangles[t];
+    for (Index corner : v)
+      if (!owner_.count(corner)) return false;
+    std::array<Index, 3> order{0, 1, 2};
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
+      const Vec3 &p = position_.at(v[a]), &q = position_.at(v[b]);
+      return std::tie(p.x, p.y, p.z, v[a]) < std::tie(q.x, q.y, q.z, v[b]);
+    });
+    Chain chain{order[0], order[1], order[2], {}, 0};
+    const Index a = v[chain.low], c = v[chain.middle], b = v[chain.high];
+    // An edge between two vertices at one place lies in their cell.
+    for (const auto& [p, q] : {std::pair{a, c}, std::pair{c, b}, std::pair{a, b}})
+      if (position_.at(p) == position_.at(q)) know(p, q, {owner_.at(p)});
+    std::optional<Cells> whole = along(a, b);
+    const std::optional<Cells> first = along(a, c), second = along(c, b);
+    if (!whole) {
+      if (!first || !second) return false;
+      whole = first;
+      whole->insert(whole->end(), second->begin() + 1, second->end());
+      know(a, b, *whole);
+    }
+    const auto at = std::find(whole->begin(), whole->end(), owner_.at(c));
+    if (at == whole->end()) return false;
+    know(a, c, Cells(whole->begin(), at + 1));
+    know(c, b, Cells(at, whole->end()));
+    chain.split = static_cast<std::size_t>(at - whole->begin());
+    chain.cells = std::move(*whole);
+    chains_.emplace(t, std::move(chain));
+    return true;
+  }
+
+  static void append_strip(const Chain& chain, std::size_t r, std::vector<Index>& labels) {
+    const bool before = r <= chain.split, after = r >= chain.split;  // of the middle corner, on its side
+    if (r > 0) labels.push_back(chain.cells[r - 1]);
+    if ((chain.low + 1) % 3 == chain.middle) {
+      if (before) labels.push_back(kEdgeLabel | chain.low);
+      if (after) labels.push_back(kEdgeLabel | chain.middle);
+    } else {
+      labels.push_back(kEdgeLabel | chain.low);
+    }
+    if (r + 1 < chain.cells.size()) labels.push_back(chain.cells[r + 1]);
+    if ((chain.low + 1) % 3 == chain.middle) {
+      labels.push_back(kEdgeLabel | chain.high);
+    } else {
+      if (after) labels.push_back(kEdgeLabel | chain.high);
+      if (before) labels.push_back(kEdgeLabel | chain.middle);
+    }
+  }
+
+  const Surface& surface_;
+  const RestrictedPolygons& polygons_;
+  std::vector<Index> flat_;          // collinear triangles of three different vertices
+  std::map<Edge, Cells> cells_;      // along edges, from the lower vertex
+  std::map<Index, Index> owner_;     // of vertices
+  std::map<Index, Vec3> position_;
+  std::map<Index, Chain> chains_;    // of the triangles that could be read
+};
+
+// Vertices whose triangles, linked through edges, fall apart into several fans.
+std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std::size_t vertices, const EdgeTable& table) {
+  std::vector<Index> fans = singletons(3 * triangles.size());
+  const auto corner_at = [&](std::size_t half_edge, Index v) {
+    const std::size_t t = half_edge / 3, k = half_edge % 3;
+    return static_cast<Index>(triangles[t][k] == v ? half_edge : 3 * t + (k + 1) % 3);
+  };
+  for (std::size_t e = 0; e < table.edges.size(); ++e)
+    for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h)
+      for (const Index v : table.edges[e]) join(fans, corner_at(*table.half_edges.begin(e), v), corner_at(*h, v));
+  std::vector<Index> fan(vertices, kNone);
+  std::vector<char> singular(vertices, 0);
+  for (Index corner = 0; corner < fans.size(); ++corner) {
+    const Index v = triangles[corner / 3][corner % 3], root = root_of(fans, corner);
+    if (fan[v] == kNone) fan[v] = root;
+    if (fan[v] != root) singular[v] = 1;
+  }
+  return singular;
+}
+
+// The diagram as a cell complex. Sets and first visits are kept in arrays over the whole diagram, but what one cell's examination
+// touches belongs to that cell alone.
+class Complex {
+ public:
+  Complex(const Surface& surface, const RestrictedPolygons& polygons)
+      : triangles_(surface.mesh.triangles),
+        diagram_(polygons),
+        begin_(first_polygons(polygons, triangles_.size())),
+        table_(edge_table(triangles_, surface.mesh.vertices.size())),
+        twin_(3 * triangles_.size(), kBorder),
+        polygon_at_(surface.mesh.vertices.size(), kNone),
+        piece_at_(surface.mesh.vertices.size(), kNone),
+        parts_(singletons(polygons.pairs.size())),
+        lines_(singletons(polygons.labels.size())) {
+    std::vector<std::size_t> around;
+    for (std::size_t e = 0; e < table_.edges.size(); ++e) {
+      around.clear();
+      for (const std::size_t* h = table_.half_edges.begin(e); h != table_.half_edges.end(e); ++h)
+        if (is_read(*h / 3)) around.push_back(*h);
+      if (around.size() == 2) {
+        twin_[around[0]] = static_cast<Index>(around[1]);
+        twin_[around[1]] = static_cast<Index>(around[0]);
+      } else if (around.size() > 2) {
+        for (const std::size_t h : around) twin_[h] = kSeveral;
+        for (const std::size_t h : around) several_[h] = around;
+      }
+    }
+    Index cells = 0;
+    for (const auto& pair : diagram_.pairs) cells = std::max(cells, pair.cell + 1);
+    of_cell_.offsets.assign(cells + 1, 0);
+    for (const auto& pair : diagram_.pairs) ++of_cell_.offsets[pair.cell + 1];
+    std::partial_sum(of_cell_.offsets.begin(), of_cell_.offsets.end(), of_cell_.offsets.begin());
+    of_cell_.values.resize(diagram_.pairs.size());
+    std::vector<std::size_t> next(of_cell_.offsets.begin(), of_cell_.offsets.end() - 1);
+    for (Index p = 0; p < diagram_.pairs.size(); ++p) of_cell_.values[next[diagram_.pairs[p].cell]++] = p;
+  }
+
+  BallReport check() {
+    std::vector<BallReport> reports((of_cell_.rows() + kChunk - 1) / kChunk);
+    parallel_chunks(of_cell_.rows(), kChunk, [&](std::size_t c, std::size_t begin, std::size_t end) {
+      Scratch scratch;
+      for (std::size_t i = begin; i < end; ++i)
+        if (of_cell_.size(i)) check_cell(static_cast<Index>(i), scratch, reports[c]);
+    });
+    BallReport all;
+    for (BallReport& r : reports) {
+      all.cells_checked += r.cells_checked;
+      all.edges_checked += r.edges_checked;
+      all.vertices_checked += r.vertices_checked;
+      all.euler += r.euler;
+      std::move(r.cells.begin(), r.cells.end(), std::back_inserter(all.cells));
+      std::move(r.edges.begin(), r.edges.end(), std::back_inserter(all.edges));
+      std::move(r.vertices.begin(), r.vertices.end(), std::back_inserter(all.vertices));
+    }
+    all.manifold = several_.empty();
+    forgive_singular_vertices(all);
+    return all;
+  }
+
+ private:
+  static constexpr Index kBorder = kNone, kSeveral = kNone - 1;
+
+  enum class Kind : unsigned char { piece, crossing, end, branching };
+  // What lies on the boundary towards the cell `other`: an entry, or its crossing of a mesh edge of two, one or more triangles.
+  struct Contact {
+    Index other;
+    Kind kind;
+    Index entry;
+    int corners;  // of a piece: its ends in a third cell
+    friend bool operator<(const Contact& a, const Contact& b) {
+      return std::tie(a.other, a.kind, a.entry) < std::tie(b.other, b.kind, b.entry);
+    }
+  };
+  struct Meeting {
+    Index low, high, entry;  // the two other cells
+    friend bool operator<(const Meeting& a, const Meeting& b) {
+      return std::tie(a.low, a.high, a.entry) < std::tie(b.low, b.high, b.entry);
+    }
+  };
+  struct Scratch {
+    std::vector<Contact> contacts;
+    std::vector<Meeting> meetings;
+    std::vector<Index> border;                   // entries on the surface's border
+    std::vector<std::array<Index, 2>> closures;  // consecutive entries of the boundary that are joined for its loops only
+  };
+
+  bool is_read(std::size_t triangle) const { return begin_[triangle] < begin_[triangle + 1]; }
+
+  Index polygon_of(std::size_t triangle, Index cell) const {
+    const auto from = diagram_.pairs.begin() + static_cast<std::ptrdiff_t>(begin_[triangle]);
+    const auto to = diagram_.pairs.begin() + static_cast<std::ptrdiff_t>(begin_[triangle + 1]);
+    const auto at = std::lower_bound(from, to, cell, [](const auto& pair, Index c) { return pair.cell < c; });
+    return at == to || at->cell != cell ? kNone : static_cast<Index>(at - diagram_.pairs.begin());
+  }
+
+  // The entry before or after another in its polygon.
+  std::size_t step(std::size_t p, std::size_t entry, bool forward) const {
+    const std::size_t first = diagram_.offsets[p], last = diagram_.offsets[p + 1] - 1;
+    if (forward) return entry == last ? first : entry + 1;
+    return entry == first ? last : entry - 1;
+  }
+
+  // Glues polygon q to p along the mesh edge of half-edge h in p and h2 in q. The bisectors that end there go on.
+  void glue(Index p, std::size_t entry, Index q, std::size_t h2) {
+    join(parts_, p, q);
+    const Index label = kEdgeLabel | static_cast<Index>(h2 % 3);
+    for (std::size_t e = diagram_.offsets[q]; e < diagram_.offsets[q + 1]; ++e) {
+      if (diagram_.labels[e] != label) continue;
+      for (bool forward : {false, true}) {
+        const std::size_t side = step(p, entry, forward);
+        const Index other = diagram_.labels[side];
+        if (is_edge(other)) continue;
+        for (bool there : {false, true})
+          if (diagram_.labels[step(q, e, there)] == other)
+            join(lines_, static_cast<Index>(side), static_cast<Index>(step(q, e, there)));
+      }
+    }
+  }
+
+  void check_cell(Index cell, Scratch& s, BallReport& report) {
+    s.contacts.clear();
+    s.meetings.clear();
+    s.border.clear();
+    s.closures.clear();
+    long long vertices = 0, edges = 0, border_vertices = 0;
+    bool plain = true;  // meets no mesh edge of more than two triangles
+    for (const Index* at = of_cell_.begin(cell); at != of_cell_.end(cell); ++at) {
+      const Index p = *at, triangle = diagram_.pairs[p].triangle;
+      for (std::size_t e = diagram_.offsets[p]; e < diagram_.offsets[p + 1]; ++e) {
+        const Index entry = static_cast<Index>(e), label = diagram_.labels[e];
+        const std::size_t previous = step(p, e, false);
+        const Index before = diagram_.labels[previous];
+        if (!is_edge(label)) {
+          ++edges;
+          const bool ends = !is_edge(diagram_.labels[step(p, e, true)]);
+          s.contacts.push_back({label, Kind::piece, entry, (ends ? 1 : 0) + (is_edge(before) ? 0 : 1)});
+          if (is_edge(before)) continue;
+          ++vertices;
+          s.meetings.push_back({std::min(label, before), std::max(label, before), entry});
+          s.closures.push_back({static_cast<Index>(previous), entry});
+          continue;
+        }
+        const Index k = label & ~kEdgeLabel;
+        const Index start = triangles_[triangle][k];
+        if (is_edge(before)) {
+          if (polygon_at_[start] == kNone) {
+            polygon_at_[start] = p;
+            ++vertices;
+          } else {
+            join(parts_, polygon_at_[start], p);
+          }
+        }
+        // The lowest half-edge counts for all on the mesh edge.
+        const std::size_t h = 3 * static_cast<std::size_t>(triangle) + k;
+        const Index twin = twin_[h];
+        const bool on_border = twin == kBorder, branches = twin == kSeveral;
+        if (branches ? several_.at(h).front() != h : twin < h) continue;
+        ++edges;
+        plain = plain && !branches;
+        if (on_border) s.border.push_back(entry);
+        for (bool forward : {false, true}) {
+          const std::size_t side = step(p, e, forward);
+          const Index other = diagram_.labels[side];
+          if (!is_edge(other)) {
+            ++vertices;
+            s.contacts.push_back({other, on_border ? Kind::end : branches ? Kind::branching : Kind::crossing, entry, 0});
+            if (on_border) {
+              ++border_vertices;
+              s.closures.push_back({entry, static_cast<Index>(side)});
+            }
+          } else if (on_border) {
+            Index& piece = piece_at_[forward ? triangles_[triangle][(k + 1) % 3] : start];
+            if (piece == kNone) {
+              piece = entry;
+              ++border_vertices;
+            } else {
+              join(lines_, piece, entry);
+            }
+          }
+        }
+        const auto glue_to = [&](std::size_t h2) {
+          const Index q = polygon_of(h2 / 3, cell);
+          if (q != kNone) glue(p, e, q, h2);
+        };
+        if (branches) {
+          for (const std::size_t h2 : several_.at(h))
+            if (h2 != h) glue_to(h2);
+        } else if (!on_border) {
+          glue_to(twin);
+        }
+      }
+    }
+
+    check_edges(cell, s, report);
+    check_vertices(cell, s, report);
+    BallReport::Cell found{cell, vertices - edges + static_cast<long long>(of_cell_.size(cell)), 0, 0, 0, 0, {}, {}};
+    found.components = count_roots(parts_, of_cell_.begin(cell), of_cell_.end(cell));
+    found.border_parts = count_roots(lines_, s.border.data(), s.border.data() + s.border.size());
+    found.border_euler = border_vertices - static_cast<long long>(s.border.size());
+    for (const auto& [a, b] : s.closures) join(lines_, a, b);
+    std::vector<Index> boundary = s.border;
+    for (const Contact& c : s.contacts)
+      if (c.kind == Kind::piece) boundary.push_back(c.entry);
+    found.loops = count_roots(lines_, boundary.data(), boundary.data() + boundary.size());
+    ++report.cells_checked;
+    report.euler += found.euler;
+    const bool connected = found.components == 1 && found.euler == 1;
+    const bool border = found.border_parts == 0 || (found.border_parts == 1 && found.border_euler == 1);
+    if (connected && (!plain || (found.loops == 1 && border))) return;
+    found.parts = groups(parts_, of_cell_.begin(cell), of_cell_.end(cell));
+    found.loop_parts = groups(lines_, boundary.data(), boundary.data() + boundary.size());
+    report.cells.push_back(std::move(found));
+  }
+
+  void check_edges(Index cell, Scratch& s, BallReport& report) {
+    std::sort(s.contacts.begin(), s.contacts.end());
+    std::vector<Index> pieces;
+    for (std::size_t k = 0, end = 0; k < s.contacts.size(); k = end) {
+      const Index other = s.contacts[k].other;
+      for (end = k; end < s.contacts.size() && s.contacts[end].other == other;) ++end;
+      if (other < cell) continue;
+      BallReport::Edge edge{cell, other, 0, 0, 0, 0, {}};
+      bool plain = true;
+      pieces.clear();
+      for (std::size_t c = k; c < end; ++c) {
+        const auto [label, kind, entry, corners] = s.contacts[c];
+        if (kind == Kind::piece) {
+          pieces.push_back(entry);
+          edge.euler += corners - 1;
+          edge.ends += static_cast<std::size_t>(corners);
+          continue;
+        }
+        ++edge.euler;
+        plain = plain && kind != Kind::branching;
+        if (kind == Kind::end) {
+          ++edge.ends;
+          ++edge.border_points;
+        }
+      }
+      edge.components = count_roots(lines_, pieces.data(), pieces.data() + pieces.size());
+      ++report.edges_checked;
+      report.euler -= edge.euler;
+      if (edge.components == 1 && edge.euler == 1 && (!plain || (edge.ends == 2 && edge.border_points <= 1))) continue;
+      edge.parts = groups(lines_, pieces.data(), pieces.data() + pieces.size());
+      report.edges.push_back(std::move(edge));
+    }
+  }
+
+  void check_vertices(Index cell, Scratch& s, BallReport& report) const {
+    std::sort(s.meetings.begin(), s.meetings.end());
+    for (std::size_t k = 0, end = 0; k < s.meetings.size(); k = end) {
+      const auto [low, high, entry] = s.meetings[k];
+      for (end = k; end < s.meetings.size() && s.meetings[end].low == low && s.meetings[end].high == high;) ++end;
+      if (low < cell) continue;
+      ++report.vertices_checked;
+      report.euler += static_cast<long long>(end - k);
+      if (end - k == 1) continue;
+      report.vertices.push_back({{cell, low, high}, {}});
+      for (std::size_t m = k; m < end; ++m) report.vertices.back().places.push_back(s.meetings[m].entry);
+    }
+  }
+
+  static std::size_t count_roots(const std::vector<Index>& parent, const Index* begin, const Index* end) {
+    return static_cast<std::size_t>(std::count_if(begin, end, [&](Index i) { return parent[i] == i; }));
+  }
+
+  // The sets among the items, by their roots.
+  static BallReport::Groups groups(std::vector<Index>& parent, const Index* begin, const Index* end) {
+    std::map<Index, std::vector<std::size_t>> sets;
+    for (const Index* i = begin; i != end; ++i) sets[root_of(parent, *i)].push_back(*i);
+    BallReport::Groups result;
+    for (auto& [root, items] : sets) result.push_back(std::move(items));
+    return result;
+  }
+
+  // Disks that touch in a mesh vertex are contractible, but have a loop each.
+  void forgive_singular_vertices(BallReport& report) const {
+    const auto suspect = [](const BallReport::Cell& c) { return c.components == 1 && c.euler == 1 && c.loops != 1; };
+    if (std::none_of(report.cells.begin(), report.cells.end(), suspect)) return;
+    const std::vector<char> singular = singular_vertices(triangles_, polygon_at_.size(), table_);
+    std::vector<char> touched(of_cell_.rows(), 0);
+    for (std::size_t v = 0; v < singular.size(); ++v)
+      if (singular[v] && polygon_at_[v] != kNone) touched[diagram_.pairs[polygon_at_[v]].cell] = 1;
+    std::erase_if(report.cells, [&](const BallReport::Cell& c) { return suspect(c) && touched[c.seed]; });
+  }
+
+  const std::vector<Triangle>& triangles_;
+  const RestrictedPolygons& diagram_;
+  std::vector<std::size_t> begin_;   // first polygon of each triangle
+  EdgeTable table_;
+  std::vector<Index> twin_;          // of each half-edge of a triangle with polygons
+  std::map<std::size_t, std::vector<std::size_t>> several_;  // all half-edges on the same mesh edge, where more than two
+  Csr<Index> of_cell_;               // polygons of each cell
+  std::vector<Index> polygon_at_;    // of each mesh vertex
+  std::vector<Index> piece_at_;      // of each mesh vertex: a piece of the border
+  std::vector<Index> parts_;         // sets of polygons
+  std::vector<Index> lines_;         // sets of entries
+};
+
+// Back from polygons and entries of the diagram with strips to those of the diagram given.
+void restore_indices(const RestrictedPolygons& merged, const std::vector<Index>& source, const RestrictedPolygons& given,
+                     BallReport& report) {
+  const auto restore = [&](std::vector<std::size_t>& items, bool entries) {
+    std::size_t n = 0;
+    for (const std::size_t item : items) {
+      std::size_t polygon = item;
+      if (entries) {
+        const auto after = std::upper_bound(merged.offsets.begin(), merged.offsets.end(), item);
+        polygon = static_cast<std::size_t>(after - merged.offsets.begin()) - 1;
+      }
+      if (source[polygon] == kNone) continue;
+      items[n++] = entries ? item - merged.offsets[polygon] + given.offsets[source[polygon]] : source[polygon];
+    }
+    items.resize(n);
+  };
+  for (BallReport::Cell& c : report.cells) {
+    for (auto& items : c.parts) restore(items, false);
+    for (auto& items : c.loop_parts) restore(items, true);
+  }
+  for (BallReport::Edge& e : report.edges)
+    for (auto& items : e.parts) restore(items, true);
+  for (BallReport::Vertex& v : report.vertices) restore(v.places, true);
+}
+
+}  // namespace
+
+BallReport check_ball_property(const Surface& surface, const RestrictedPolygons& polygons) {
+  const Strips strips(surface, polygons);
+  BallReport report;
+  if (strips.empty()) {
+    report = Complex(surface, polygons).check();
+  } else {
+    std::vector<Index> source;
+    const RestrictedPolygons merged = strips.merged(source);
+    report = Complex(surface, merged).check();
+    restore_indices(merged, source, polygons, report);
+  }
+  report.unread = strips.unread();
+  report.holds = report.failures() == 0;
+  return report;
+}
+
+}  // namespace bisector

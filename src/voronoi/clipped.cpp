@@ -1,0 +1,385 @@
+#include "voronoi/clipped.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/parallel.h"
+#include "voronoi/clip_tet.h"
+#include "voronoi/fixed_tree_sum.h"
+#include "voronoi/polyhedra.h"
+#include "voronoi/step_mass.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kWalks = 16;   // cells that are walked together
+constexpr std::size_t kWholes = 256;  // cells that are taken whole together
+
+double seconds_between(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
+  return std::chrono::duration<double>(b - a).count();
+}
+
+// What one chunk of cells contributes.
+struct Chunk {
+  std::vector<Index> first_neighbour;  // of each cell, in `neighbours`; and one past the last
+  std::vector<Index> neighbours;       // slots of the bisectors of its polyhedra
+  std::vector<Index> tets;             // of each neighbour: one where the two cells meet
+  ClippedPolyhedra polyhedra;
+  Certification certification;
+
+  void clear() {
+    first_neighbour.clear();
+    neighbours.clear();
+    tets.clear();
+    polyhedra = {};
+    certification = {};
+  }
+};
+
+// Marks by generation, so that nothing has to be cleared.
+class Marks {
+ public:
+  void begin(std::size_t size) {
+    if (stamps_.size() != size || now_ == kNone - 1) {
+      stamps_.assign(size, 0);
+      now_ = 0;
+    }
+    ++now_;
+  }
+  // Whether k was not marked before.
+  bool mark(Index k) {
+    if (stamps_[k] == now_) return false;
+    stamps_[k] = now_;
+    return true;
+  }
+
+ private:
+  std::vector<Index> stamps_;
+  Index now_ = 0;
+};
+
+// Per thread: a clipper, and what the current cell has met.
+struct Walker {
+  TetClipper clipper;
+  Marks tets, cells;
+  struct Term {
+    Index tet;
+    Moments moments;
+  };
+  std::vector<Index> queue;
+  std::vector<Term> terms;
+  FixedTreeSum sum;
+  std::uint64_t generation = 0;  // of the seeds that the clipper knows
+};
+
+}  // namespace
+
+struct ClippedVoronoi::Work {
+  const Solid& solid;
+  const bool inner_whole;
+  RestrictedVoronoi boundary;
+  std::vector<TetFrame> frames;  // of the tetrahedra
+  TetFrame enclosure;
+  ThreadLocal<Walker> walkers;
+  std::uint64_t generation = 0;
+  std::vector<std::vector<Chunk>> rounds;
+  std::size_t round_count = 0;
+  std::vector<char> known;       // of each slot: it has been reached
+
+  struct Start {
+    Index slot, tet;
+  };
+
+  Work(const Solid& s, InnerCells inner);
+
+  const SortedSeeds& seeds() const { return boundary.seeds(); }
+  Walker& walker();
+  std::vector<Chunk>& next_round(std::size_t chunks);
+  template <class Starts>
+  void walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk, CellMoments& result, bool want_polyhedra) const;
+  void take_whole(Index slot, Walker& walker, Chunk& chunk, CellMoments& result, bool want_polyhedra) const;
+  std::vector<Start> walk_boundary(CellMoments& result, bool want_polyhedra);
+  void walk_inner(std::vector<Start> frontier, CellMoments& result, bool want_polyhedra);
+  void take_inner(const std::vector<Start>& reached, CellMoments& result, bool want_polyhedra);
+  std::vector<Start> newly_reached(const std::vector<Chunk>& chunks);
+  void gather(ClippedPolyhedra& polyhedra) const;
+  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, RestrictedPolygons* polygons,
+                ClippedPolyhedra* polyhedra);
+};
+
+ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
+    : solid(s),
+      inner_whole(inner == InnerCells::whole && s.density.empty()),
+      boundary(s.boundary, kListsInSpace),
+      frames(tet_frames(s)),
+      enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0) {}
+
+Walker& ClippedVoronoi::Work::walker() {
+  Walker& walker = walkers.local();
+  if (walker.generation != generation) {
+    walker.generation = generation;
+    walker.clipper.reset(seeds(), boundary.neighbours());
+  }
+  return walker;
+}
+
+std::vector<Chunk>& ClippedVoronoi::Work::next_round(std::size_t chunks) {
+  if (rounds.size() == round_count) rounds.emplace_back();
+  std::vector<Chunk>& round = rounds[round_count++];
+  round.resize(chunks);
+  for (Chunk& chunk : round) chunk.clear();
+  return round;
+}
+
+// Cuts up the part of the cell that hangs together with the tetrahedra of `starts`, which it is known to meet.
+template <class Starts>
+void ClippedVoronoi::Work::walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk, CellMoments& result,
+                                bool want_polyhedra) const {
+  TetClipper& clipper = walker.clipper;
+  const bool uniform = solid.density.empty();
+  clipper.begin(slot);
+  walker.tets.begin(frames.size());
+  walker.cells.begin(seeds().x.size());
+  walker.queue.clear();
+  walker.terms.clear();
+  chunk.first_neighbour.push_back(static_cast<Index>(chunk.neighbours.size()));
+  clipper.narrow(enclosure);
+  for (const Index tet : starts)
+    if (walker.tets.mark(tet)) walker.queue.push_back(tet);
+  for (std::size_t head = 0; head < walker.queue.size(); ++head) {
+    const Index tet = walker.queue[head];
+    const bool found = clipper.clip(frames[tet]);
+    chunk.certification.uncertain += clipper.uncertain();
+    chunk.certification.wider += clipper.wider();
+    if (!found) continue;
+    ++chunk.certification.pairs;
+    clipper.each_label([&](Index label) {
+      if (is_facet(label)) {
+        const Index across = solid.adjacent[tet][label & ~kFacetLabel];
+        if (across == kNone || !walker.tets.mark(across)) return;
+        walker.queue.push_back(across);
+        for (std::size_t line = 0; line < sizeof(TetFrame); line += 64)
+          __builtin_prefetch(reinterpret_cast<const char*>(&frames[across]) + line);
+      } else if (walker.cells.mark(label)) {
+        chunk.neighbours.push_back(label);
+        chunk.tets.push_back(tet);
+      }
+    });
+    walker.terms.push_back({tet, uniform ? clipper.integrate<true>() : clipper.integrate<false>()});
+    if (want_polyhedra) append_polyhedron(clipper, seeds(), tet, slot, chunk.polyhedra);
+  }
+  std::sort(walker.terms.begin(), walker.terms.end(), [](const auto& a, const auto& b) { return a.tet < b.tet; });
+  for (const Walker::Term& term : walker.terms) walker.sum.add(term.moments);
+  result.cells[seeds().id[slot]] = walker.sum.finish();
+}
+
+void ClippedVoronoi::Work::take_whole(Index slot, Walker& walker, Chunk& chunk, CellMoments& result,
+                                      bool want_polyhedra) const {
+  TetClipper& clipper = walker.clipper;
+  clipper.begin(slot);
+  chunk.first_neighbour.push_back(static_cast<Index>(chunk.neighbours.size()));
+  const bool found = clipper.clip(enclosure);
+  chunk.certification.uncertain += clipper.uncertain();
+  chunk.certification.wider += clipper.wider();
+  if (!found) return;
+  const std::size_t first = chunk.neighbours.size();
+  bool bounded = true;
+  clipper.each_label([&](Index label) {
+    bounded = bounded && !is_facet(label);
+    chunk.neighbours.push_back(label);
+  });
+  // A cell that reaches out of the enclosure lies outside the solid or on its boundary.
+  if (!bounded) return chunk.neighbours.resize(first);
+  result.cells[seeds().id[slot]] = clipper.integrate<true>();
+  if (want_polyhedra) append_polyhedron(clipper, seeds(), kNone, slot, chunk.polyhedra);
+}
+
+// The cells across the bisectors of `chunks` that were not known, in order of slots; they are now.
+std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::newly_reached(const std::vector<Chunk>& chunks) {
+  std::vector<Start> reached;
+  for (const Chunk& chunk : chunks)
+    for (std::size_t k = 0; k < chunk.neighbours.size(); ++k)
+      if (!known[chunk.neighbours[k]]) {
+        known[chunk.neighbours[k]] = true;
+        reached.push_back({chunk.neighbours[k], chunk.tets[k]});
+      }
+  std::sort(reached.begin(), reached.end(), [](const Start& a, const Start& b) { return a.slot < b.slot; });
+  return reached;
+}
+
+// The cells that meet the boundary, from the tetrahedra under the triangles that they meet. A part of such a cell that the
+// boundary does not bound would be all of the cell, so this finds every part.
+std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(CellMoments& result, bool want_polyhedra) {
+  std::vector<Index> slots;
+  known.assign(seeds().x.size(), false);
+  for (Index s = 0; s < known.size(); ++s)
+    if (result.triangles.size(seeds().id[s])) {
+      slots.push_back(s);
+      known[s] = true;
+    }
+  std::vector<Chunk>& chunks = next_round((slots.size() + kWalks - 1) / kWalks);
+  parallel_chunks(slots.size(), kWalks, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    Walker& local = walker();
+    std::vector<Index> starts;
+    for (std::size_t k = begin; k < end; ++k) {
+      const Index i = seeds().id[slots[k]];
+      starts.clear();
+      for (const Index* t = result.triangles.begin(i); t != result.triangles.end(i); ++t)
+        starts.push_back(solid.tet_of_triangle[*t]);
+      walk(slots[k], starts, local, chunks[c], result, want_polyhedra);
+    }
+  });
+  return newly_reached(chunks);
+}
+
+// A cell that does not meet the boundary but shares a bisector with one inside the solid lies inside itself.
+void ClippedVoronoi::Work::walk_inner(std::vector<Start> frontier, CellMoments& result, bool want_polyhedra) {
+  while (!frontier.empty()) {
+    std::vector<Chunk>& chunks = next_round((frontier.size() + kWalks - 1) / kWalks);
+    parallel_chunks(frontier.size(), kWalks, [&](std::size_t c, std::size_t begin, std::size_t end) {
+      Walker& local = walker();
+      for (std::size_t k = begin; k < end; ++k)
+        walk(frontier[k].slot, std::array<Index, 1>{frontier[k].tet}, local, chunks[c], result, want_polyhedra);
+    });
+    frontier = newly_reached(chunks);
+  }
+}
+
+// The same, but all cells that do not meet the boundary are taken whole at first, and then those kept that are reached.
+void ClippedVoronoi::Work::take_inner(const std::vector<Start>& reached, CellMoments& result, bool want_polyhedra) {
+  std::vector<Index> slots, place(known.size(), kNone);
+  std::vector<char> inside(known.size(), false);
+  for (const Start& start : reached) inside[start.slot] = true;
+  for (Index s = 0; s < known.size(); ++s)
+    if (!known[s] || inside[s]) {
+      place[s] = static_cast<Index>(slots.size());
+      slots.push_back(s);
+    }
+  std::vector<Chunk>& chunks = next_round((slots.size() + kWholes - 1) / kWholes);
+  parallel_chunks(slots.size(), kWholes, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    Walker& local = walker();
+    for (std::size_t k = begin; k < end; ++k) take_whole(slots[k], local, chunks[c], result, want_polyhedra);
+    chunks[c].first_neighbour.push_back(static_cast<Index>(chunks[c].neighbours.size()));
+  });
+  std::vector<Index> queue;
+  for (const Start& start : reached) queue.push_back(start.slot);
+  for (std::size_t head = 0; head < queue.size(); ++head) {
+    const Chunk& chunk = chunks[place[queue[head]] / kWholes];
+    const std::size_t k = place[queue[head]] % kWholes;
+    for (Index n = chunk.first_neighbour[k]; n < chunk.first_neighbour[k + 1]; ++n) {
+      const Index other = chunk.neighbours[n];
+      if (known[other]) continue;
+      known[other] = inside[other] = true;
+      queue.push_back(other);
+    }
+  }
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    if (inside[slots[k]]) ++chunks[k / kWholes].certification.pairs;
+    else result.cells[seeds().id[slots[k]]] = {};
+  }
+}
+
+void ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,
+                                    RestrictedPolygons* polygons, ClippedPolyhedra* polyhedra) {
+  boundary.trace(given, source, result, polygons);
+  const auto t0 = std::chrono::steady_clock::now();
+  ++generation;
+  round_count = 0;
+  result.cells.assign(given.size(), Moments{});
+  const bool want_polyhedra = polyhedra != nullptr;
+  std::vector<Start> reached = walk_boundary(result, want_polyhedra);
+  if (inner_whole) take_inner(reached, result, want_polyhedra);
+  else walk_inner(std::move(reached), result, want_polyhedra);
+  set_step_masses(seeds(), boundary.neighbours(), result);
+  result.mass = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].mass; });
+  result.energy = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].second; });
+  result.certification = {};
+  for (std::size_t r = 0; r < round_count; ++r)
+    for (const Chunk& chunk : rounds[r]) {
+      result.certification.pairs += chunk.certification.pairs;
+      result.certification.uncertain += chunk.certification.uncertain;
+      result.certification.wider += chunk.certification.wider;
+    }
+  result.certification.cpu = result.certification.uncertain;
+  result.seconds.pairs += result.seconds.clip;
+  result.seconds.clip = seconds_between(t0, std::chrono::steady_clock::now());
+  if (polyhedra) gather(*polyhedra);
+}
+
+// Polyhedra lie in chunks by cells; the result is in order of tetrahedra, then cells.
+void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
+  struct Item {
+    Index tet, cell;
+    const ClippedPolyhedra* from;
+    std::size_t place;
+  };
+  std::vector<Item> items;
+  std::size_t labels = 0, vertices = 0;
+  for (std::size_t r = 0; r < round_count; ++r)
+    for (const Chunk& chunk : rounds[r]) {
+      const ClippedPolyhedra& from = chunk.polyhedra;
+      for (std::size_t k = 0; k < from.pairs.size(); ++k)
+        if (known[seeds().slot[from.pairs[k].cell]]) items.push_back({from.pairs[k].tet, from.pairs[k].cell, &from, k});
+      labels += from.labels.size();
+      vertices += from.triples.size();
+    }
+  sort_in_parallel(items, [](const Item& a, const Item& b) { return a.tet != b.tet ? a.tet < b.tet : a.cell < b.cell; });
+  polyhedra = {};
+  polyhedra.pairs.reserve(items.size());
+  polyhedra.label_offsets.reserve(items.size() + 1);
+  polyhedra.vertex_offsets.reserve(items.size() + 1);
+  polyhedra.labels.reserve(labels);
+  polyhedra.triples.reserve(vertices);
+  polyhedra.vertices.reserve(vertices);
+  const auto append = [](auto& to, const auto& from, std::size_t begin, std::size_t end) {
+    to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(begin), from.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  for (const Item& item : items) {
+    const ClippedPolyhedra& from = *item.from;
+    const std::size_t k = item.place;
+    polyhedra.pairs.push_back(from.pairs[k]);
+    append(polyhedra.labels, from.labels, from.label_offsets[k], from.label_offsets[k + 1]);
+    append(polyhedra.triples, from.triples, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
+    append(polyhedra.vertices, from.vertices, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
+    polyhedra.label_offsets.push_back(polyhedra.labels.size());
+    polyhedra.vertex_offsets.push_back(polyhedra.triples.size());
+  }
+}
+
+ClippedVoronoi::ClippedVoronoi(const Solid& solid, InnerCells inner) : work_(std::make_unique<Work>(solid, inner)) {}
+ClippedVoronoi::~ClippedVoronoi() = default;
+
+void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result) {
+  work_->evaluate(seeds, source, result, nullptr, nullptr);
+}
+
+void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
+                              RestrictedPolygons& polygons) {
+  work_->evaluate(seeds, source, result, &polygons, nullptr);
+}
+
+void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
+                              RestrictedPolygons& polygons, ClippedPolyhedra& polyhedra) {
+  work_->evaluate(seeds, source, result, &polygons, &polyhedra);
+}
+
+std::vector<Tetrahedron> dual_tets(const ClippedPolyhedra& polyhedra) {
+  std::vector<Tetrahedron> tets;
+  for (std::size_t k = 0; k < polyhedra.pairs.size(); ++k) {
+    const Index cell = polyhedra.pairs[k].cell;
+    const Index* labels = polyhedra.labels.data() + polyhedra.label_offsets[k];
+    for (std::size_t v = polyhedra.vertex_offsets[k]; v < polyhedra.vertex_offsets[k + 1]; ++v) {
+      const auto& on = polyhedra.triples[v];
+      Tetrahedron tet{cell, labels[on[0]], labels[on[1]], labels[on[2]]};
+      // Facets compare as greater than seeds. Each vertex is seen from its four cells; the lowest reports it.
+      if (is_facet(std::max({tet[1], tet[2], tet[3]})) || std::min({tet[1], tet[2], tet[3]}) < cell) continue;
+      std::sort(tet.begin(), tet.end());
+      tets.push_back(tet);
+    }
+  }
+  sort_in_parallel(tets, [](const Tetrahedron& a, const Tetrahedron& b) { return a < b; });
+  tets.erase(std::unique(tets.begin(), tets.end()), tets.end());
+  return tets;
+}
+
+}  // namespace bisector

@@ -1,0 +1,93 @@
+#include "voronoi/dual.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "core/parallel.h"
+
+namespace bisector {
+namespace {
+
+struct Triple {
+  Triangle ascending;
+  Index mesh_triangle;
+  bool flipped;  // the oriented triple is an odd permutation of `ascending`
+};
+
+bool operator<(const Triple& a, const Triple& b) {
+  return a.ascending != b.ascending ? a.ascending < b.ascending : a.mesh_triangle < b.mesh_triangle;
+}
+
+}  // namespace
+
+Dual extract_dual(const RestrictedPolygons& polygons) {
+  std::vector<Triple> triples;
+  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+    const auto [triangle, cell] = polygons.pairs[k];
+    const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
+    for (std::size_t e = 0; e < size; ++e) {
+      const Index b = polygons.labels[first + (e + size - 1) % size], c = polygons.labels[first + e];
+      // Each vertex is seen from its three cells; the lowest reports it.
+      if (is_edge(b) || is_edge(c) || b < cell || c < cell) continue;
+      // Walking around the cell, the neighbour before the vertex precedes the one after it.
+      triples.push_back({{cell, std::min(b, c), std::max(b, c)}, triangle, b > c});
+    }
+  }
+  sort_in_parallel(triples, [](const Triple& a, const Triple& b) { return a < b; });
+  Dual dual;
+  for (std::size_t k = 0; k < triples.size(); ++k) {
+    const Triangle& t = triples[k].ascending;
+    if (k && triples[k - 1].ascending == t) {
+      ++dual.multiplicity.back();
+      continue;
+    }
+    dual.triangles.push_back(triples[k].flipped ? Triangle{t[0], t[2], t[1]} : t);
+    dual.multiplicity.push_back(1);
+    dual.mesh_triangle.push_back(triples[k].mesh_triangle);
+  }
+  return dual;
+}
+
+std::vector<Index> dual_vertices(const Dual& dual, std::size_t seeds) {
+  std::vector<Index> number(seeds, kNone);
+  for (const Triangle& t : dual.triangles)
+    for (Index v : t) number[v] = 0;
+  Index count = 0;
+  for (Index& n : number)
+    if (n != kNone) n = count++;
+  return number;
+}
+
+std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds) {
+  struct Piece {
+    DualEdge edge;
+    double squared;  // from the middle of the seeds
+  };
+  std::vector<Piece> pieces;
+  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+    const Index cell = polygons.pairs[k].cell;
+    const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
+    for (std::size_t e = 0; e < size; ++e) {
+      const Index label = polygons.labels[first + e];
+      if (is_edge(label) || label < cell) continue;
+      const Vec3 &p = polygons.vertices[first + e], &q = polygons.vertices[first + (e + 1) % size];
+      const Vec3 along = q - p, middle = 0.5 * (seeds[cell] + seeds[label]);
+      const double length2 = norm2(along);
+      if (length2 == 0) continue;
+      const Vec3 nearest = p + std::clamp(dot(middle - p, along) / length2, 0.0, 1.0) * along;
+      pieces.push_back({{cell, label, nearest}, norm2(nearest - middle)});
+    }
+  }
+  sort_in_parallel(pieces, [](const Piece& x, const Piece& y) {
+    const auto key = [](const Piece& p) {
+      return std::tie(p.edge.a, p.edge.b, p.squared, p.edge.crossing.x, p.edge.crossing.y, p.edge.crossing.z);
+    };
+    return key(x) < key(y);
+  });
+  std::vector<DualEdge> edges;
+  for (const Piece& p : pieces)
+    if (edges.empty() || edges.back().a != p.edge.a || edges.back().b != p.edge.b) edges.push_back(p.edge);
+  return edges;
+}
+
+}  // namespace bisector

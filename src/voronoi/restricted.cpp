@@ -1,0 +1,386 @@
+#include "voronoi/restricted.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/parallel.h"
+#include "voronoi/clip.h"
+#include "voronoi/fixed_tree_sum.h"
+#include "voronoi/owner.h"
+#include "voronoi/polygons.h"
+#include "voronoi/step_mass.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
+constexpr std::size_t kRanges = 8;  // of triangles, in the sort by cells
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// The moments of a pair whose cell holds all of the facet are left to the facet's summary.
+constexpr Index kWhole = kNone;
+
+struct Entry {
+  Index slot;
+  Index moments;  // index into Chunk::moments, or kWhole
+};
+
+// What one chunk of facets contributes, facet by facet, and the polygons if they are wanted.
+struct Chunk {
+  std::vector<Entry> entries;
+  std::vector<Moments> moments;
+  std::vector<Index> first_label;  // of each of `moments`, in `labels`; and one past the last
+  std::vector<Index> labels;       // bounding lines in cyclic order: slots or facet edges
+  RestrictedPolygons polygons;
+  Certification certification;
+};
+
+// Per thread: a clipper, and the cells that the current facet has met.
+struct Walker {
+  Clipper clipper;
+  std::vector<Index> queue;
+  std::vector<Index> stamp;  // by slot: the last visit
+  Index visit = 0;
+  std::uint64_t generation = 0;  // of the seeds that the clipper knows
+
+  void begin(std::size_t slots) {
+    if (stamp.size() != slots || visit == kNone - 1) {
+      stamp.assign(slots, 0);
+      visit = 0;
+    }
+    ++visit;
+    queue.clear();
+  }
+  void meet(Index slot) {
+    if (stamp[slot] == visit) return;
+    stamp[slot] = visit;
+    queue.push_back(slot);
+  }
+};
+
+}  // namespace
+
+struct RestrictedVoronoi::Work {
+  const Surface& surface;
+  SortedSeeds seeds;
+  Neighbours neighbours;
+  NeighbourSource built_source = NeighbourSource::nearest;
+  std::vector<Index> owner;   // slot of each site
+  std::vector<Index> hint;    // owner's seed index in the last diagram
+  std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
+  std::uint64_t generation = 0;  // of `seeds`
+  ThreadLocal<Walker> walkers;
+  std::size_t chunk_size = 1;           // facets
+  std::vector<Index> first_entry, last_first_entry;  // of each facet, in its chunk
+  bool followed = false;                // the slots are those of the last diagram
+  struct Item {
+    Index facet, moments;
+  };
+  std::vector<Item> items;              // by cell, then by triangle
+  std::vector<std::size_t> cell_begin;
+  std::vector<Index> cursor;            // by range of triangles and slot
+
+  Work(const Surface& s, ListLength lists) : surface(s), neighbours(lists) {}
+
+  void find_owners(std::size_t seed_count);
+  void clip_facets(bool want_polygons);
+  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
+  bool confirm_last(std::size_t facet, Index slot, Clipper& clipper) const;
+  std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
+  void sort_items();
+  void list_triangles(std::size_t seed_count, CellMoments& result);
+  void sum_cells(std::size_t seed_count, CellMoments& result);
+  void gather(RestrictedPolygons& polygons) const;
+  bool follow(const std::vector<Vec3>& given, NeighbourSource source);
+  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_moments,
+                bool want_polygons);
+};
+
+void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
+  const std::size_t n = surface.sites.size();
+  owner.resize(n);
+  hint.resize(n, kNone);
+  parallel_chunks(n, 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+    Index last = kNone;
+    for (std::size_t k = begin; k < end; ++k) {
+      const Vec3& q = surface.mesh.vertices[surface.sites[k]];
+      Index guess = hint[k] < seed_count ? seeds.slot[hint[k]] : kNone;
+      if (guess == kNone) guess = last;
+      if (guess == kNone) guess = neighbours.nearest(q);
+      last = owner[k] = find_owner(seeds, neighbours, q, guess);
+      hint[k] = seeds.id[last];
+    }
+  });
+}
+
+void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk, bool want_polygons) const {
+  const FacetSummary& summary = surface.summaries[index];
+  Clipper& clipper = walker.clipper;
+  const Index first = owner[summary.site[0]];
+  // A cell is convex: it holds the facet if it owns the corners.
+  if (first == owner[summary.site[1]] && first == owner[summary.site[2]]) {
+    chunk.entries.push_back({first, kWhole});
+    if (want_polygons) {
+      clipper.begin(surface.facets[index]);
+      clipper.take(first);
+      append_polygon(clipper, seeds, summary.triangle, first, chunk.polygons);
+    }
+    return;
+  }
+  const bool uniform = surface.density.empty();
+  clipper.begin(surface.facets[index]);
+  walker.begin(seeds.x.size());
+  for (Index site : summary.site) walker.meet(owner[site]);
+  for (std::size_t head = 0; head < walker.queue.size(); ++head) {
+    const Index slot = walker.queue[head];
+    if (!confirm_last(index, slot, clipper)) {
+      const bool found = clipper.clip(neighbours, slot);
+      chunk.certification.uncertain += clipper.uncertain();
+      chunk.certification.wider += clipper.wider();
+      if (!found) continue;
+    }
+    chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
+    for (std::size_t k = 0; k < clipper.size(); ++k) chunk.labels.push_back(clipper.label(k));
+    for (std::size_t k = 0; k < clipper.size(); ++k)
+      if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
+    chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
+    chunk.moments.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
+    if (want_polygons) append_polygon(clipper, seeds, summary.triangle, slot, chunk.polygons);
+  }
+}
+
+// Whether the pair is bounded as it was in the last diagram.
+bool RestrictedVoronoi::Work::confirm_last(std::size_t facet, Index slot, Clipper& clipper) const {
+  if (!followed) return false;
+  const Chunk& chunk = last_chunks[facet / chunk_size];
+  const std::size_t begin = last_first_entry[facet], end = entries_end(facet, chunk, last_first_entry);
+  if (end - begin > kMostRemembered) return false;
+  for (std::size_t k = begin; k < end; ++k) {
+    const Entry& entry = chunk.entries[k];
+    if (entry.slot != slot || entry.moments == kWhole) continue;
+    const Index first = chunk.first_label[entry.moments];
+    return clipper.confirm(neighbours, slot, chunk.labels.data() + first, chunk.first_label[entry.moments + 1] - first);
+  }
+  return false;
+}
+
+std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk& chunk,
+                                                 const std::vector<Index>& first) const {
+  const bool last = facet + 1 == first.size() || (facet + 1) % chunk_size == 0;
+  return last ? chunk.entries.size() : first[facet + 1];
+}
+
+void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
+  const std::size_t n = surface.facets.size();
+  // Small chunks where facets are few and large.
+  chunk_size = std::clamp<std::size_t>(n / 256, 1, 512);
+  chunks.swap(last_chunks);
+  first_entry.swap(last_first_entry);
+  chunks.resize((n + chunk_size - 1) / chunk_size);
+  first_entry.resize(n);
+  ++generation;
+  parallel_chunks(n, chunk_size, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    Chunk& chunk = chunks[c];
+    chunk.entries.clear();
+    chunk.moments.clear();
+    chunk.first_label.clear();
+    chunk.labels.clear();
+    chunk.polygons = {};
+    chunk.certification = {};
+    Walker& walker = walkers.local();
+    if (walker.generation != generation) {
+      walker.generation = generation;
+      walker.clipper.reset(seeds);
+    }
+    for (std::size_t k = begin; k < end; ++k) {
+      first_entry[k] = static_cast<Index>(chunk.entries.size());
+      clip_facet(k, walker, chunk, want_polygons);
+    }
+    chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
+  });
+}
+
+// Brings the entries into the order of cells and, in each, of triangles: a stable counting sort over the triangles in their
+// order, in a fixed number of ranges.
+void RestrictedVoronoi::Work::sort_items() {
+  const std::size_t slots = seeds.x.size(), triangles = surface.facet_of.size();
+  const std::size_t range = (triangles + kRanges - 1) / kRanges;
+  const auto for_each_entry = [&](std::size_t begin, std::size_t end, const auto& visit) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const Index facet = surface.facet_of[t];
+      if (facet == kNone) continue;
+      const Chunk& chunk = chunks[facet / chunk_size];
+      const std::size_t stop = entries_end(facet, chunk, first_entry);
+      for (std::size_t k = first_entry[facet]; k < stop; ++k) visit(facet, chunk.entries[k]);
+    }
+  };
+  cursor.assign(kRanges * slots, 0);
+  parallel_chunks(triangles, range, [&](std::size_t r, std::size_t begin, std::size_t end) {
+    Index* count = cursor.data() + r * slots;
+    for_each_entry(begin, end, [&](Index, const Entry& entry) { ++count[entry.slot]; });
+  });
+  cell_begin.resize(slots + 1);
+  std::size_t total = 0;
+  for (std::size_t s = 0; s < slots; ++s) {
+    cell_begin[s] = total;
+    for (std::size_t r = 0; r < kRanges; ++r) {
+      const Index count = cursor[r * slots + s];
+      cursor[r * slots + s] = static_cast<Index>(total);
+      total += count;
+    }
+  }
+  cell_begin[slots] = total;
+  items.resize(total);
+  parallel_chunks(triangles, range, [&](std::size_t r, std::size_t begin, std::size_t end) {
+    Index* next = cursor.data() + r * slots;
+    for_each_entry(begin, end, [&](Index facet, const Entry& entry) { items[next[entry.slot]++] = {facet, entry.moments}; });
+  });
+}
+
+void RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellMoments& result) {
+  sort_items();
+  const std::size_t slots = seeds.x.size();
+  result.triangles.offsets.assign(seed_count + 1, 0);
+  for (std::size_t i = 0; i < seed_count; ++i) {
+    const Index s = seeds.slot[i];
+    result.triangles.offsets[i + 1] = result.triangles.offsets[i] + (s == kNone ? 0 : cell_begin[s + 1] - cell_begin[s]);
+  }
+  result.triangles.values.resize(items.size());
+  parallel_chunks(slots, 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      Index* triangles = result.triangles.values.data() + result.triangles.offsets[seeds.id[s]];
+      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) *triangles++ = surface.summaries[items[k].facet].triangle;
+    }
+  });
+  result.certification = {};
+  result.certification.pairs = items.size();
+  for (const Chunk& chunk : chunks) {
+    result.certification.uncertain += chunk.certification.uncertain;
+    result.certification.wider += chunk.certification.wider;
+  }
+  result.certification.cpu = result.certification.uncertain;
+}
+
+void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
+  result.cells.assign(seed_count, Moments{});
+  parallel_chunks(seeds.x.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+    FixedTreeSum sum;
+    for (std::size_t s = begin; s < end; ++s) {
+      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
+        const FacetSummary& summary = surface.summaries[items[k].facet];
+        sum.add(items[k].moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[s])
+                                           : chunks[items[k].facet / chunk_size].moments[items[k].moments]);
+      }
+      result.cells[seeds.id[s]] = sum.finish();
+    }
+  });
+  set_step_masses(seeds, neighbours, result);
+  result.mass = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].mass; });
+  result.energy = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].second; });
+}
+
+// Moves the seeds of the last diagram in place if these are as many and not far off.
+bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSource source) {
+  if (given.size() != seeds.x.size() || given.size() != seeds.slot.size() || source != built_source) return false;
+  parallel_each(given.size(), [&](std::size_t i) { seeds.x[seeds.slot[i]] = given[i]; });
+  seeds.extent = bounding_box(seeds.x).diagonal();
+  return neighbours.update();
+}
+
+void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,
+                                       bool want_moments, bool want_polygons) {
+  const auto t0 = std::chrono::steady_clock::now();
+  followed = follow(given, source);
+  if (!followed) {
+    seeds = sort_seeds(given);
+    neighbours.build(seeds, source);
+    built_source = source;
+  }
+  const auto t1 = std::chrono::steady_clock::now();
+  find_owners(given.size());
+  const auto t2 = std::chrono::steady_clock::now();
+  clip_facets(want_polygons);
+  list_triangles(given.size(), result);
+  if (want_moments) sum_cells(given.size(), result);
+  const double building = std::chrono::duration<double>(t1 - t0).count();
+  const bool delaunay = source == NeighbourSource::delaunay;
+  result.seconds = {delaunay ? building : 0, delaunay ? 0 : building, std::chrono::duration<double>(t2 - t1).count(),
+                    seconds_since(t2), {}};
+}
+
+// Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of triangles,
+// then cells.
+void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
+  polygons = {};
+  polygons.pairs.reserve(items.size());
+  polygons.offsets.reserve(items.size() + 1);
+  std::size_t entries = 0;
+  for (const Chunk& chunk : chunks) entries += chunk.polygons.labels.size();
+  polygons.labels.reserve(entries);
+  polygons.vertices.reserve(entries);
+  std::vector<std::size_t> order;
+  for (const Index facet : surface.facet_of) {
+    if (facet == kNone) continue;
+    const Chunk& chunk = chunks[facet / chunk_size];
+    const RestrictedPolygons& from = chunk.polygons;
+    order.clear();
+    for (std::size_t k = first_entry[facet]; k < entries_end(facet, chunk, first_entry); ++k) order.push_back(k);
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return from.pairs[a].cell < from.pairs[b].cell; });
+    for (const std::size_t k : order) {
+      polygons.pairs.push_back(from.pairs[k]);
+      const auto begin = static_cast<std::ptrdiff_t>(from.offsets[k]), end = static_cast<std::ptrdiff_t>(from.offsets[k + 1]);
+      polygons.labels.insert(polygons.labels.end(), from.labels.begin() + begin, from.labels.begin() + end);
+      polygons.vertices.insert(polygons.vertices.end(), from.vertices.begin() + begin, from.vertices.begin() + end);
+      polygons.offsets.push_back(polygons.labels.size());
+    }
+  }
+}
+
+DeviceSeconds& DeviceSeconds::operator+=(const DeviceSeconds& b) {
+  transfer += b.transfer;
+  grid += b.grid;
+  neighbours += b.neighbours;
+  owners += b.owners;
+  clip += b.clip;
+  sort += b.sort;
+  sum += b.sum;
+  return *this;
+}
+
+DiagramSeconds& DiagramSeconds::operator+=(const DiagramSeconds& b) {
+  delaunay += b.delaunay;
+  neighbours += b.neighbours;
+  pairs += b.pairs;
+  clip += b.clip;
+  device += b.device;
+  return *this;
+}
+
+RestrictedVoronoi::RestrictedVoronoi(const Surface& surface, ListLength lists)
+    : work_(std::make_unique<Work>(surface, lists)) {}
+RestrictedVoronoi::~RestrictedVoronoi() = default;
+
+void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result) {
+  work_->evaluate(seeds, source, result, true, false);
+}
+
+void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
+                                 RestrictedPolygons& polygons) {
+  work_->evaluate(seeds, source, result, true, true);
+  work_->gather(polygons);
+}
+
+void RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
+                              RestrictedPolygons* polygons) {
+  work_->evaluate(seeds, source, result, false, polygons != nullptr);
+  if (polygons) work_->gather(*polygons);
+}
+
+const SortedSeeds& RestrictedVoronoi::seeds() const { return work_->seeds; }
+const Neighbours& RestrictedVoronoi::neighbours() const { return work_->neighbours; }
+
+}  // namespace bisector

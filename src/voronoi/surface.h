@@ -1,0 +1,54 @@
+// A triangle mesh with a density, prepared as the domain of restricted Voronoi diagrams.
+#pragma once
+
+#include <vector>
+
+#include "core/geometry.h"
+#include "voronoi/moments.h"
+
+namespace bisector {
+
+// Labels of polygon edges on a facet: a seed, or the facet's edge k (from corner k to corner k + 1).
+inline constexpr Index kEdgeLabel = 0x80000000u;
+inline bool is_edge(Index label) { return label & kEdgeLabel; }
+
+// One triangle as the clipping reads it. Edge k runs from corner k to corner k + 1.
+struct Facet {
+  Vec3 corners[3];
+  Vec3 normal;              // unit length
+  double density[3];        // at the corners
+  Vec3 gradient;            // of the density
+  unsigned char anchor;     // the corner of lowest vertex index
+  unsigned char origin[3];  // of each edge: its end of lower vertex index
+  unsigned char rank[3];    // of each edge among the three, by sorted vertex indices
+};
+
+// What is needed of a triangle that lies in one cell.
+struct FacetSummary {
+  Vec3 anchor;      // position of that corner
+  Moments moments;  // of the whole triangle, about the anchor
+  Index site[3];    // of the corners, in Surface::sites
+  Index triangle;   // index in the mesh
+};
+
+// (b - a) x (c - a) at unit length, each coordinate off by at most 60 units of roundoff; the zero vector exactly when the corners
+// are collinear.
+Vec3 facet_normal(const Vec3& a, const Vec3& b, const Vec3& c);
+
+struct Surface {
+  // `density`: one positive value per vertex, linear on each triangle; empty means 1. Throws Error if the mesh has no
+  // area or a density is not positive and finite.
+  explicit Surface(TriangleMesh mesh, std::vector<double> density = {});
+
+  TriangleMesh mesh;
+  std::vector<double> density;       // per vertex, or empty
+  std::vector<Facet> facets;         // in a spatial order; exactly collinear triangles are left out
+  std::vector<FacetSummary> summaries;  // of the facets
+  std::vector<Index> sites;          // the vertices that facets use, in a spatial order
+  std::vector<Index> facet_of;       // of each triangle, or kNone
+  double area = 0;
+  double mass = 0;                   // integral of the density
+  Box box;                           // of the sites
+};
+
+}  // namespace bisector

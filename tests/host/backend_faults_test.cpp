@@ -1,0 +1,515 @@
+// Failing and poor devices: a clear error or a counted fallback, never a wrong or partial result.
+//
+// Needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one ("vulkan:0") that then must be there.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bisector/error.h"
+#include "compute/compute.h"
+#include "backend/cpu_backend.h"
+#include "backend/fallback_backend.h"
+#include "check/parity.h"
+#include "remesh/remesh.h"
+#include "support/diagram.h"
+#include "host/device/faults.h"
+#include "host/passes/vulkan_backend.h"
+#include "support/models.h"
+
+namespace bisector::test {
+namespace {
+
+using host::Device;
+using host::Fault;
+using host::VulkanOptions;
+
+// --- Devices ---
+
+// A request for a device, preferably one with double precision and that is no software; empty where there is none.
+std::string device_word() {
+  if (const char* named = std::getenv("BISECTOR_TEST_DEVICE")) return named;
+  static const DeviceList list = list_devices();
+  for (const Precision precision : {Precision::double_, Precision::automatic})
+    if (const std::string gpu = best_gpu(list, precision); !gpu.empty()) return gpu;
+  for (const bool float64 : {true, false})
+    for (const DeviceDescription& device : list.devices)
+      if (device.rejected.empty() && device.float64 >= float64) return "vulkan:" + std::to_string(device.index);
+  return {};
+}
+
+bool has_double() {
+  static const bool has = Device::open(device_word())->description().float64;
+  return has;
+}
+
+std::string device_name() {
+  static const std::string name = Device::open(device_word())->description().name;
+  return name;
+}
+
+// Skips without a device, and without one that has the precision.
+#define SKIP_WITHOUT_DEVICE(precision)                                                     \
+  if (device_word().empty()) GTEST_SKIP() << "no Vulkan device";                           \
+  if ((precision) == Precision::double_ && !has_double()) GTEST_SKIP() << "no double precision"
+
+std::unique_ptr<Backend> device_backend(const Surface& surface, const VulkanOptions& options) {
+  return host::make_vulkan_backend(surface, Device::open(device_word()), options);
+}
+
+VulkanOptions with_precision(Precision precision) {
+  VulkanOptions options;
+  options.precision = precision;
+  return options;
+}
+
+// No test leaves a fault behind.
+class Faultless : public testing::Test {
+ protected:
+  void TearDown() override { host::inject_fault(Fault::none, 0); }
+};
+
+Context collecting(std::vector<std::string>& warnings) {
+  Context context;
+  context.warning = [&](const std::string& line) { warnings.push_back(line); };
+  return context;
+}
+
+// --- Problems ---
+
+Vec3 turned(double u, double v) { return {0.8 * u - 0.6 * v, 0.6 * u + 0.8 * v, 0}; }
+
+// Seeds near the unit cube's bottom: few spread ones; a cluster, whose cells need wide lists; squares askew, the corners of which
+// only exact arithmetic tells apart; and squares that are a little off, for double precision.
+std::vector<Vec3> hard_seeds(const TriangleMesh& mesh, std::size_t spread) {
+  SplitMix64 random(31);
+  const auto shift = [&](double size) { return size * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)}; };
+  std::vector<Vec3> seeds = random_seeds(mesh, spread, 32);
+  for (int k = 0; k < 60; ++k) seeds.push_back(Vec3{0.9, 0.1, 0} + shift(1e-3));
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      seeds.push_back(Vec3{0.25, 0.25, 0} + turned(0.1 * i, 0.1 * j));
+      seeds.push_back(Vec3{0.25, 0.75, 0} + turned(0.1 * i, 0.1 * j) + shift(1e-7));
+    }
+  return seeds;
+}
+
+std::vector<Vec3> moved(std::vector<Vec3> seeds) {
+  for (Vec3& x : seeds) x += Vec3{0.01, 0.02, 0.001};
+  return seeds;
+}
+
+Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
+  Diagram d;
+  backend.evaluate(seeds, d.moments, d.polygons);
+  return d;
+}
+
+Diagram cpu_diagram(const Surface& surface, const std::vector<Vec3>& seeds) {
+  return test::diagram_of(surface, seeds, NeighbourSource::nearest);
+}
+
+// Combinatorics that are the CPU's, and moments that are so to rounding, or to the bit in double precision.
+void expect_parity(const Surface& surface, const Diagram& reference, const Diagram& found, Precision precision) {
+  const Parity parity = compare(reference.moments, reference.polygons, found.moments, found.polygons, surface);
+  EXPECT_TRUE(parity.same_pairs && parity.same_labels && parity.same_dual);
+  EXPECT_EQ(found.moments.triangles.offsets, reference.moments.triangles.offsets);
+  EXPECT_EQ(found.moments.triangles.values, reference.moments.triangles.values);
+  EXPECT_EQ(found.moments.certification.pairs, reference.polygons.pairs.size());
+  const double cells = precision == Precision::double_ ? 1e-12 : 1e-5;
+  EXPECT_LE(parity.mass_error, cells);
+  EXPECT_LE(parity.centroid_error, cells);
+  EXPECT_LE(parity.energy_error, cells);
+  EXPECT_LE(parity.sum_error, 0.1 * cells);
+  if (precision == Precision::double_) {
+    EXPECT_TRUE(parity.bitwise);
+  }
+}
+
+std::string message_of(const auto& action) {
+  try {
+    action();
+  } catch (const DeviceError& error) {
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    return error.what();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return {};
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+// --- Failures at every call ---
+
+// What a run of a backend gives: cold, then warm with moved seeds, then with polygons.
+struct Results {
+  CellMoments cold, warm;
+  Diagram last;
+  int evaluations = 0;  // that were done
+};
+
+struct FaultProblem {
+  TriangleMesh mesh = box(1);
+  Surface surface{mesh};
+  std::vector<Vec3> first = hard_seeds(mesh, 60), second = moved(first);
+  Diagram reference_first = cpu_diagram(surface, first), reference_second = cpu_diagram(surface, second);
+
+  void run(Backend& backend, Results& results) const {
+    backend.evaluate(first, results.cold);
+    ++results.evaluations;
+    backend.evaluate(second, results.warm);
+    ++results.evaluations;
+    backend.evaluate(first, results.last.moments, results.last.polygons);
+    ++results.evaluations;
+  }
+};
+
+struct Point {
+  std::size_t call;
+  std::string name;
+};
+
+// Where each name occurs first among the calls, and last if that is in another evaluation.
+std::vector<Point> sites(const std::vector<std::string>& names, const std::vector<std::size_t>& ends) {
+  std::map<std::string, std::pair<std::size_t, std::size_t>> calls;
+  for (std::size_t call = 0; call < names.size(); ++call)
+    calls.try_emplace(names[call], call, call).first->second.second = call;
+  std::vector<Point> points;
+  for (const auto& [name, range] : calls) {
+    points.push_back({range.first, name});
+    if (std::ranges::upper_bound(ends, range.first) != std::ranges::upper_bound(ends, range.second))
+      points.push_back({range.second, name});
+  }
+  return points;
+}
+
+class EveryCall : public Faultless, public testing::WithParamInterface<Precision> {
+ protected:
+  // Where a run can fail.
+  std::vector<Point> sites_of(const FaultProblem& problem, Results& results) {
+    std::vector<std::string> names;
+    host::log_fallible_calls(&names);
+    const auto backend = make(problem);
+    std::vector<std::size_t> ends{names.size()};
+    backend->evaluate(problem.first, results.cold);
+    ends.push_back(names.size());
+    backend->evaluate(problem.second, results.warm);
+    ends.push_back(names.size());
+    backend->evaluate(problem.first, results.last.moments, results.last.polygons);
+    ends.push_back(names.size());
+    host::log_fallible_calls(nullptr);
+    made_ = ends.front();
+    ends_ = ends;
+    return sites(names, ends);
+  }
+
+  std::unique_ptr<Backend> make(const FaultProblem& problem) const {
+    return make_backend(problem.surface, {device_word(), GetParam(), NeighbourSource::nearest});
+  }
+
+  void expect_right(const FaultProblem& problem, const Results& results) const {
+    expect_parity(problem.surface, problem.reference_first, results.last, GetParam());
+    EXPECT_TRUE(same_bits(results.cold, results.last.moments));
+    EXPECT_EQ(results.warm.triangles.values, problem.reference_second.moments.triangles.values);
+  }
+
+  std::size_t made_ = 0;            // calls until the backend is made
+  std::vector<std::size_t> ends_;   // and from then on, until each evaluation is done
+};
+
+TEST_P(EveryCall, LeavesAsDeviceError) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  const FaultProblem problem;
+  Results right;
+  const std::vector<Point> points = sites_of(problem, right);
+  expect_right(problem, right);
+  const Certification& rungs = right.cold.certification;
+  EXPECT_GT(rungs.wider, 0u);
+  EXPECT_GT(rungs.cpu, 0u);
+  if (GetParam() == Precision::single && has_double()) {
+    EXPECT_GT(rungs.doubled, 0u);
+  }
+  EXPECT_GT(points.size(), 80u);
+  std::size_t k = GetParam() == Precision::single;
+  for (const Point& point : points) {
+    SCOPED_TRACE(point.name + ", call " + std::to_string(point.call));
+    // The kinds differ in nothing but the message; both at each call take twice the time.
+    const bool lost = ++k % 2 == 0;
+    host::inject_fault(lost ? Fault::device_lost : Fault::out_of_memory, point.call);
+    Results results;
+    try {
+      const auto backend = make(problem);
+      problem.run(*backend, results);
+      ADD_FAILURE() << "it did not fail";
+    } catch (const DeviceError& error) {
+      const std::string text = error.what();
+      EXPECT_FALSE(has(text, "\n")) << text;
+      EXPECT_TRUE(has(text, point.name)) << text;
+      EXPECT_TRUE(has(text, lost ? "lost" : "out of device memory")) << text;
+      EXPECT_TRUE(has(text, "--device cpu")) << text;
+      EXPECT_TRUE(point.call < made_ || has(text, device_name())) << text;
+    } catch (const std::exception& error) {
+      ADD_FAILURE() << "not a DeviceError: " << error.what();
+    }
+    // What came before it is right, and there are no polygons.
+    EXPECT_TRUE(results.evaluations < 1 || same_bits(results.cold, right.cold));
+    EXPECT_TRUE(results.evaluations < 2 || same_bits(results.warm, right.warm));
+    EXPECT_EQ(results.evaluations, std::ranges::upper_bound(ends_.begin() + 1, ends_.end(), point.call) - ends_.begin() - 1);
+    EXPECT_TRUE(results.last.polygons.pairs.empty() && results.last.polygons.labels.empty());
+  }
+  host::inject_fault(Fault::none, 0);
+  Results again;
+  problem.run(*make(problem), again);
+  expect_right(problem, again);
+}
+
+// From the failure on all is the CPU's.
+TEST_P(EveryCall, FallsBackOnce) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  const FaultProblem problem;
+  Results right;
+  const std::vector<Point> points = sites_of(problem, right);
+  constexpr std::size_t kStride = 7;
+  for (std::size_t k = 0; k < points.size(); k += kStride) {
+    if (points[k].call < made_) continue;
+    SCOPED_TRACE(points[k].name + ", call " + std::to_string(points[k].call));
+    std::vector<std::string> warnings;
+    host::inject_fault(Fault::none, 0);
+    auto device = make(problem);
+    FallbackBackend backend(std::move(device), NeighbourSource::nearest, collecting(warnings));
+    host::inject_fault(k % 2 ? Fault::device_lost : Fault::out_of_memory, points[k].call - made_);
+    const auto expect_one = [&](const CellMoments& found, const CellMoments& device_has, const CellMoments& cpu_has) {
+      const bool fell = !backend.description().fallback.empty();
+      EXPECT_EQ(warnings.size(), fell ? 1u : 0u);
+      EXPECT_TRUE(same_bits(found, fell ? cpu_has : device_has));
+    };
+    Results results;
+    backend.evaluate(problem.first, results.cold);
+    expect_one(results.cold, right.cold, problem.reference_first.moments);
+    backend.evaluate(problem.second, results.warm);
+    expect_one(results.warm, right.warm, problem.reference_second.moments);
+    backend.evaluate(problem.first, results.last.moments, results.last.polygons);
+    expect_same_diagram(results.last, problem.reference_first);
+    EXPECT_EQ(results.last.moments.seconds.device.clip, 0);
+    EXPECT_EQ(backend.description().kind, "cpu");
+    EXPECT_TRUE(has(backend.description().fallback, points[k].name)) << backend.description().fallback;
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(has(warnings[0], points[k].name) && !has(warnings[0], "\n")) << warnings[0];
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, EveryCall, testing::Values(Precision::single, Precision::double_),
+                         [](const auto& instance) { return instance.param == Precision::single ? "single" : "double"; });
+
+// --- A whole run ---
+
+class LostInARun : public Faultless {};
+
+TEST_F(LostInARun, GivesTheCpusMesh) {
+  SKIP_WITHOUT_DEVICE(Precision::double_);
+  const Surface surface(torus(24, 16));
+  RemeshOptions options;
+  options.vertices = 250;
+  options.iterations = 8;
+  CpuBackend cpu(surface, NeighbourSource::nearest);
+  const RemeshResult expected = remesh(cpu, {}, options);
+  const auto run = [&](const Context& context) {
+    FallbackBackend backend(device_backend(surface, with_precision(Precision::double_)), NeighbourSource::nearest, context);
+    return remesh(backend, {}, options, context);
+  };
+  std::vector<std::string> warnings;
+  host::inject_fault(Fault::none, 0);
+  const RemeshResult whole = run(collecting(warnings));
+  EXPECT_EQ(whole.device.fallback, "");
+  EXPECT_TRUE(warnings.empty());
+  const std::size_t calls = host::fallible_calls();
+  for (const double share : {0.4, 0.99}) {
+    warnings.clear();
+    host::inject_fault(Fault::device_lost, static_cast<std::size_t>(share * static_cast<double>(calls)));
+    const RemeshResult found = run(collecting(warnings));
+    EXPECT_TRUE(has(found.device.fallback, "lost")) << found.device.fallback;
+    EXPECT_EQ(found.device.kind, "cpu");
+    EXPECT_EQ(warnings.size(), 1u);
+    EXPECT_GT(found.seconds.diagrams.device.clip + found.seconds.diagrams.device.transfer, 0);
+    EXPECT_EQ(found.evaluations, expected.evaluations);
+    EXPECT_TRUE(found.mesh.triangles == expected.mesh.triangles);
+    EXPECT_TRUE(same_bits(found.mesh.vertices, expected.mesh.vertices));
+    EXPECT_TRUE(same_bits(found.energy, expected.energy));
+  }
+  EXPECT_TRUE(same_bits(whole.mesh.vertices, expected.mesh.vertices));
+}
+
+// --- Without double precision ---
+
+std::unique_ptr<Device> device_without_double() {
+  std::unique_ptr<Device> device = Device::open(device_word());
+  host::hide_float64(*device);
+  return device;
+}
+
+TEST(WithoutDouble, IsRefusedIfAskedForDouble) {
+  SKIP_WITHOUT_DEVICE(Precision::single);
+  const Surface surface(box(1));
+  const std::string text = message_of(
+      [&] { host::make_vulkan_backend(surface, device_without_double(), with_precision(Precision::double_)); });
+  EXPECT_TRUE(has(text, device_name()) && has(text, "double precision") && has(text, "--precision single")) << text;
+}
+
+TEST(WithoutDouble, IsSingleAndUncertainPairsReachTheCpu) {
+  SKIP_WITHOUT_DEVICE(Precision::single);
+  const FaultProblem problem;
+  for (const Precision precision : {Precision::automatic, Precision::single}) {
+    const auto backend = host::make_vulkan_backend(problem.surface, device_without_double(), with_precision(precision));
+    EXPECT_EQ(backend->description().precision, "single");
+    const Diagram found = diagram_of(*backend, problem.first);
+    expect_parity(problem.surface, problem.reference_first, found, Precision::single);
+    EXPECT_EQ(found.moments.certification.doubled, 0u);
+    EXPECT_GT(found.moments.certification.cpu, 0u);
+    if (!has_double()) continue;
+    const auto better = device_backend(problem.surface, with_precision(Precision::single));
+    const Certification rungs = diagram_of(*better, problem.first).moments.certification;
+    EXPECT_LT(rungs.cpu, found.moments.certification.cpu);
+    VulkanOptions options = with_precision(Precision::single);
+    options.double_rung = false;
+    const auto off = device_backend(problem.surface, options);
+    EXPECT_TRUE(same_bits(diagram_of(*off, problem.first).moments, found.moments));
+  }
+}
+
+// --- Too little room ---
+
+class Room : public testing::TestWithParam<Precision> {};
+
+TEST_P(Room, Grows) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  const TriangleMesh mesh = torus(32, 20);
+  const Surface surface(mesh);
+  std::vector<Vec3> seeds = random_seeds(mesh, 500, 33);
+  for (const Vec3& x : hard_seeds(mesh, 1)) seeds.push_back(x);
+  const Diagram reference = cpu_diagram(surface, seeds);
+  const Diagram roomy = diagram_of(*device_backend(surface, with_precision(GetParam())), seeds);
+  expect_parity(surface, reference, roomy, GetParam());
+  const auto check = [&](const char* what, const host::Rooms& rooms) {
+    SCOPED_TRACE(what);
+    VulkanOptions options = with_precision(GetParam());
+    options.rooms = rooms;
+    const auto backend = device_backend(surface, options);
+    for (const char* round : {"cold", "warm"}) {
+      SCOPED_TRACE(round);
+      const Diagram found = diagram_of(*backend, seeds);
+      EXPECT_TRUE(same_bits(found.moments, roomy.moments));
+      expect_parity(surface, reference, found, GetParam());
+      EXPECT_EQ(found.moments.certification.cpu, roomy.moments.certification.cpu);
+    }
+  };
+  const host::Rooms plenty;
+  check("table", {plenty.batch_pairs, 64, plenty.proposals, 0});
+  check("proposals", {plenty.batch_pairs, plenty.table, 64, 0});
+  check("pairs", {plenty.batch_pairs, plenty.table, plenty.proposals, 64});
+  check("batches", {100, plenty.table, plenty.proposals, 0});
+  check("all", {100, 16, 16, 16});
+}
+
+TEST_P(Room, FacetsComeInChunks) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  constexpr std::size_t kRange = std::size_t{9} << 19, kFacets = kRange / 192;
+  const TriangleMesh mesh = torus(180, 140);
+  const Surface surface(mesh);
+  ASSERT_GT(surface.facets.size(), 2 * kFacets);
+  const std::vector<Vec3> seeds = random_seeds(mesh, 3000, 34);
+  std::unique_ptr<Device> device = Device::open(device_word());
+  host::limit_storage_range(*device, kRange);
+  VulkanOptions options = with_precision(GetParam());
+  options.rooms = {10'000, 1 << 15, 1 << 16, 0};
+  const auto backend = host::make_vulkan_backend(surface, std::move(device), options);
+  const Diagram reference = cpu_diagram(surface, seeds);
+  for (int round = 0; round < 2; ++round)
+    expect_parity(surface, reference, diagram_of(*backend, seeds), GetParam());
+}
+
+TEST_P(Room, EndsAtWhatTheDeviceBinds) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  const TriangleMesh mesh = torus(32, 20);
+  const Surface surface(mesh);
+  const std::vector<Vec3> seeds = random_seeds(mesh, 20'000, 35);
+  for (const std::size_t range : {std::size_t{100} << 10, std::size_t{600} << 10}) {
+    SCOPED_TRACE(range);
+    const std::string text = message_of([&] {
+      std::unique_ptr<Device> device = Device::open(device_word());
+      host::limit_storage_range(*device, range);
+      VulkanOptions options = with_precision(GetParam());
+      options.rooms = {10'000, 64, 64, 64};
+      const auto backend = host::make_vulkan_backend(surface, std::move(device), options);
+      CellMoments moments;
+      backend->evaluate(seeds, moments);
+    });
+    EXPECT_TRUE(has(text, device_name()) && has(text, "--device cpu")) << text;
+  }
+}
+
+// A cell with very many sides in one facet.
+TEST_P(Room, PolygonsWithManyCorners) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  const Surface surface(single_triangle());
+  for (const int sides : {16, 17, 48, 49, 300}) {
+    SCOPED_TRACE(sides);
+    const Vec3 centre{2.3, 2.2, 0};
+    std::vector<Vec3> seeds{centre};
+    for (int k = 0; k < sides; ++k) {
+      const double angle = 2 * std::numbers::pi * (k + 0.1) / sides;
+      seeds.push_back(centre + Vec3{std::cos(angle), std::sin(angle), 0});
+    }
+    const Diagram reference = cpu_diagram(surface, seeds);
+    ASSERT_EQ(reference.polygons.offsets[1], static_cast<std::size_t>(sides));
+    for (const NeighbourSource source : {NeighbourSource::nearest, NeighbourSource::delaunay}) {
+      VulkanOptions options = with_precision(GetParam());
+      options.neighbours = source;
+      const Diagram found = diagram_of(*device_backend(surface, options), seeds);
+      expect_parity(surface, reference, found, GetParam());
+      const Certification& rungs = found.moments.certification;
+      EXPECT_TRUE(sides <= 16 || rungs.wider > 0 || rungs.cpu > 0);
+      EXPECT_TRUE(sides <= 48 || rungs.cpu > 0);
+    }
+  }
+}
+
+// A cell with twenty thousand neighbours, all of which the clipping has to look at: more steps than some drivers' loops have.
+TEST_P(Room, CellsWithManyNeighbours) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  constexpr int kCount = 20'000;
+  SplitMix64 random(36);
+  std::vector<Vec3> seeds{{0, 0, 0}};
+  for (int k = 0; k < kCount; ++k) {
+    const double z = 1 - (2 * k + 1.0) / kCount, r = std::sqrt(1 - z * z), angle = 2.399963229728653 * k;
+    seeds.push_back(random.range(1, 1 + 1e-6) * Vec3{r * std::cos(angle), r * std::sin(angle), z});
+  }
+  // Thin, from the centre to a little beyond the cell.
+  const Surface surface(TriangleMesh{{{-0.01, 0, 0.003}, {0.55, 0.001, 0.1}, {0.54, 0.004, 0.11}, {-0.2, 0.3, 0}},
+                                     {{0, 1, 2}, {0, 2, 3}}, {}});
+  const Diagram reference = cpu_diagram(surface, seeds);
+  for (const NeighbourSource source : {NeighbourSource::nearest, NeighbourSource::delaunay}) {
+    SCOPED_TRACE(source == NeighbourSource::nearest ? "nearest" : "delaunay");
+    VulkanOptions options = with_precision(GetParam());
+    options.neighbours = source;
+    const Diagram found = diagram_of(*device_backend(surface, options), seeds);
+    expect_parity(surface, reference, found, GetParam());
+    // llvmpipe's loops end early, which must be noticed.
+    if (device_name().starts_with("llvmpipe")) {
+      EXPECT_GT(found.moments.certification.cpu, 0u);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, Room, testing::Values(Precision::single, Precision::double_),
+                         [](const auto& instance) { return instance.param == Precision::single ? "single" : "double"; });
+
+}  // namespace
+}  // namespace bisector::test

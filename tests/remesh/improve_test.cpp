@@ -1,0 +1,416 @@
+// The quality pass: its model of the dual against the dual itself, and what it may and may not do to a mesh.
+#include "remesh/improve.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include "bisector/error.h"
+#include "cvt/constrain.h"
+#include "backend/cpu_backend.h"
+#include "cvt/multilevel.h"
+#include "mesh/quality.h"
+#include "remesh/feature_recovery.h"
+#include "remesh/feature_seeds.h"
+#include "remesh/improve_patch.h"
+#include "remesh/topology_control.h"
+#include "support/diagram.h"
+#include "support/models.h"
+
+namespace bisector::test {
+namespace {
+
+using Kind = SeedPlace::Kind;
+
+// --- The cost of a triangle ---
+
+const ShapeGoal kGoal = shape_goal(40, 91);
+
+// Isosceles with an apex of so many degrees.
+std::array<Vec3, 3> isosceles(double apex) {
+  const double half = apex / 2 * std::numbers::pi / 180;
+  return {Vec3{0, 0, 0}, Vec3{std::sin(half), std::cos(half), 0}, Vec3{-std::sin(half), std::cos(half), 0}};
+}
+
+TEST(ShapeCost, IsZeroForEquilateralTrianglesAndGrowsAwayFromThem) {
+  const auto cost = [](double apex) {
+    const auto [a, b, c] = isosceles(apex);
+    return shape_cost(a, b, c, kGoal);
+  };
+  EXPECT_NEAR(cost(60), 0, 1e-12);
+  for (double apex = 60; apex < 175; apex += 1) EXPECT_LT(cost(apex), cost(apex + 1)) << apex;
+  for (double apex = 60; apex > 2; apex -= 1) EXPECT_LT(cost(apex), cost(apex - 1)) << apex;
+}
+
+TEST(ShapeCost, DependsOnShapeAlone) {
+  SplitMix64 random(3);
+  for (int trial = 0; trial < 100; ++trial) {
+    Vec3 p[3];
+    for (Vec3& x : p) x = {random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    const double cost = shape_cost(p[0], p[1], p[2], kGoal);
+    const Vec3 shift{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    Vec3 q[3];
+    for (int k = 0; k < 3; ++k) q[k] = 7.5 * Vec3{p[k].y, p[k].z, p[k].x} + shift;
+    EXPECT_NEAR(shape_cost(q[1], q[2], q[0], kGoal), cost, 1e-9 * cost);
+    EXPECT_NEAR(shape_cost(q[1], q[0], q[2], kGoal), cost, 1e-9 * cost);
+  }
+}
+
+TEST(ShapeExcess, IsTheAnglesBeyondTheGoal) {
+  for (double apex = 5; apex < 170; apex += 5) {
+    const auto [a, b, c] = isosceles(apex);
+    const ShapeExcess excess = shape_excess(a, b, c, kGoal);
+    const double base = (180 - apex) / 2;
+    EXPECT_NEAR(excess.under, std::max(0.0, 40 - std::min(apex, base)), 1e-6);
+    EXPECT_NEAR(excess.over, std::max(0.0, std::max(apex, base) - 91), 1e-6);
+  }
+}
+
+// --- The patch ---
+
+Csr<Index> rings_of(const Dual& dual, std::size_t seeds) {
+  std::vector<std::vector<Index>> rings(seeds);
+  for (const Triangle& t : dual.triangles)
+    for (int m = 0; m < 3; ++m)
+      for (const Index w : {t[(m + 1) % 3], t[(m + 2) % 3]}) rings[t[m]].push_back(w);
+  Csr<Index> csr;
+  for (std::vector<Index>& ring : rings) {
+    std::sort(ring.begin(), ring.end());
+    ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
+    csr.values.insert(csr.values.end(), ring.begin(), ring.end());
+    csr.offsets.push_back(csr.values.size());
+  }
+  return csr;
+}
+
+// The whole dual of seeds on a surface as a patch.
+struct WholePatch {
+  explicit WholePatch(TriangleMesh mesh, std::vector<Vec3> given)
+      : surface(std::move(mesh)), seeds(std::move(given)), diagram(diagram_of(surface, seeds, NeighbourSource::nearest)),
+        dual(extract_dual(diagram.polygons)), rings(rings_of(dual, seeds.size())),
+        map(surface, seeds, diagram.moments.triangles, rings), patch(map, nullptr, kGoal) {
+    for (Index v = 0; v < seeds.size(); ++v) {
+      PatchVertex vertex;
+      vertex.x = seeds[v];
+      vertex.owner = vertex.seed = v;
+      vertex.free = true;
+      map.project(vertex.x, vertex.owner, vertex.normal);
+      patch.add_vertex(vertex);
+    }
+    for (const Triangle& t : dual.triangles) patch.add_triangle(t);
+  }
+
+  Surface surface;
+  std::vector<Vec3> seeds;
+  Diagram diagram;
+  Dual dual;
+  Csr<Index> rings;
+  CellMap map;
+  ImprovePatch patch;
+};
+
+std::vector<Triangle> normalised(std::vector<Triangle> triangles) {
+  for (Triangle& t : triangles) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  std::sort(triangles.begin(), triangles.end());
+  return triangles;
+}
+
+// In the plane the dual is a part of the Delaunay triangulation, and flips lead back to it from anywhere.
+TEST(ImprovePatch, FlipsLeadBackToTheDualInThePlane) {
+  for (std::uint64_t random_seed : {1u, 2u, 3u}) {
+    WholePatch whole(grid_patch(4, 4), random_seeds(grid_patch(4, 4), 120, random_seed));
+    ImprovePatch& patch = whole.patch;
+    const std::vector<Triangle> dual = normalised(whole.dual.triangles);
+    EXPECT_EQ(normalised(patch.triangles()), dual);
+    patch.make_delaunay();
+    EXPECT_EQ(normalised(patch.triangles()), dual);
+    SplitMix64 random(random_seed);
+    std::size_t flips = 0;
+    for (int trial = 0; trial < 400; ++trial) {
+      const std::vector<Triangle> triangles = patch.triangles();
+      const Triangle& t = triangles[random.below(triangles.size())];
+      flips += patch.flip(t[0], t[1]);
+    }
+    EXPECT_GT(flips, 50u);
+    EXPECT_NE(normalised(patch.triangles()), dual);
+    for (int k = 0; k < 20; ++k) patch.make_delaunay();
+    EXPECT_EQ(normalised(patch.triangles()), dual);
+  }
+}
+
+TEST(ImprovePatch, LockedEdgesStay) {
+  WholePatch whole(grid_patch(4, 4), random_seeds(grid_patch(4, 4), 120, 4));
+  const Triangle& t = whole.dual.triangles[100];
+  whole.patch.lock({{std::min(t[0], t[1]), std::max(t[0], t[1])}});
+  EXPECT_FALSE(whole.patch.flip(t[0], t[1]));
+}
+
+TEST(ImprovePatch, OperationsKeepASphereASphere) {
+  WholePatch whole(icosphere(4), random_seeds(icosphere(4), 150, 5));
+  ImprovePatch& patch = whole.patch;
+  SplitMix64 random(6);
+  long long vertices = 150;
+  int removed = 0, added = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const std::vector<Triangle> triangles = patch.triangles();
+    const std::size_t k = random.below(triangles.size());
+    const auto [a, b, c] = triangles[k];
+    switch (random.below(4)) {
+      case 0: removed += patch.remove(a); break;
+      case 1: added += patch.split(a, b); break;
+      case 2: added += patch.insert(patch.largest_triangle(a)); break;
+      default: patch.flip(b, c);
+    }
+    const MeshTopology topology = analyse_topology(patch.triangles(), patch.vertices().size());
+    ASSERT_TRUE(topology.manifold && topology.closed && topology.oriented);
+    ASSERT_EQ(topology.euler, 2);
+    ASSERT_EQ(patch.triangles().size(), 2 * static_cast<std::size_t>(vertices + added - removed) - 4);
+  }
+  EXPECT_GT(removed, 20);
+  EXPECT_GT(added, 20);
+}
+
+TEST(ImprovePatch, RelaxingNeverCostsAndStaysOnTheSurface) {
+  WholePatch whole(icosphere(4), random_seeds(icosphere(4), 150, 7));
+  ImprovePatch& patch = whole.patch;
+  double cost = patch.cost(0, 0);
+  const double first = cost;
+  for (int sweep = 0; sweep < 5; ++sweep)
+    for (Index v = 0; v < patch.vertices().size(); ++v) {
+      const bool moved = patch.relax(v, 0);
+      const double next = patch.cost(0, 0);
+      EXPECT_EQ(moved, next < cost);
+      cost = next;
+    }
+  EXPECT_LT(cost, 0.5 * first);
+  for (const PatchVertex& vertex : patch.vertices()) {
+    double nearest = 1;
+    for (const Facet& f : whole.surface.facets)
+      nearest = std::min(nearest, norm2(nearest_on_triangle(vertex.x, f.corners[0], f.corners[1], f.corners[2]) - vertex.x));
+    EXPECT_LT(nearest, 1e-28);
+  }
+}
+
+// A seed that is held stays nearer to where it was, the more so the more it is held.
+TEST(ImprovePatch, HoldingLimitsTheWay) {
+  double last = 1e9;
+  for (const double hold : {0.0, 10.0, 1000.0}) {
+    WholePatch whole(icosphere(4), random_seeds(icosphere(4), 150, 7));
+    double way = 0;
+    for (int sweep = 0; sweep < 5; ++sweep)
+      for (Index v = 0; v < 150; ++v) whole.patch.relax(v, hold);
+    for (Index v = 0; v < 150; ++v) way += norm2(whole.patch.vertices()[v].x - whole.seeds[v]);
+    EXPECT_LT(way, last);
+    last = way;
+  }
+}
+
+// --- The pass ---
+
+struct Problem {
+  Problem(const TriangleMesh& mesh, std::size_t count, int iterations, FeatureGraph graph = {})
+      : surface(mesh), backend(surface, NeighbourSource::nearest), curves(graph, surface.mesh.vertices),
+        trace(surface, curves), input(analyse_topology(mesh.triangles, mesh.vertices.size())) {
+    step.iterations = iterations;
+    step.constrained = true;
+    step.curves = &curves;
+    const CurveMeasure measure(surface, curves);
+    PlacedSeeds placed;
+    if (curves.size() > 0) placed = seeds_on_features(curves, measure, measure.scale(count));
+    state.seeds = initial_seeds(surface, count - placed.seeds.size(), 1);
+    state.seeds.insert(state.seeds.begin(), placed.seeds.begin(), placed.seeds.end());
+    if (curves.size() > 0) {
+      state.places = placed.places;
+      state.places.resize(count);
+    }
+    optimise(backend, state, step, totals, {});
+    if (curves.size() > 0)
+      recover_features(backend, state, polygons, trace, measure, measure.scale(count), step, totals, {});
+    backend.evaluate(state.seeds, state.moments, polygons);
+    before = state;
+    quality_before = quality();
+  }
+
+  QualityReport quality() const { return measure_quality(dual_mesh(state.seeds, polygons)); }
+  ImproveReport improve_to(std::size_t count, double min_angle = 40, const Context& context = {}) {
+    return improve(backend, state, polygons, trace, {min_angle, 91, count}, step, totals, context);
+  }
+  // That state and polygons belong together and nothing is worse than before.
+  void expect_sound(std::size_t count) {
+    EXPECT_EQ(state.seeds.size(), count);
+    const Diagram d = diagram_of(surface, state.seeds, NeighbourSource::nearest);
+    EXPECT_EQ(triples_of(polygons), triples_of(d.polygons));
+    expect_same_moments(state.moments, d.moments);
+    EXPECT_EQ(state.gradient.size(), count);
+    const QualityReport after = quality(), &was = quality_before;
+    EXPECT_TRUE(same_topology(after.topology, input));
+    EXPECT_GE(after.theta_min, std::min(was.theta_min, 40.0) - 1e-9);
+    EXPECT_LE(after.theta_max, std::max(was.theta_max, 91.0) + 1e-9);
+    EXPECT_GE(after.q_ave, was.q_ave);
+    EXPECT_GE(after.theta_min_ave, was.theta_min_ave);
+    const double tolerance = 1e-12 * bounding_box(surface.mesh.vertices).diagonal();
+    for (const Vec3& x : state.seeds) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Facet& f : surface.facets)
+        nearest = std::min(nearest, norm2(nearest_on_triangle(x, f.corners[0], f.corners[1], f.corners[2]) - x));
+      EXPECT_LE(std::sqrt(nearest), tolerance);
+    }
+  }
+
+  Surface surface;
+  CpuBackend backend;
+  FeatureCurves curves;
+  FeatureTrace trace;
+  MeshTopology input;
+  OptimiseOptions step;
+  OptimiseTotals totals;
+  CvtState state, before;
+  RestrictedPolygons polygons;
+  QualityReport quality_before;
+};
+
+// Few steps leave poor triangles, as a bad local minimum would.
+TEST(Improve, MendsSmoothSurfaces) {
+  for (const TriangleMesh& mesh : {icosphere(4), torus(80, 48)}) {
+    Problem run(mesh, 600, 8);
+    ASSERT_LT(run.quality_before.theta_min, 40);
+    const ImproveReport report = run.improve_to(600);
+    run.expect_sound(600);
+    EXPECT_EQ(report.missed, 0u);
+    EXPECT_GE(run.quality().theta_min, 40);
+    EXPECT_LE(run.quality().theta_max, 91);
+    EXPECT_GE(run.quality().valence6, run.quality_before.valence6);
+  }
+}
+
+TEST(Improve, CountsTheTrianglesThatItMissed) {
+  Problem run(icosphere(4), 300, 10);
+  const ImproveReport report = run.improve_to(300, 55);
+  const TriangleMesh mesh = dual_mesh(run.state.seeds, run.polygons);
+  std::size_t missed = 0;
+  for (const auto& [a, b, c] : mesh.triangles)
+    missed += shape_excess(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], shape_goal(55, 91)).most() > 0;
+  EXPECT_GT(missed, 0u);
+  EXPECT_EQ(report.missed, missed);
+}
+
+TEST(Improve, MeetsTheCount) {
+  for (const int off : {-3, 4}) {
+    Problem run(icosphere(4), static_cast<std::size_t>(400 + off), 25);
+    const ImproveReport report = run.improve_to(400);
+    run.expect_sound(400);
+    EXPECT_EQ(static_cast<int>(report.inserted) - static_cast<int>(report.removed), -off);
+  }
+}
+
+// Of equal seeds the first owns everything, the others are no vertices.
+TEST(Improve, ReplacesSeedsThatOwnNothing) {
+  Problem run(icosphere(4), 300, 25);
+  run.state.seeds[7] = run.state.seeds[8] = run.state.seeds[20];
+  run.backend.evaluate(run.state.seeds, run.state.moments, run.polygons);
+  run.quality_before = run.quality();
+  ASSERT_EQ(dual_mesh(run.state.seeds, run.polygons).vertices.size(), 298u);
+  run.improve_to(300);
+  run.expect_sound(300);
+  EXPECT_EQ(dual_mesh(run.state.seeds, run.polygons).vertices.size(), 300u);
+}
+
+// Every edge of the cube is a curve, every corner of it a corner.
+FeatureGraph cube_features(const TriangleMesh& mesh) {
+  FeatureGraph graph = detect_features(mesh);
+  EXPECT_EQ(graph.curves.size(), 12u);
+  EXPECT_EQ(graph.corners.size(), 8u);
+  return graph;
+}
+
+TEST(Improve, KeepsFeatures) {
+  const TriangleMesh mesh = box(8);
+  Problem run(mesh, 700, 15, cube_features(mesh));
+  ASSERT_TRUE(check_features(run.trace, run.curves, run.state.places, run.polygons).broken.empty());
+  run.improve_to(700);
+  run.expect_sound(700);
+  EXPECT_TRUE(check_features(run.trace, run.curves, run.state.places, run.polygons).broken.empty());
+  ASSERT_EQ(run.state.places.size(), run.state.seeds.size());
+  std::vector<int> at_corner(8, 0);
+  for (std::size_t i = 0; i < run.state.seeds.size(); ++i) {
+    const SeedPlace& place = run.state.places[i];
+    const Vec3& x = run.state.seeds[i];
+    if (place.corner != kNone) {
+      ++at_corner[place.corner];
+      EXPECT_EQ(x, run.curves.corner(place.corner));
+    } else if (place.kind == Kind::curve) {
+      EXPECT_EQ(x, run.curves.point(place.curve, place.position));
+    }
+  }
+  EXPECT_EQ(at_corner, std::vector<int>(8, 1));
+  // A seed that recovery fixed on a curve may go, but not move.
+  for (std::size_t i = 0; i < run.state.seeds.size(); ++i) {
+    if (run.state.places[i].kind != Kind::fixed) continue;
+    const auto was = std::find(run.before.seeds.begin(), run.before.seeds.end(), run.state.seeds[i]);
+    ASSERT_NE(was, run.before.seeds.end());
+    EXPECT_EQ(run.before.places[static_cast<std::size_t>(was - run.before.seeds.begin())].kind, Kind::fixed);
+  }
+}
+
+// Where a border is no feature, its seeds would creep inwards.
+TEST(Improve, LeavesSeedsAtABorderWhereTheyAre) {
+  Problem run(wavy_patch(40), 400, 25);
+  const auto border = [](const Problem& r) {
+    std::map<std::array<Index, 2>, int> edges;
+    for (const Triangle& t : triples_of(r.polygons))
+      for (int m = 0; m < 3; ++m) ++edges[{std::min(t[m], t[(m + 1) % 3]), std::max(t[m], t[(m + 1) % 3])}];
+    std::vector<std::array<double, 3>> ends;
+    for (const auto& [e, count] : edges)
+      if (count == 1)
+        for (const Index v : e) ends.push_back({r.state.seeds[v].x, r.state.seeds[v].y, r.state.seeds[v].z});
+    std::sort(ends.begin(), ends.end());
+    return ends;
+  };
+  const auto before = border(run);
+  EXPECT_FALSE(before.empty());
+  run.improve_to(400);
+  run.expect_sound(400);
+  EXPECT_EQ(border(run), before);
+}
+
+TEST(Improve, RepeatsWithAnyNumberOfThreads) {
+  std::vector<Vec3> reference;
+  for (const unsigned threads : {1u, 2u, 3u}) {
+    const ThreadLimit limit(threads);
+    Problem run(torus(80, 48), 500, 15);
+    run.improve_to(500);
+    if (reference.empty()) reference = run.state.seeds;
+    EXPECT_TRUE(same_bits(run.state.seeds, reference));
+  }
+}
+
+TEST(Improve, CanBeCancelled) {
+  Problem run(icosphere(3), 100, 5);
+  std::atomic<bool> cancel = true;
+  Context context;
+  context.cancel = &cancel;
+  EXPECT_THROW(run.improve_to(100, 40, context), Cancelled);
+}
+
+// Duals that are not manifold, seeds that are too few: nothing to win, nothing to lose.
+TEST(Improve, LeavesHardInputsNoWorse) {
+  for (const TriangleMesh& mesh : {pages(), soup(40, 2), box(1), two_spheres()})
+    for (const std::size_t count : {6u, 60u}) {
+      Problem run(mesh, count, 10);
+      const QualityReport was = run.quality_before;
+      run.improve_to(count);
+      const QualityReport after = run.quality();
+      EXPECT_EQ(after.topology.euler, was.topology.euler);
+      EXPECT_EQ(after.topology.manifold, was.topology.manifold);
+      EXPECT_GE(after.theta_min, std::min(was.theta_min, 40.0) - 1e-9);
+      EXPECT_LE(after.theta_max, std::max(was.theta_max, 91.0) + 1e-9);
+    }
+}
+
+}  // namespace
+}  // namespace bisector::test

@@ -1,0 +1,275 @@
+// Remeshing end to end on generated surfaces: counts, topology, quality, reproducibility, and input it has to refuse.
+#include "remesh/remesh.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "bisector/error.h"
+#include "cvt/constrain.h"
+#include "mesh/quality.h"
+#include "support/diagram.h"
+#include "support/models.h"
+
+namespace bisector::test {
+namespace {
+
+struct Case {
+  std::string name;
+  TriangleMesh mesh;
+  std::size_t vertices;
+  bool smooth;  // and closed: no sharp edges that cells have to straddle
+};
+
+void PrintTo(const Case& problem, std::ostream* out) { *out << problem.name; }
+
+std::vector<Case> cases() {
+  return {{"icosphere_300", icosphere(4), 300, true},    {"icosphere_2000", icosphere(5), 2000, true},
+          {"torus_600", torus(80, 48), 600, true},       {"torus_2000", torus(80, 48), 2000, true},
+          {"two_spheres_500", two_spheres(), 500, false}, {"box_1000", box(4), 1000, false},
+          {"box_of_12_500", box(1), 500, false},         {"wavy_patch_700", wavy_patch(40), 700, false}};
+}
+
+RemeshOptions options_for(std::size_t vertices) {
+  RemeshOptions options;
+  options.vertices = vertices;
+  return options;
+}
+
+double distance_to(const TriangleMesh& mesh, const Vec3& p) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const auto& [a, b, c] : mesh.triangles)
+    best = std::min(best, norm2(nearest_on_triangle(p, mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]) - p));
+  return std::sqrt(best);
+}
+
+bool same_mesh(const TriangleMesh& a, const TriangleMesh& b) {
+  return a.triangles == b.triangles && same_bits(a.vertices, b.vertices);
+}
+
+class Remesh : public testing::TestWithParam<Case> {};
+
+TEST_P(Remesh, KeepsTheTopologyAndMakesGoodTriangles) {
+  const auto& [name, mesh, vertices, smooth] = GetParam();
+  const RemeshResult result = remesh(mesh, options_for(vertices));
+  const MeshTopology want = analyse_topology(mesh.triangles, mesh.vertices.size());
+  const MeshTopology got = analyse_topology(result.mesh.triangles, result.mesh.vertices.size());
+  EXPECT_EQ(result.mesh.vertices.size(), vertices);
+  EXPECT_TRUE(got.manifold);
+  EXPECT_TRUE(got.oriented);
+  EXPECT_EQ(got.closed, want.closed);
+  EXPECT_EQ(got.euler, want.euler);
+  EXPECT_EQ(got.components, want.components);
+  EXPECT_EQ(got.boundary_edges == 0, want.boundary_edges == 0);
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_EQ(result.topology.euler, got.euler);
+  EXPECT_EQ(result.input_topology.euler, want.euler);
+  EXPECT_EQ(result.untiled, 0u);
+  EXPECT_EQ(count_self_intersections(result.mesh), 0u);
+  EXPECT_GT(result.iterations, 0);
+  EXPECT_GE(result.evaluations, result.iterations);
+  const QualityReport quality = measure_quality(result.mesh);
+  EXPECT_GT(quality.q_ave, 0.8);
+  if (smooth) {
+    EXPECT_GT(quality.theta_min, 25);
+    EXPECT_GT(quality.q_ave, 0.9);
+    EXPECT_GT(quality.theta_min_ave, 50);
+    EXPECT_GT(quality.valence6, 0.7);
+  }
+  const double tolerance = 1e-9 * bounding_box(mesh.vertices).diagonal();
+  for (const Vec3& x : result.mesh.vertices) ASSERT_LE(distance_to(mesh, x), tolerance);
+  // Oriented as the input: the signed volumes agree in sign, and closely for fine meshes.
+  if (!want.closed) return;
+  const auto volume = [](const TriangleMesh& m) {
+    double sum = 0;
+    for (const auto& [a, b, c] : m.triangles) sum += dot(m.vertices[a], cross(m.vertices[b], m.vertices[c])) / 6;
+    return sum;
+  };
+  EXPECT_NEAR(volume(result.mesh), volume(mesh), 0.15 * volume(mesh));
+}
+
+TEST_P(Remesh, IsReproducible) {
+  const auto& [name, mesh, vertices, smooth] = GetParam();
+  RemeshOptions options = options_for(std::min<std::size_t>(vertices, 600));
+  options.threads = 1;
+  const TriangleMesh reference = remesh(mesh, options).mesh;
+  options.threads = 2;
+  EXPECT_TRUE(same_mesh(remesh(mesh, options).mesh, reference)) << "2 threads";
+  options.random_seed = 2;
+  EXPECT_FALSE(same_mesh(remesh(mesh, options).mesh, reference)) << "another random seed";
+}
+
+TEST_P(Remesh, IsTheSameFromEitherSourceOfNeighbours) {
+  const auto& [name, mesh, vertices, smooth] = GetParam();
+  RemeshOptions options = options_for(std::min<std::size_t>(vertices, 600));
+  const TriangleMesh reference = remesh(mesh, options).mesh;
+  options.compute.neighbours = NeighbourSource::delaunay;
+  EXPECT_TRUE(same_mesh(remesh(mesh, options).mesh, reference));
+}
+
+INSTANTIATE_TEST_SUITE_P(Surfaces, Remesh, testing::ValuesIn(cases()),
+                         [](const auto& instance) { return instance.param.name; });
+
+// A plate whose cells reach through it wherever they are wider than it is thick.
+TEST(RemeshThin, APlateKeepsItsTwoSides) {
+  TriangleMesh plate = box(8);
+  for (Vec3& v : plate.vertices) v.z *= 0.02;
+  for (std::uint64_t random_seed : {1u, 2u, 3u}) {
+    RemeshOptions options = options_for(3000);
+    options.random_seed = random_seed;
+    const RemeshResult result = remesh(plate, options);
+    EXPECT_EQ(result.mesh.vertices.size(), 3000u);
+    EXPECT_TRUE(result.topology_matches) << "random seed " << random_seed;
+    EXPECT_EQ(result.topology.euler, 2);
+    EXPECT_TRUE(result.topology.manifold && result.topology.closed);
+    EXPECT_EQ(result.untiled, 0u);
+  }
+}
+
+// Whatever the dual is, it is reported for what it is.
+TEST(RemeshHard, NonManifoldInputRunsAndReports) {
+  const std::vector<Case> hard{{"pages", pages(), 300, false},
+                               {"soup", soup(60, 5), 400, false},
+                               {"duplicated", duplicated_triangles(), 100, false},
+                               {"needles", needles(), 100, false},
+                               {"collinear", collinear_among_good(), 100, false}};
+  for (const auto& [name, mesh, vertices, smooth] : hard)
+    for (TopologyControl control : {TopologyControl::enforce, TopologyControl::check}) {
+      SCOPED_TRACE(name);
+      RemeshOptions options = options_for(vertices);
+      options.topology = control;
+      const RemeshResult result = remesh(mesh, options);
+      EXPECT_EQ(result.untiled, 0u);
+      EXPECT_FALSE(result.mesh.triangles.empty());
+      // More only where that mends the topology or keeps features.
+      EXPECT_TRUE(result.mesh.vertices.size() <= vertices || result.topology_matches || result.features.curves > 0);
+      const MeshTopology topology = analyse_topology(result.mesh.triangles, result.mesh.vertices.size());
+      EXPECT_EQ(result.topology.manifold, topology.manifold);
+      EXPECT_EQ(result.topology.euler, topology.euler);
+      const MeshTopology input = analyse_topology(mesh.triangles, mesh.vertices.size());
+      EXPECT_EQ(result.topology_matches, topology.manifold == input.manifold && topology.oriented == input.oriented &&
+                                             topology.closed == input.closed && topology.euler == input.euler &&
+                                             topology.components == input.components);
+    }
+}
+
+TEST(RemeshHard, FewVerticesGiveWhatTheyCan) {
+  for (const TriangleMesh& mesh : {icosphere(3), torus(24, 16), box(2), two_spheres()})
+    for (std::size_t vertices : {4u, 5u, 12u, 40u}) {
+      RemeshOptions options = options_for(vertices);
+      const RemeshResult enforced = remesh(mesh, options);
+      EXPECT_EQ(enforced.untiled, 0u);
+      // Seeds are only added for the sake of the topology.
+      EXPECT_TRUE(enforced.mesh.vertices.size() <= vertices || enforced.topology_matches);
+      options.topology = TopologyControl::check;
+      const RemeshResult checked = remesh(mesh, options);
+      EXPECT_EQ(checked.untiled, 0u);
+      // Corners are vertices however few were asked for.
+      EXPECT_LE(checked.mesh.vertices.size(), std::max(vertices, checked.features.corners));
+    }
+  const RemeshResult tetrahedron = remesh(icosphere(3), options_for(4));
+  EXPECT_TRUE(tetrahedron.topology_matches);
+  EXPECT_EQ(tetrahedron.mesh.triangles.size(), 4u);
+}
+
+TEST(RemeshOptionsTest, GivenSeedsAreTheStart) {
+  const TriangleMesh mesh = icosphere(3);
+  RemeshOptions options;
+  options.seeds = random_seeds(mesh, 200, 6);
+  options.iterations = 0;
+  options.energy = Energy::restricted;
+  options.topology = TopologyControl::off;
+  const RemeshResult start = remesh(mesh, options);
+  EXPECT_EQ(start.iterations, 0);
+  EXPECT_TRUE(same_bits(start.mesh.vertices, options.seeds));
+  options.iterations = 50;
+  const RemeshResult free = remesh(mesh, options);
+  EXPECT_LT(free.energy, start.energy);
+  options.energy = Energy::constrained;
+  const RemeshResult constrained = remesh(mesh, options);
+  // The free minimum leaves the surface, and lies below.
+  EXPECT_LT(free.energy, constrained.energy);
+  for (const Vec3& x : constrained.mesh.vertices) EXPECT_LE(distance_to(mesh, x), 1e-11);
+}
+
+TEST(RemeshOptionsTest, EveryNumberOfLevelsGivesTheCount) {
+  const TriangleMesh mesh = torus(60, 36);
+  for (int levels : {1, 2, 3, 4}) {
+    RemeshOptions options = options_for(777);
+    options.levels = levels;
+    options.iterations = 30;
+    EXPECT_EQ(remesh(mesh, options).mesh.vertices.size(), 777u) << levels;
+  }
+}
+
+TEST(RemeshOptionsTest, ProgressRunsForwardAndCancelStops) {
+  const TriangleMesh mesh = icosphere(4);
+  std::atomic<bool> cancel{false};
+  double fraction = 0;
+  int reports = 0;
+  Context context;
+  context.cancel = &cancel;
+  context.progress = [&](const Progress& p) {
+    EXPECT_GE(p.fraction, fraction);
+    EXPECT_LE(p.fraction, 1);
+    EXPECT_FALSE(p.phase.empty());
+    fraction = p.fraction;
+    ++reports;
+  };
+  remesh(mesh, options_for(500), context);
+  EXPECT_GT(reports, 10);
+  EXPECT_GT(fraction, 0.3);
+  reports = 0;
+  context.progress = [&](const Progress&) { cancel = ++reports == 5; };
+  EXPECT_THROW(remesh(mesh, options_for(500), context), Cancelled);
+  EXPECT_EQ(reports, 5);
+}
+
+// A needle-like cone: the tip is a corner, but its cell must not be wrapped by two others.
+TEST(RemeshHard, AThinTipKeepsTheTopology) {
+  TriangleMesh cone;
+  const Index sides = 32;
+  for (Index k = 0; k < sides; ++k) {
+    const double t = 2 * 3.141592653589793 * k / sides;
+    cone.vertices.push_back({std::cos(t), std::sin(t), 0});
+    cone.triangles.push_back({k, (k + 1) % sides, sides});
+    cone.triangles.push_back({(k + 1) % sides, k, sides + 1});
+  }
+  cone.vertices.push_back({0, 0, 20});
+  cone.vertices.push_back({0, 0, 0});
+  const RemeshResult result = remesh(cone, options_for(1000));
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_TRUE(result.ball_property);
+  EXPECT_EQ(result.features.broken, 0u);
+  EXPECT_EQ(result.features.curves, 1u);
+}
+
+TEST(RemeshErrors, AreOneLineThatSaysWhatToDo) {
+  const auto message = [](const TriangleMesh& mesh, const RemeshOptions& options) {
+    try {
+      remesh(mesh, options);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(message(icosphere(1), options_for(0)).find("vertices"), std::string::npos);
+  for (std::size_t vertices : {1u, 3u})
+    EXPECT_NE(message(icosphere(1), options_for(vertices)).find("4"), std::string::npos);
+  RemeshOptions seeded;
+  seeded.seeds = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
+  EXPECT_FALSE(message(icosphere(1), seeded).empty());
+  const TriangleMesh line{{{0, 0, 0}, {1, 1, 1}, {3, 3, 3}}, {{0, 1, 2}, {2, 1, 0}}, {}};
+  for (const TriangleMesh& mesh : {TriangleMesh{}, line}) {
+    const std::string text = message(mesh, options_for(10));
+    EXPECT_FALSE(text.empty());
+    EXPECT_EQ(text.find('\n'), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace bisector::test

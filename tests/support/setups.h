@@ -1,0 +1,136 @@
+// The backends that the parity suites run on, and what two diagrams of the same seeds have in common.
+//
+// A suite needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one ("vulkan:0") that then must be there.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "compute/compute.h"
+#include "check/parity.h"
+#include "support/diagram.h"
+
+namespace bisector::test {
+
+enum class Processor { cpu, single, double_ };
+
+struct Setup {
+  Processor processor;
+  NeighbourSource source;
+};
+
+inline constexpr std::array kProcessors{Processor::cpu, Processor::single, Processor::double_};
+inline constexpr std::array kSources{NeighbourSource::nearest, NeighbourSource::delaunay};
+
+inline std::string name_of(const Setup& setup) {
+  constexpr std::array kNames{"cpu", "single", "double"};
+  return std::string(kNames[static_cast<std::size_t>(setup.processor)]) +
+         (setup.source == NeighbourSource::nearest ? "_nearest" : "_delaunay");
+}
+
+inline void PrintTo(const Setup& setup, std::ostream* out) { *out << name_of(setup); }
+
+inline std::vector<Setup> setups() {
+  std::vector<Setup> all;
+  for (Processor processor : kProcessors)
+    for (NeighbourSource source : kSources) all.push_back({processor, source});
+  return all;
+}
+
+struct Tolerance {
+  double cells, sum;
+};
+
+inline Tolerance tolerance_of(Processor processor) {
+  return processor == Processor::single ? Tolerance{1e-5, 1e-6} : Tolerance{1e-12, 1e-12};
+}
+
+inline Precision precision_of(Processor processor) {
+  return processor == Processor::single ? Precision::single : Precision::double_;
+}
+
+// A request for a device that can do it, preferably one that is no software; empty where there is none.
+inline std::string device_for(Processor processor) {
+  if (processor == Processor::cpu) return "cpu";
+  if (const char* named = std::getenv("BISECTOR_TEST_DEVICE")) return named;
+  static const DeviceList list = list_devices();
+  const std::string gpu = best_gpu(list, precision_of(processor));
+  if (!gpu.empty()) return gpu;
+  for (const DeviceDescription& device : list.devices)
+    if (device.rejected.empty() && (device.float64 || processor == Processor::single))
+      return "vulkan:" + std::to_string(device.index);
+  return {};
+}
+
+inline ComputeOptions options_of(const Setup& setup) {
+  ComputeOptions options;
+  options.device = device_for(setup.processor);
+  options.precision = precision_of(setup.processor);
+  options.neighbours = setup.source;
+  return options;
+}
+
+#define SKIP_WITHOUT_DEVICE(processor) \
+  if (device_for(processor).empty()) GTEST_SKIP() << "no Vulkan device for this"
+
+inline Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
+  Diagram d;
+  backend.evaluate(seeds, d.moments, d.polygons);
+  return d;
+}
+
+// What the reported vertices give, which the moments do not show. Vertices are rounded at the size of the coordinates.
+inline void expect_same_areas(const Surface& surface, const Diagram& reference, const Diagram& found, double tolerance) {
+  const double rounding = 1e-15 * (norm(surface.box.lo) + norm(surface.box.hi));
+  const std::vector<Vec3>&a = reference.polygons.vertices, &b = found.polygons.vertices;
+  ASSERT_EQ(a.size(), b.size());
+  double worst = 0;
+  for (std::size_t k = 0; k < reference.polygons.pairs.size(); ++k) {
+    const std::size_t begin = reference.polygons.offsets[k], end = reference.polygons.offsets[k + 1];
+    Vec3 twice_a, twice_b;
+    double perimeter = 0;
+    for (std::size_t e = begin; e < end; ++e) {
+      const std::size_t next = e + 1 == end ? begin : e + 1;
+      twice_a += cross(a[e] - a[begin], a[next] - a[begin]);
+      twice_b += cross(b[e] - b[begin], b[next] - b[begin]);
+      perimeter += norm(a[next] - a[e]);
+    }
+    const double excess = 0.5 * norm(twice_b - twice_a) - rounding * perimeter;
+    if (!(excess <= 0)) worst = std::max(worst, excess / reference.moments.step_mass[reference.polygons.pairs[k].cell]);
+    ASSERT_FALSE(std::isnan(excess)) << "polygon " << k;
+  }
+  EXPECT_LE(worst, tolerance);
+}
+
+inline void expect_parity(const Surface& surface, const Diagram& reference, const Diagram& found, Processor processor) {
+  const Parity parity = compare(reference.moments, reference.polygons, found.moments, found.polygons, surface);
+  EXPECT_TRUE(parity.same_pairs);
+  EXPECT_TRUE(parity.same_labels);
+  EXPECT_TRUE(parity.same_dual);
+  EXPECT_EQ(count_untiled(surface, found.polygons), 0u);
+  EXPECT_TRUE(found.moments.triangles.offsets == reference.moments.triangles.offsets);
+  EXPECT_TRUE(found.moments.triangles.values == reference.moments.triangles.values);
+  const Tolerance tolerance = tolerance_of(processor);
+  EXPECT_LE(parity.mass_error, tolerance.cells);
+  EXPECT_LE(parity.centroid_error, tolerance.cells);
+  EXPECT_LE(parity.energy_error, tolerance.cells);
+  EXPECT_LE(parity.sum_error, tolerance.sum);
+  EXPECT_NEAR(found.moments.energy, reference.moments.energy, tolerance.cells * reference.moments.energy);
+  if (parity.same_labels && surface.density.empty()) expect_same_areas(surface, reference, found, tolerance.cells);
+  if (processor != Processor::single) {
+    EXPECT_TRUE(parity.bitwise) << "not the CPU's bits";
+  }
+  EXPECT_EQ(found.moments.certification.pairs, reference.polygons.pairs.size());
+  if (processor != Processor::single) {
+    EXPECT_EQ(found.moments.certification.doubled, 0u);
+  }
+}
+
+}  // namespace bisector::test
