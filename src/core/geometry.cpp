@@ -1,6 +1,20 @@
 #include "core/geometry.h"
 
+#include <algorithm>
+
 namespace bisector {
+
+Vec3 perpendicular(const Vec3& n) { return unit(cross(n, std::abs(n.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0})); }
+
+double nearest_parameter(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 d = b - a;
+  const double length2 = norm2(d);
+  return length2 > 0 ? std::clamp(dot(p - a, d) / length2, 0.0, 1.0) : 0.0;
+}
+
+Vec3 nearest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  return a + nearest_parameter(p, a, b) * (b - a);
+}
 
 // Voronoi regions of the triangle's corners and edges (Ericson, Real-Time Collision Detection, 5.1.5).
 Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "bisector/mesh.h"
@@ -23,6 +24,25 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 inline double norm2(const Vec3& a) { return dot(a, a); }
 inline double norm(const Vec3& a) { return std::sqrt(norm2(a)); }
 
+inline constexpr double kRadiansPerDegree = std::numbers::pi / 180, kDegreesPerRadian = 180 / std::numbers::pi;
+
+// The direction of a vector, of length 1; zero for the zero vector.
+inline Vec3 unit(const Vec3& a) {
+  const double length = norm(a);
+  return length > 0 ? (1 / length) * a : Vec3{};
+}
+
+// A vector of length 1 perpendicular to `n`, which has length 1, and to the x axis, or to the y axis if `n` is near the x axis.
+Vec3 perpendicular(const Vec3& n);
+
+// Normal of the triangle (a, b, c), as long as twice its area, on the side from which the corners run counter-clockwise.
+inline Vec3 twice_area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(b - a, c - a); }
+
+// Six times the signed volume of the tetrahedron (a, b, c, d), rounded: positive as orientation() says.
+inline double six_rounded_volumes(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  return dot(b - a, cross(c - a, d - a));
+}
+
 struct Box {
   Vec3 lo, hi;
   double diagonal() const { return norm(hi - lo); }
@@ -39,6 +59,12 @@ inline Box bounding_box(const std::vector<Vec3>& points) {
     }
   return box;
 }
+
+// Where on the segment from a (0) to b (1) the point nearest to p lies; 0 if a and b are the same point.
+double nearest_parameter(const Vec3& p, const Vec3& a, const Vec3& b);
+
+// Nearest point to p of the segment from a to b.
+Vec3 nearest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b);
 
 // Nearest point to p of the triangle (a, b, c).
 Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);

@@ -51,11 +51,6 @@ unsigned char to_srgb(float value) {
   return static_cast<unsigned char>(std::lround(255 * s));
 }
 
-Vec3 unit(const Vec3& v) {
-  const double length = norm(v);
-  return length > 0 ? (1 / length) * v : Vec3{};
-}
-
 // A vertex as the camera sees it: x and y in samples, y down; `nearness` is linear on the screen and grows towards the
 // camera.
 struct Projected {

@@ -26,11 +26,6 @@ constexpr int kFlipEvery = 3;                       // sweeps
 
 double beyond(double excess) { return excess > 0 ? excess * (kLinear + kQuadratic * excess) : 0; }
 
-Vec3 unit(const Vec3& n) {
-  const double length = norm(n);
-  return length > 0 ? (1 / length) * n : Vec3{};
-}
-
 std::array<Index, 2> key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 
 bool has(const Triangle& t, Index v) { return t[0] == v || t[1] == v || t[2] == v; }

@@ -46,7 +46,8 @@ class Path {
   double length_ = 0;
 };
 
-Vec3 perpendicular(const Vec3& tangent) {
+// Perpendicular to the tangent and to the coordinate axis that the tangent is farthest from.
+Vec3 first_normal(const Vec3& tangent) {
   const Vec3 size{std::abs(tangent.x), std::abs(tangent.y), std::abs(tangent.z)};
   Vec3 axis;
   axis[size.x <= size.y && size.x <= size.z ? 0 : size.y <= size.z ? 1 : 2] = 1;
@@ -69,7 +70,7 @@ Vec3 reflect_twice(const Place& a, const Vec3& normal, const Place& b) {
     carried = reflected(half, b.tangent - tangent);
   }
   carried -= dot(carried, b.tangent) * b.tangent;
-  return norm(carried) > 1e-6 ? normalised(carried) : perpendicular(b.tangent);
+  return norm(carried) > 1e-6 ? normalised(carried) : first_normal(b.tangent);
 }
 
 Vec3 carry(const Path& path, const Place& a, const Vec3& normal, const Place& b, int halvings) {
@@ -100,7 +101,7 @@ std::vector<Frame> rotation_minimising_frames(const BSplineCurve& curve, const s
 
   std::vector<Frame> frames;
   Place place = path.at(0);
-  Vec3 normal = perpendicular(place.tangent);
+  Vec3 normal = first_normal(place.tangent);
   auto station = between.begin();
   for (const double t : parameters) {
     while (place.t < t) {

@@ -49,12 +49,6 @@ inline double value_at(const std::vector<double>& values, const PolylineFoot& fo
   return (1 - foot.t) * values[foot.segment] + foot.t * values[foot.segment + 1];
 }
 
-// The direction of a vector; zero of the zero vector.
-inline Vec3 unit(const Vec3& v) {
-  const double length = norm(v);
-  return length > 0 ? (1 / length) * v : Vec3{};
-}
-
 // The value that a share of them is not above; 0 if there are none.
 inline double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0;
