@@ -29,7 +29,7 @@ void require_length(double length, const char* what) {
   if (!(length > 0) || !std::isfinite(length)) throw Error(std::string(what) + " is not positive: give a finite length");
 }
 
-Vec3 perpendicular(const Vec3& axis) {
+Vec3 perpendicular_to(const Vec3& axis) {
   const double x = std::abs(axis.x), y = std::abs(axis.y), z = std::abs(axis.z);
   const Vec3 other = x <= y && x <= z ? Vec3{1, 0, 0} : y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
   const Vec3 v = cross(axis, other);
@@ -47,12 +47,12 @@ Cylindrical cylindrical(const Primitive& primitive, const Vec3& p) {
   const double z = dot(primitive.axis, q);
   const Vec3 across = q - z * primitive.axis;
   const double rho = norm(across);
-  if (!(rho > 0)) return {perpendicular(primitive.axis), rho, z};
+  if (!(rho > 0)) return {perpendicular_to(primitive.axis), rho, z};
   // Near the axis rounding leaves something along it.
   Vec3 outward = (1 / rho) * across;
   outward -= dot(outward, primitive.axis) * primitive.axis;
   const double length = norm(outward);
-  return {length > 0.5 ? (1 / length) * outward : perpendicular(primitive.axis), rho, z};
+  return {length > 0.5 ? (1 / length) * outward : perpendicular_to(primitive.axis), rho, z};
 }
 
 bool is_general(SurfaceType type) { return type > SurfaceType::torus; }

@@ -99,7 +99,6 @@ Vec3 direction(SplitMix64& random) {
     if (const Vec3 p = random_point(random); norm2(p) > 0.01 && norm2(p) <= 1) return (1 / norm(p)) * p;
 }
 
-Vec3 unit(const Vec3& v) { return (1 / norm(v)) * v; }
 double power(SplitMix64& random, const std::array<double, 2>& range) { return std::pow(10, random.range(range[0], range[1])); }
 
 // 0 one time in eight, else of either sign and of any magnitude from 1e-17 to 0.1.

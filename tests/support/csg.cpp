@@ -24,8 +24,6 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Triangulation = CGAL::Delaunay_triangulation_2<
     Kernel, CGAL::Triangulation_data_structure_2<CGAL::Triangulation_vertex_base_with_info_2<Index, Kernel>>>;
 
-Vec3 unit(const Vec3& v) { return (1 / norm(v)) * v; }
-
 struct Frame {
   Vec3 origin, x, y, z;  // orthonormal
 

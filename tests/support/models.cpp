@@ -12,8 +12,6 @@ namespace {
 
 Index index_of(std::size_t n) { return static_cast<Index>(n); }
 
-Vec3 unit(const Vec3& v) { return (1 / norm(v)) * v; }
-
 // The rectangle of nx x ny cells as two triangles each, seen counter-clockwise; corner(i, j) gives the vertex.
 template <class Corner>
 void add_quads(TriangleMesh& mesh, int nx, int ny, const Corner& corner) {

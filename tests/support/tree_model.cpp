@@ -23,15 +23,13 @@ constexpr int kTries = 60;    // to place a branch
 constexpr double kGoldenAngle = 2.399963229728653;
 constexpr std::size_t kSamples = 50;  // along a branch's axis, to score it
 
-Vec3 unit(const Vec3& a) { return (1 / norm(a)) * a; }
-
-Vec3 perpendicular(const Vec3& a) {
+Vec3 any_perpendicular(const Vec3& a) {
   return unit(cross(a, std::abs(a.x) < 0.5 * norm(a) ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
 }
 
 // In the plane across `a`, at an angle from an arbitrary direction in it.
 Vec3 across(const Vec3& a, double angle) {
-  const Vec3 n = perpendicular(a), b = cross(unit(a), n);
+  const Vec3 n = any_perpendicular(a), b = cross(unit(a), n);
   return std::cos(angle) * n + std::sin(angle) * b;
 }
 

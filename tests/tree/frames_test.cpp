@@ -13,8 +13,6 @@ namespace {
 
 using test::SplitMix64;
 
-Vec3 unit(const Vec3& a) { return (1 / norm(a)) * a; }
-
 std::vector<double> evenly(int count) {
   std::vector<double> t;
   for (int i = 0; i <= count; ++i) t.push_back(static_cast<double>(i) / count);
