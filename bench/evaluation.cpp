@@ -45,7 +45,7 @@ NeighbourSource source_of(const std::string& name) {
 
 struct Run {
   double total = 0, gradient_norm = 0;
-  CellMoments moments;
+  Diagram diagram;
 };
 
 // From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which has
@@ -54,20 +54,20 @@ Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSo
              Backend* device) {
   const ThreadLimit limit(threads);
   Run run;
-  if (device && seeds.size() > 1) device->evaluate({seeds.begin(), seeds.end() - 1}, run.moments);
+  if (device && seeds.size() > 1) device->evaluate({seeds.begin(), seeds.end() - 1}, Want::moments, run.diagram);
   const Stopwatch watch;
   if (device) {
-    device->evaluate(seeds, run.moments);
+    device->evaluate(seeds, Want::moments, run.diagram);
   } else {
-    RestrictedVoronoi(surface).evaluate(seeds, source, run.moments);
+    RestrictedVoronoi(surface).evaluate(seeds, source, Want::moments, run.diagram);
   }
   std::vector<Vec3> gradient(seeds.size());
-  parallel_each(seeds.size(), [&](std::size_t i) { gradient[i] = -2.0 * run.moments.cells[i].first; });
+  parallel_each(seeds.size(), [&](std::size_t i) { gradient[i] = -2.0 * run.diagram.moments.cells[i].first; });
   run.gradient_norm = std::sqrt(fixed_sum(seeds.size(), [&](std::size_t i) { return norm2(gradient[i]); }));
-  const double missing = std::abs(run.moments.mass - surface.mass);
+  const double missing = std::abs(run.diagram.moments.mass - surface.mass);
   run.total = watch.seconds();
   if (!(missing <= (device ? device->mass_tolerance() : 1e-12) * surface.mass))
-    throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(), run.moments.mass,
+    throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(), run.diagram.moments.mass,
                             surface.mass));
   return run;
 }
@@ -113,7 +113,7 @@ struct Series {
   std::unique_ptr<Backend> device;  // none: the CPU
 
   void add(Run run, double delaunay) {
-    const DiagramSeconds& phases = run.moments.seconds;
+    const DiagramSeconds& phases = run.diagram.moments.seconds;
     total.push_back(run.total);
     neighbours.push_back(phases.delaunay + phases.neighbours);
     owners.push_back(phases.pairs);
@@ -121,7 +121,7 @@ struct Series {
     ratio.push_back(run.total / delaunay);
     if (gradient_norm != 0 && run.gradient_norm != gradient_norm) throw Error("the gradient differs from the last run's");
     gradient_norm = run.gradient_norm;
-    last = std::move(run.moments);
+    last = std::move(run.diagram.moments);
   }
 };
 

@@ -19,20 +19,14 @@ class VulkanBackend : public Backend {
   VulkanBackend(const Surface& surface, std::unique_ptr<Device> device, const VulkanOptions& options,
                 const Precisions& precisions);
 
-  const Surface& surface() const override { return surface_; }
   BackendDescription description() const override { return stage_.description(); }
   double mass_tolerance() const override { return double_ ? 1e-12 : 1e-6; }
   // Energies are sums of terms that are off by a few units of 2^-24 each, mostly at random.
   double energy_noise() const override { return double_ ? 0 : 1e-7; }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) override { run(seeds, moments, nullptr); }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) override {
-    run(seeds, moments, &polygons);
-  }
 
  private:
-  void run(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons* polygons);
+  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
 
-  const Surface& surface_;
   bool double_;
   SeedStage stage_;
   SurfaceStage pairs_;
@@ -42,7 +36,7 @@ class VulkanBackend : public Backend {
 
 VulkanBackend::VulkanBackend(const Surface& surface, std::unique_ptr<Device> device, const VulkanOptions& options,
                              const Precisions& precisions)
-    : surface_(surface), double_(precisions.is_double),
+    : Backend(surface), double_(precisions.is_double),
       stage_(std::move(device), precisions, options.neighbours, device_scale(surface), surface.box, false),
       pairs_(stage_, surface, options.rooms), cells_(stage_.device(), double_, false), cpu_(surface, options.neighbours) {
   std::vector<Index> triangles;
@@ -51,10 +45,10 @@ VulkanBackend::VulkanBackend(const Surface& surface, std::unique_ptr<Device> dev
   stage_.commands.run();
 }
 
-void VulkanBackend::run(const std::vector<Vec3>& given, CellMoments& moments, RestrictedPolygons* polygons) {
-  if (given.empty() || !stage_.within_reach(given)) {
-    if (polygons) cpu_.evaluate(given, moments, *polygons);
-    else cpu_.evaluate(given, moments);
+void VulkanBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& diagram) {
+  CellMoments& moments = diagram.moments;
+  if (!stage_.within_reach(given)) {
+    cpu_.evaluate(given, want, diagram);
     moments.certification.cpu = moments.certification.pairs;
     return;
   }
@@ -80,7 +74,7 @@ void VulkanBackend::run(const std::vector<Vec3>& given, CellMoments& moments, Re
     // If all masses still do not add up, what is left to doubt climbs too, and in the end everything.
     for (const float share : {1.0f, 0.05f, 0.0f}) {
       if (pairs_.refine(cells_.cells(), share, certification) > 0) sum();
-      if (std::abs(moments.mass - surface_.mass) <= mass_tolerance() * surface_.mass) break;
+      if (std::abs(moments.mass - mass()) <= mass_tolerance() * mass()) break;
     }
   }
   stage_.set_step_masses(moments);
@@ -90,7 +84,7 @@ void VulkanBackend::run(const std::vector<Vec3>& given, CellMoments& moments, Re
   (stage_.delaunay() ? moments.seconds.delaunay : moments.seconds.neighbours) = stage_.lists_seconds();
   moments.seconds.neighbours += searched;
   moments.seconds.clip = seconds_since(clipping);
-  if (polygons) pairs_.polygons(*polygons);
+  if (includes(want, Want::polygons)) pairs_.polygons(diagram.polygons);
   moments.seconds.device = stage_.take_seconds();
 }
 

@@ -25,28 +25,18 @@ class VulkanSolidBackend : public SolidBackend {
   VulkanSolidBackend(const Solid& solid, std::unique_ptr<Device> device, const VulkanOptions& options,
                      const Precisions& precisions, InnerCells inner);
 
-  const Solid& solid() const override { return solid_; }
   BackendDescription description() const override { return stage_.description(); }
   double mass_tolerance() const override { return double_ ? 1e-12 : 1e-6; }
   // Energies are sums of terms that are off by a few units of 2^-24 each, mostly at random.
   double energy_noise() const override { return double_ ? 0 : 1e-7; }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) override { run(seeds, moments, nullptr, nullptr); }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) override {
-    run(seeds, moments, &polygons, nullptr);
-  }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons,
-                ClippedPolyhedra& polyhedra) override {
-    run(seeds, moments, &polygons, &polyhedra);
-  }
 
  private:
-  void run(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons* polygons, ClippedPolyhedra* polyhedra);
+  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
   void find_owners(const std::vector<Vec3>& seeds);
   PairJob job() {
     return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.scan, stage_.counters, store_, tets_};
   }
 
-  const Solid& solid_;
   bool double_;
   SeedStage stage_;
   SurfaceStage shell_;
@@ -63,7 +53,7 @@ class VulkanSolidBackend : public SolidBackend {
 
 VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::unique_ptr<Device> device, const VulkanOptions& options,
                                        const Precisions& precisions, InnerCells inner)
-    : solid_(solid), double_(precisions.is_double),
+    : SolidBackend(solid), double_(precisions.is_double),
       stage_(std::move(device), precisions, options.neighbours, device_scale(solid), box_of(solid), true),
       shell_(stage_, solid.boundary, options.rooms), shell_cells_(stage_.device(), double_, false),
       device_solid_(stage_.device(), stage_.commands, solid, stage_.seeds.scale, double_, precisions.double_rung),
@@ -100,16 +90,14 @@ void VulkanSolidBackend::find_owners(const std::vector<Vec3>& given) {
   if (!counters[kLostSites]) return;
   const std::vector<Index> lost = corners_.lost(stage_.commands, counters[kLostSites]);
   std::vector<Vec3> points;
-  for (const Index corner : lost) points.push_back(solid_.mesh.vertices[device_solid_.vertices[corner]]);
+  for (const Index corner : lost) points.push_back(solid().mesh.vertices[device_solid_.vertices[corner]]);
   corners_.settle(stage_.commands, lost, stage_.exact.owners(points));
 }
 
-void VulkanSolidBackend::run(const std::vector<Vec3>& given, CellMoments& moments, RestrictedPolygons* polygons,
-                             ClippedPolyhedra* polyhedra) {
-  if (given.empty() || !stage_.within_reach(given)) {
-    if (polyhedra) cpu_.evaluate(given, moments, *polygons, *polyhedra);
-    else if (polygons) cpu_.evaluate(given, moments, *polygons);
-    else cpu_.evaluate(given, moments);
+void VulkanSolidBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& diagram) {
+  CellMoments& moments = diagram.moments;
+  if (!stage_.within_reach(given)) {
+    cpu_.evaluate(given, want, diagram);
     moments.certification.cpu = moments.certification.pairs;
     return;
   }
@@ -124,7 +112,7 @@ void VulkanSolidBackend::run(const std::vector<Vec3>& given, CellMoments& moment
   shell_.find_pairs(certification);
   shell_cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, shell_.store());
   shell_cells_.sum(stage_, shell_.store(), shell);
-  if (polygons) shell_.polygons(*polygons);
+  if (includes(want, Want::polygons)) shell_.polygons(diagram.polygons);
   tets_.set_shell(shell_.store(), shell, stage_.seeds.count());
   const double paired = seconds_since(pairing);
 
@@ -137,7 +125,7 @@ void VulkanSolidBackend::run(const std::vector<Vec3>& given, CellMoments& moment
     // If all masses still do not add up, what is left to doubt climbs too, and in the end everything.
     for (const float share : {1.0f, 0.05f, 0.0f}) {
       if (pairs_.refine(job(), cells_.cells(), share, certification) > 0) sum();
-      if (std::abs(moments.mass - solid_.mass) <= mass_tolerance() * solid_.mass) break;
+      if (std::abs(moments.mass - mass()) <= mass_tolerance() * mass()) break;
     }
   }
   certification.pairs = moments.triangles.values.size();
@@ -149,7 +137,7 @@ void VulkanSolidBackend::run(const std::vector<Vec3>& given, CellMoments& moment
   moments.seconds.neighbours += searched;
   moments.seconds.pairs = paired;
   moments.seconds.clip = seconds_since(clipping);
-  if (polyhedra) polyhedra_.run(pairs_, job(), tets_, stage_.exact, *polyhedra);
+  if (includes(want, Want::polyhedra)) polyhedra_.run(pairs_, job(), tets_, stage_.exact, diagram.polyhedra);
   moments.seconds.device = stage_.take_seconds();
 }
 

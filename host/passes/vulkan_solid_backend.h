@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "backend/solid_backend.h"
+#include "backend/backend.h"
 #include "host/passes/vulkan_backend.h"
 
 namespace bisector::host {

@@ -83,4 +83,10 @@ struct Certification {
   std::size_t cpu = 0;        // settled by the CPU's exact arithmetic
 };
 
+// What an evaluation of a diagram reports of itself.
+struct EvaluationReport {
+  Certification certification;
+  DiagramSeconds seconds;
+};
+
 }  // namespace bisector

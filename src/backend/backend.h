@@ -1,34 +1,70 @@
-// The contract between the optimiser and whatever computes restricted Voronoi diagrams.
+// The contract between the pipelines and whatever computes Voronoi diagrams.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "bisector/device.h"
 #include "core/geometry.h"
-#include "voronoi/restricted.h"
+#include "voronoi/diagram.h"
+#include "voronoi/solid.h"
+#include "voronoi/surface.h"
 
 namespace bisector {
 
-// A backend holds one domain: a surface, or a solid (cvt/solid_backend.h). Every backend returns the same pairs and labels for the same seeds; moments agree to
-// rounding, and runs repeat bit for bit.
+// A backend holds one domain, which must outlive it: a surface, or a solid. Every backend returns the same pairs and labels for the
+// same seeds; moments agree to rounding, and runs repeat bit for bit.
 class Backend {
  public:
   virtual ~Backend() = default;
+  Backend(const Backend&) = delete;
+  Backend& operator=(const Backend&) = delete;
 
   // The surface, or the boundary of the solid.
-  virtual const Surface& surface() const = 0;
+  const Surface& surface() const { return surface_; }
   // Integral of the density over the domain.
-  virtual double mass() const { return surface().mass; }
+  double mass() const { return mass_; }
   virtual BackendDescription description() const = 0;
-  // By how much, relative to the whole, rounding may make the sum of all masses miss the surface's.
+  // By how much, relative to the whole, rounding may make the sum of all masses miss the domain's.
   virtual double mass_tolerance() const = 0;
   // Energies nearer than this, relative, may compare wrongly because of rounding; 0 if comparing them is good enough.
   virtual double energy_noise() const { return 0; }
-  // Moments of all cells of the seeds' diagram. After a DeviceError neither results nor backend are good for anything.
-  virtual void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) = 0;
-  // The same, and the polygons of cells and surface.
-  virtual void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) = 0;
+
+  // Computes the diagram of the seeds: its moments and the parts of it that are wanted. Other parts are emptied; memory is used again.
+  // Wanting the dual includes the polygons. Only a backend of a solid has polyhedra. Throws Error if there are no seeds; after a
+  // DeviceError neither diagram nor backend are good for anything.
+  EvaluationReport evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram);
+
+  // Until every caller holds a Diagram.
+  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments);
+  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons);
+  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons,
+                ClippedPolyhedra& polyhedra);
+
+ protected:
+  explicit Backend(const Surface& surface) : Backend(surface, surface.mass, Want::polygons) {}
+  Backend(const Surface& boundary, double mass, Want offers) : surface_(boundary), mass_(mass), offers_(offers) {}
+
+  // Sets the moments and, of polygons and polyhedra, those that are wanted. There are seeds.
+  virtual void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
+
+ private:
+  const Surface& surface_;
+  double mass_;
+  Want offers_;  // parts that compute() can set
+};
+
+// A backend whose cells are those of a solid: masses, centroids and energies are integrals over volumes, and triangles and
+// polygons those of the solid's boundary.
+class SolidBackend : public Backend {
+ public:
+  const Solid& solid() const { return solid_; }
+
+ protected:
+  explicit SolidBackend(const Solid& solid)
+      : Backend(solid.boundary, solid.mass, Want::polygons | Want::polyhedra), solid_(solid) {}
+
+ private:
+  const Solid& solid_;
 };
 
 }  // namespace bisector

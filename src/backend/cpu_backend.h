@@ -1,30 +1,43 @@
-// The backend that defines the answer: all cores, double precision, exact signs.
+// The backends that define the answer: all cores, double precision, exact signs.
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "backend/backend.h"
+#include "voronoi/clipped.h"
+#include "voronoi/restricted.h"
 
 namespace bisector {
 
-class CpuBackend : public Backend {
+// What a surface's and a solid's have in common: Base is Backend or SolidBackend, Voronoi RestrictedVoronoi or ClippedVoronoi.
+template <class Base, class Voronoi>
+class CpuBackendOf : public Base {
  public:
-  // The surface must outlive the backend.
-  CpuBackend(const Surface& surface, NeighbourSource source);
-  // In place of a device that was given up, for this reason.
-  CpuBackend(const Surface& surface, NeighbourSource source, std::string fallback);
-
-  const Surface& surface() const override { return surface_; }
   BackendDescription description() const override;
   double mass_tolerance() const override { return 1e-12; }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) override;
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) override;
+
+ protected:
+  template <class Domain, class... Options>
+  CpuBackendOf(const Domain& domain, NeighbourSource source, std::string fallback, Options... options);
+
+  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
 
  private:
-  const Surface& surface_;
   NeighbourSource source_;
   std::string fallback_;
-  RestrictedVoronoi diagram_;
+  Voronoi diagram_;
+};
+
+class CpuBackend : public CpuBackendOf<Backend, RestrictedVoronoi> {
+ public:
+  // `fallback`: why a device was given up for this one; empty if none was.
+  CpuBackend(const Surface& surface, NeighbourSource source, std::string fallback = {});
+};
+
+class CpuSolidBackend : public CpuBackendOf<SolidBackend, ClippedVoronoi> {
+ public:
+  CpuSolidBackend(const Solid& solid, NeighbourSource source, InnerCells inner = InnerCells::whole, std::string fallback = {});
 };
 
 }  // namespace bisector

@@ -3,23 +3,49 @@
 #include <utility>
 
 #include "backend/cpu_backend.h"
+#include "bisector/error.h"
 
 namespace bisector {
 
+template <class Base>
+template <class Domain>
+FallbackOf<Base>::FallbackOf(const Domain& domain, std::unique_ptr<Base>&& device,
+                             std::function<std::unique_ptr<Base>(const std::string&)> on_cpu, Context context)
+    : Base(domain), on_cpu_(std::move(on_cpu)), context_(std::move(context)), energy_noise_(device->energy_noise()),
+      backend_(std::move(device)) {}
+
+template <class Base>
+void FallbackOf<Base>::compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
+  if (on_device_) {
+    std::string reason;
+    try {
+      backend_->evaluate(seeds, want, diagram);
+      return;
+    } catch (const DeviceError& error) {
+      reason = error.what();
+    }
+    on_device_ = false;
+    backend_ = on_cpu_(reason);
+    context_.warn("going on with the CPU because of this: " + reason);
+  }
+  backend_->evaluate(seeds, want, diagram);
+}
+
+template class FallbackOf<Backend>;
+template class FallbackOf<SolidBackend>;
+
 FallbackBackend::FallbackBackend(std::unique_ptr<Backend> device, NeighbourSource source, Context context)
-    : surface_(device->surface()),
-      fallback_(
-          std::move(device),
-          [&surface = surface_, source](const std::string& reason) {
+    : FallbackOf(
+          device->surface(), std::move(device),
+          [&surface = device->surface(), source](const std::string& reason) {
             return std::make_unique<CpuBackend>(surface, source, reason);
           },
           std::move(context)) {}
 
 FallbackSolidBackend::FallbackSolidBackend(std::unique_ptr<SolidBackend> device, NeighbourSource source, Context context)
-    : solid_(device->solid()),
-      fallback_(
-          std::move(device),
-          [&solid = solid_, source](const std::string& reason) {
+    : FallbackOf(
+          device->solid(), std::move(device),
+          [&solid = device->solid(), source](const std::string& reason) {
             return std::make_unique<CpuSolidBackend>(solid, source, InnerCells::whole, reason);
           },
           std::move(context)) {}

@@ -7,7 +7,6 @@
 #include "bisector/error.h"
 #include "backend/cpu_backend.h"
 #include "backend/fallback_backend.h"
-#include "backend/solid_backend.h"
 #include "host/device/ranking.h"
 #include "host/passes/vulkan_backend.h"
 #include "host/passes/vulkan_solid_backend.h"

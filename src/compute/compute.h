@@ -9,7 +9,6 @@
 #include "bisector/context.h"
 #include "bisector/device.h"
 #include "backend/backend.h"
-#include "backend/solid_backend.h"
 
 namespace bisector {
 

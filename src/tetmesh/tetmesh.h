@@ -8,7 +8,7 @@
 
 #include "bisector/context.h"
 #include "core/geometry.h"
-#include "backend/solid_backend.h"
+#include "backend/backend.h"
 #include "features/features.h"
 #include "remesh/remesh.h"
 #include "tetmesh/conform.h"

@@ -103,8 +103,7 @@ struct ClippedVoronoi::Work {
   void take_inner(const std::vector<Start>& reached, CellMoments& result, bool want_polyhedra);
   std::vector<Start> newly_reached(const std::vector<Chunk>& chunks);
   void gather(ClippedPolyhedra& polyhedra) const;
-  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, RestrictedPolygons* polygons,
-                ClippedPolyhedra* polyhedra);
+  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want, Diagram& diagram);
 };
 
 ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
@@ -279,14 +278,14 @@ void ClippedVoronoi::Work::take_inner(const std::vector<Start>& reached, CellMom
   }
 }
 
-void ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,
-                                    RestrictedPolygons* polygons, ClippedPolyhedra* polyhedra) {
-  boundary.trace(given, source, result, polygons);
+void ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want, Diagram& diagram) {
+  boundary.trace(given, source, want, diagram);
+  CellMoments& result = diagram.moments;
   const auto t0 = std::chrono::steady_clock::now();
   ++generation;
   round_count = 0;
   result.cells.assign(given.size(), Moments{});
-  const bool want_polyhedra = polyhedra != nullptr;
+  const bool want_polyhedra = includes(want, Want::polyhedra);
   std::vector<Start> reached = walk_boundary(result, want_polyhedra);
   if (inner_whole) take_inner(reached, result, want_polyhedra);
   else walk_inner(std::move(reached), result, want_polyhedra);
@@ -303,7 +302,7 @@ void ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSou
   result.certification.cpu = result.certification.uncertain;
   result.seconds.pairs += result.seconds.clip;
   result.seconds.clip = seconds_between(t0, std::chrono::steady_clock::now());
-  if (polyhedra) gather(*polyhedra);
+  if (want_polyhedra) gather(diagram.polyhedra);
 }
 
 // Polyhedra lie in chunks by cells; the result is in order of tetrahedra, then cells.
@@ -349,18 +348,8 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
 ClippedVoronoi::ClippedVoronoi(const Solid& solid, InnerCells inner) : work_(std::make_unique<Work>(solid, inner)) {}
 ClippedVoronoi::~ClippedVoronoi() = default;
 
-void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result) {
-  work_->evaluate(seeds, source, result, nullptr, nullptr);
-}
-
-void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
-                              RestrictedPolygons& polygons) {
-  work_->evaluate(seeds, source, result, &polygons, nullptr);
-}
-
-void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
-                              RestrictedPolygons& polygons, ClippedPolyhedra& polyhedra) {
-  work_->evaluate(seeds, source, result, &polygons, &polyhedra);
+void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
+  work_->evaluate(seeds, source, want, diagram);
 }
 
 std::vector<Tetrahedron> dual_tets(const ClippedPolyhedra& polyhedra) {

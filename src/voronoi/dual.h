@@ -4,18 +4,9 @@
 #include <vector>
 
 #include "core/geometry.h"
-#include "voronoi/restricted.h"
+#include "voronoi/diagram.h"
 
 namespace bisector {
-
-struct Dual {
-  // Triples of cells that share a vertex of the diagram, each oriented as the surface at its first such vertex. Sorted as
-  // ascending triples, without repeats.
-  std::vector<Triangle> triangles;
-  // How many vertices of the diagram each triple has; 1 where the topological ball property holds.
-  std::vector<Index> multiplicity;
-  std::vector<Index> mesh_triangle;  // in which its first such vertex lies
-};
 
 Dual extract_dual(const RestrictedPolygons& polygons);
 

@@ -95,8 +95,7 @@ struct RestrictedVoronoi::Work {
   void sum_cells(std::size_t seed_count, CellMoments& result);
   void gather(RestrictedPolygons& polygons) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
-  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result, bool want_moments,
-                bool want_polygons);
+  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want, Diagram& diagram);
 };
 
 void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
@@ -290,8 +289,10 @@ bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSo
   return neighbours.update();
 }
 
-void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, CellMoments& result,
-                                       bool want_moments, bool want_polygons) {
+void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want,
+                                       Diagram& diagram) {
+  const bool want_polygons = includes(want, Want::polygons);
+  CellMoments& result = diagram.moments;
   const auto t0 = std::chrono::steady_clock::now();
   followed = follow(given, source);
   if (!followed) {
@@ -309,6 +310,7 @@ void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neighbour
   const bool delaunay = source == NeighbourSource::delaunay;
   result.seconds = {delaunay ? building : 0, delaunay ? 0 : building, std::chrono::duration<double>(t2 - t1).count(),
                     seconds_since(t2), {}};
+  if (want_polygons) gather(diagram.polygons);
 }
 
 // Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of triangles,
@@ -364,20 +366,12 @@ RestrictedVoronoi::RestrictedVoronoi(const Surface& surface, ListLength lists)
     : work_(std::make_unique<Work>(surface, lists)) {}
 RestrictedVoronoi::~RestrictedVoronoi() = default;
 
-void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result) {
-  work_->evaluate(seeds, source, result, true, false);
+void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
+  work_->evaluate(seeds, source, true, want, diagram);
 }
 
-void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
-                                 RestrictedPolygons& polygons) {
-  work_->evaluate(seeds, source, result, true, true);
-  work_->gather(polygons);
-}
-
-void RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, CellMoments& result,
-                              RestrictedPolygons* polygons) {
-  work_->evaluate(seeds, source, result, false, polygons != nullptr);
-  if (polygons) work_->gather(*polygons);
+void RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
+  work_->evaluate(seeds, source, false, want, diagram);
 }
 
 const SortedSeeds& RestrictedVoronoi::seeds() const { return work_->seeds; }

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "voronoi/restricted.h"
+#include "voronoi/diagram.h"
 
 namespace bisector {
 

@@ -20,8 +20,6 @@
 namespace bisector {
 namespace {
 
-using test::Diagram;
-
 // The CPU in a device's place, which fails from some evaluation on and leaves its results half done.
 class FailingBackend : public CpuBackend {
  public:
@@ -31,17 +29,13 @@ class FailingBackend : public CpuBackend {
   BackendDescription description() const override { return {"fake", "discrete", "single", ""}; }
   double mass_tolerance() const override { return 1e-6; }
   double energy_noise() const override { return 1e-7; }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) override {
-    CpuBackend::evaluate(seeds, moments);
-    fail(moments);
-  }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) override {
-    CpuBackend::evaluate(seeds, moments, polygons);
-    if (left_ == 0) polygons.pairs.resize(polygons.pairs.size() / 2);
-    fail(moments);
-  }
 
  private:
+  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override {
+    CpuBackend::compute(seeds, want, diagram);
+    if (left_ == 0) diagram.polygons.pairs.resize(diagram.polygons.pairs.size() / 2);
+    fail(diagram.moments);
+  }
   void fail(CellMoments& moments) {
     if (left_-- > 0) return;
     moments.cells.resize(moments.cells.size() / 2);
@@ -60,7 +54,7 @@ Context collecting(std::vector<std::string>& warnings) {
 
 Diagram evaluate(Backend& backend, const std::vector<Vec3>& seeds) {
   Diagram d;
-  backend.evaluate(seeds, d.moments, d.polygons);
+  backend.evaluate(seeds, Want::polygons, d);
   return d;
 }
 
@@ -160,7 +154,9 @@ TEST_F(Compute, AFailedDeviceIsReplacedOnce) {
 class BrokenBackend : public CpuBackend {
  public:
   using CpuBackend::CpuBackend;
-  void evaluate(const std::vector<Vec3>&, CellMoments&) override { throw Error("bad input"); }
+
+ private:
+  void compute(const std::vector<Vec3>&, Want, Diagram&) override { throw Error("bad input"); }
 };
 
 TEST_F(Compute, OtherErrorsAreNotTheDevices) {
@@ -198,12 +194,13 @@ class NoisyBackend : public CpuBackend {
   NoisyBackend(const Surface& surface, double noise) : CpuBackend(surface, NeighbourSource::nearest), noise_(noise) {}
 
   double energy_noise() const override { return noise_; }
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) override {
-    CpuBackend::evaluate(seeds, moments);
-    moments.energy *= 1 + 5e-7 * (2 * Random(7, evaluations_++).uniform() - 1);
-  }
 
  private:
+  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override {
+    CpuBackend::compute(seeds, want, diagram);
+    diagram.moments.energy *= 1 + 5e-7 * (2 * Random(7, evaluations_++).uniform() - 1);
+  }
+
   double noise_;
   std::uint64_t evaluations_ = 0;
 };

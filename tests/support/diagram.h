@@ -17,14 +17,9 @@
 
 namespace bisector::test {
 
-struct Diagram {
-  CellMoments moments;
-  RestrictedPolygons polygons;
-};
-
 inline Diagram diagram_of(RestrictedVoronoi& voronoi, const std::vector<Vec3>& seeds, NeighbourSource source) {
   Diagram d;
-  voronoi.evaluate(seeds, source, d.moments, d.polygons);
+  voronoi.evaluate(seeds, source, Want::polygons, d);
   return d;
 }
 

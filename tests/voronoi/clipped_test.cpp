@@ -23,19 +23,13 @@ namespace {
 
 constexpr NeighbourSource kSources[] = {NeighbourSource::nearest, NeighbourSource::delaunay};
 
-struct SolidDiagram {
-  CellMoments moments;
-  RestrictedPolygons polygons;
-  ClippedPolyhedra polyhedra;
-};
-
-SolidDiagram diagram_of(ClippedVoronoi& voronoi, const std::vector<Vec3>& seeds, NeighbourSource source) {
-  SolidDiagram d;
-  voronoi.evaluate(seeds, source, d.moments, d.polygons, d.polyhedra);
+Diagram diagram_of(ClippedVoronoi& voronoi, const std::vector<Vec3>& seeds, NeighbourSource source) {
+  Diagram d;
+  voronoi.evaluate(seeds, source, Want::polygons | Want::polyhedra, d);
   return d;
 }
 
-SolidDiagram diagram_of(const Solid& solid, const std::vector<Vec3>& seeds, NeighbourSource source, InnerCells inner) {
+Diagram diagram_of(const Solid& solid, const std::vector<Vec3>& seeds, NeighbourSource source, InnerCells inner) {
   ClippedVoronoi voronoi(solid, inner);
   return diagram_of(voronoi, seeds, source);
 }
@@ -123,7 +117,7 @@ bool triangles_differ(const Solid& solid) {
   return true;
 }
 
-void expect_sound(const Solid& solid, const SolidDiagram& d) {
+void expect_sound(const Solid& solid, const Diagram& d) {
   EXPECT_EQ(count_untiled(solid, d.polyhedra), 0u);
   EXPECT_NEAR(d.moments.mass, solid.mass, 1e-12 * solid.mass);
   EXPECT_EQ(d.moments.certification.pairs, d.polyhedra.pairs.size());
@@ -188,7 +182,7 @@ void expect_oracle(const SolidCase& problem, bool every_way) {
       if (!every_way && (source == NeighbourSource::nearest) != (inner == InnerCells::whole)) continue;
       SCOPED_TRACE(source == NeighbourSource::nearest ? "nearest" : "delaunay");
       SCOPED_TRACE(inner == InnerCells::whole ? "whole" : "clipped");
-      const SolidDiagram got = diagram_of(solid, seeds, source, inner);
+      const Diagram got = diagram_of(solid, seeds, source, inner);
       expect_sound(solid, got);
       std::size_t wholes = 0;
       for (const auto& pair : got.polyhedra.pairs) wholes += pair.tet == kNone;
@@ -231,7 +225,7 @@ INSTANTIATE_TEST_SUITE_P(Clipped, IntegerSolids, testing::Range(std::uint64_t{0}
 
 // --- Against itself ---
 
-void expect_same_diagram(const SolidDiagram& a, const SolidDiagram& b) {
+void expect_same_diagram(const Diagram& a, const Diagram& b) {
   expect_same_moments(a.moments, b.moments);
   EXPECT_TRUE(same_bits(a.moments.step_mass, b.moments.step_mass));
   EXPECT_TRUE(pairs_of(a.polyhedra) == pairs_of(b.polyhedra));
@@ -278,7 +272,7 @@ TEST_P(MediumSolid, EverySourceAndThreadCountGivesTheSameBits) {
       const ThreadLimit limit(threads);
       return diagram_of(solid, GetParam().seeds, source, inner);
     };
-    const SolidDiagram reference = with(NeighbourSource::nearest, 1);
+    const Diagram reference = with(NeighbourSource::nearest, 1);
     expect_sound(solid, reference);
     expect_same_diagram(reference, with(NeighbourSource::nearest, 2));
     expect_same_diagram(reference, with(NeighbourSource::delaunay, 2));
@@ -289,8 +283,8 @@ TEST_P(MediumSolid, EverySourceAndThreadCountGivesTheSameBits) {
 TEST_P(MediumSolid, WholeCellsAreTheSumOfTheirPieces) {
   const Solid solid(GetParam().mesh);
   const std::vector<Vec3>& seeds = GetParam().seeds;
-  const SolidDiagram cut = diagram_of(solid, seeds, NeighbourSource::delaunay, InnerCells::clipped);
-  const SolidDiagram whole = diagram_of(solid, seeds, NeighbourSource::delaunay, InnerCells::whole);
+  const Diagram cut = diagram_of(solid, seeds, NeighbourSource::delaunay, InnerCells::clipped);
+  const Diagram whole = diagram_of(solid, seeds, NeighbourSource::delaunay, InnerCells::whole);
   EXPECT_EQ(dual_tets(cut.polyhedra), dual_tets(whole.polyhedra));
   EXPECT_EQ(cut.moments.triangles.values, whole.moments.triangles.values);
   const double reach = reach_of(solid, seeds);
@@ -321,7 +315,7 @@ TEST_P(MediumSolid, AUsedObjectAnswersAsAFreshOne) {
   SplitMix64 random(27);
   for (Vec3& x : moved) x += 1e-3 * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
   diagram_of(used, moved, NeighbourSource::nearest);
-  const SolidDiagram again = diagram_of(used, GetParam().seeds, NeighbourSource::nearest);
+  const Diagram again = diagram_of(used, GetParam().seeds, NeighbourSource::nearest);
   expect_same_diagram(again, diagram_of(solid, GetParam().seeds, NeighbourSource::nearest, InnerCells::whole));
 }
 
@@ -337,15 +331,16 @@ std::vector<double> linear_density(const TetMesh& mesh) {
 }
 
 double energy_of(ClippedVoronoi& voronoi, const std::vector<Vec3>& seeds) {
-  CellMoments moments;
-  voronoi.evaluate(seeds, NeighbourSource::nearest, moments);
-  return moments.energy;
+  Diagram diagram;
+  voronoi.evaluate(seeds, NeighbourSource::nearest, Want::moments, diagram);
+  return diagram.moments.energy;
 }
 
 void expect_gradient(const Solid& solid, std::vector<Vec3> seeds) {
   ClippedVoronoi voronoi(solid);
-  CellMoments moments;
-  voronoi.evaluate(seeds, NeighbourSource::nearest, moments);
+  Diagram diagram;
+  voronoi.evaluate(seeds, NeighbourSource::nearest, Want::moments, diagram);
+  const CellMoments& moments = diagram.moments;
   constexpr double kStep = 1e-5;
   for (std::size_t i = 0; i < seeds.size(); i += 5)
     for (int k = 0; k < 3; ++k) {
@@ -372,8 +367,8 @@ TEST(ClippedMoments, ADensityThatIsLinearThroughoutWeighsTheUniformCells) {
   const TetMesh mesh = shaken(tet_grid(3, 2, 2), 0.2, 33);
   const std::vector<Vec3> seeds = seeds_about(mesh, 100, 0.2, 34);
   const Solid uniform(mesh), weighted(mesh, linear_density(mesh));
-  const SolidDiagram a = diagram_of(uniform, seeds, NeighbourSource::nearest, InnerCells::clipped);
-  const SolidDiagram b = diagram_of(weighted, seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram a = diagram_of(uniform, seeds, NeighbourSource::nearest, InnerCells::clipped);
+  const Diagram b = diagram_of(weighted, seeds, NeighbourSource::nearest, InnerCells::whole);
   expect_sound(weighted, b);
   EXPECT_TRUE(pairs_of(a.polyhedra) == pairs_of(b.polyhedra));
   for (std::size_t i = 0; i < seeds.size(); ++i) {
@@ -387,8 +382,8 @@ TEST(ClippedMoments, AConstantDensityScalesThem) {
   const TetMesh mesh = hollow();
   const std::vector<Vec3> seeds = seeds_about(mesh, 300, 0.1, 35);
   const Solid plain(mesh), tripled(mesh, std::vector<double>(mesh.vertices.size(), 3.0));
-  const SolidDiagram a = diagram_of(plain, seeds, NeighbourSource::nearest, InnerCells::whole);
-  const SolidDiagram b = diagram_of(tripled, seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram a = diagram_of(plain, seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram b = diagram_of(tripled, seeds, NeighbourSource::nearest, InnerCells::whole);
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     EXPECT_NEAR(b.moments.cells[i].mass, 3 * a.moments.cells[i].mass, 1e-13 * tripled.mass);
     EXPECT_LE(norm(b.moments.cells[i].first - 3 * a.moments.cells[i].first), 1e-13 * tripled.mass * 3);
@@ -401,7 +396,7 @@ TEST(ClippedMoments, AgreeWithCountingPoints) {
   const TetMesh mesh = tet_grid(2, 2, 2);
   const std::vector<Vec3> seeds = seeds_about(mesh, 8, 0, 36);
   const Solid solid(mesh, linear_density(mesh));
-  const SolidDiagram d = diagram_of(solid, seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram d = diagram_of(solid, seeds, NeighbourSource::nearest, InnerCells::whole);
   constexpr int kPoints = 64;
   constexpr double kCell = 2.0 / kPoints;
   std::vector<Moments> counted(seeds.size());
@@ -432,7 +427,7 @@ TEST(Clipped, ACellOutsideOwnsNothing) {
   for (const Vec3 d : {Vec3{0.05, 0, 0}, Vec3{-0.05, 0, 0}, Vec3{0, 0.05, 0}, Vec3{0, -0.05, 0}, Vec3{0, 0, 0.05}, Vec3{0, 0, -0.05}})
     seeds.push_back(Vec3{1.5, 1.5, 1.5} + d);
   seeds.push_back({9, 9, 9});
-  const SolidDiagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, InnerCells::whole);
   EXPECT_EQ(d.moments.cells[inside].mass, 0);
   EXPECT_EQ(d.moments.cells.back().mass, 0);
   for (const auto& pair : d.polyhedra.pairs) EXPECT_NE(pair.cell, inside);
@@ -441,7 +436,7 @@ TEST(Clipped, ACellOutsideOwnsNothing) {
 TEST(Clipped, EmptyCellsOfEqualSeedsHaveNoMass) {
   const TetMesh mesh = tet_grid(2, 2, 2);
   const std::vector<Vec3> seeds = repeated(seeds_about(mesh, 50, 0, 42), 2);
-  const SolidDiagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::delaunay, InnerCells::whole);
+  const Diagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::delaunay, InnerCells::whole);
   for (std::size_t i = 50; i < 100; ++i) EXPECT_EQ(d.moments.cells[i].mass, 0);
 }
 
@@ -478,7 +473,7 @@ TEST(Clipped, TheDualOfSeedsInTheSolidIsTheirDelaunayTriangulation) {
 
 TEST(Clipped, TilingFailsWhereAPolyhedronIsMissingOrWrong) {
   const Solid solid(tet_grid(2, 2, 2));
-  const SolidDiagram d = diagram_of(solid, seeds_about(solid.mesh, 40, 0, 44), NeighbourSource::nearest, InnerCells::whole);
+  const Diagram d = diagram_of(solid, seeds_about(solid.mesh, 40, 0, 44), NeighbourSource::nearest, InnerCells::whole);
   ASSERT_EQ(count_untiled(solid, d.polyhedra), 0u);
   const std::size_t k = d.polyhedra.pairs.size() / 2;
   ClippedPolyhedra relabelled = d.polyhedra;
@@ -557,8 +552,8 @@ TEST(SolidBackends, TheCpuIsOne) {
   EXPECT_EQ(backend->description().kind, "cpu");
   EXPECT_EQ(backend->mass(), solid.mass);
   const std::vector<Vec3> seeds = seeds_about(solid.mesh, 100, 0, 46);
-  SolidDiagram d;
-  backend->evaluate(seeds, d.moments, d.polygons, d.polyhedra);
+  Diagram d;
+  backend->evaluate(seeds, Want::polygons | Want::polyhedra, d);
   expect_same_diagram(d, diagram_of(solid, seeds, NeighbourSource::nearest, InnerCells::whole));
   options.device = "abacus";
   EXPECT_THROW(make_backend(solid, options), Error);

@@ -220,12 +220,12 @@ TEST_P(Medium, EverySourceAndThreadCountGivesTheSameBits) {
     }
   // An object that has seen other seeds, fewer and more of them.
   RestrictedVoronoi used(surface);
-  CellMoments moments;
-  used.evaluate(random_seeds(mesh, 50, 27), NeighbourSource::nearest, moments);
+  Diagram last;
+  used.evaluate(random_seeds(mesh, 50, 27), NeighbourSource::nearest, Want::moments, last);
   for (NeighbourSource source : kSources) expect_same_diagram(diagram_of(used, seeds, source), reference);
-  used.evaluate(random_seeds(mesh, 6000, 28), NeighbourSource::delaunay, moments);
-  used.evaluate(seeds, NeighbourSource::nearest, moments);
-  expect_same_moments(moments, reference.moments);
+  used.evaluate(random_seeds(mesh, 6000, 28), NeighbourSource::delaunay, Want::moments, last);
+  used.evaluate(seeds, NeighbourSource::nearest, Want::moments, last);
+  expect_same_moments(last.moments, reference.moments);
 }
 
 // The optimiser's use: seeds that move a little, or jump, change their number, coincide, and come back.
@@ -247,9 +247,10 @@ TEST_P(Medium, AUsedObjectAnswersAsAFreshOne) {
       std::fill(moving.begin(), moving.begin() + static_cast<std::ptrdiff_t>(moving.size() / 2), moving[0]);
     if (step == 7) moving = seeds;
     const NeighbourSource source = kSources[step == 4];
-    CellMoments got, want;
-    used.evaluate(moving, source, got);
-    RestrictedVoronoi(surface).evaluate(moving, source, want);
+    Diagram of_used, of_fresh;
+    used.evaluate(moving, source, Want::moments, of_used);
+    RestrictedVoronoi(surface).evaluate(moving, source, Want::moments, of_fresh);
+    const CellMoments &got = of_used.moments, &want = of_fresh.moments;
     SCOPED_TRACE(step);
     expect_same_moments(got, want);
     EXPECT_TRUE(same_bits(got.step_mass, want.step_mass));
@@ -262,24 +263,24 @@ TEST_P(Medium, AUsedObjectAnswersAsAFreshOne) {
 TEST_P(Medium, StepMassesAreTheSameForBothSources) {
   const auto& [name, mesh, seeds] = GetParam();
   const Surface surface(mesh);
-  CellMoments nearest, delaunay;
-  RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::nearest, nearest);
-  RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::delaunay, delaunay);
-  EXPECT_TRUE(same_bits(nearest.step_mass, delaunay.step_mass));
+  Diagram nearest, delaunay;
+  RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::nearest, Want::moments, nearest);
+  RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::delaunay, Want::moments, delaunay);
+  EXPECT_TRUE(same_bits(nearest.moments.step_mass, delaunay.moments.step_mass));
 }
 
 TEST_P(Medium, CertificationIsReproducible) {
   const auto& [name, mesh, seeds] = GetParam();
   const Surface surface(mesh);
   for (NeighbourSource source : kSources) {
-    CellMoments first;
+    Diagram first;
     for (unsigned threads : {1u, 2u, 2u}) {
       const ThreadLimit limit(threads);
-      CellMoments again;
-      RestrictedVoronoi(surface).evaluate(seeds, source, again);
-      if (first.cells.empty()) first = again;
-      EXPECT_EQ(again.certification.uncertain, first.certification.uncertain);
-      EXPECT_EQ(again.certification.wider, first.certification.wider);
+      Diagram again;
+      RestrictedVoronoi(surface).evaluate(seeds, source, Want::moments, again);
+      if (first.moments.cells.empty()) first = again;
+      EXPECT_EQ(again.moments.certification.uncertain, first.moments.certification.uncertain);
+      EXPECT_EQ(again.moments.certification.wider, first.moments.certification.wider);
     }
   }
 }

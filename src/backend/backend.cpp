@@ -1,0 +1,49 @@
+#include "backend/backend.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include "bisector/error.h"
+#include "voronoi/dual.h"
+
+namespace bisector {
+
+EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
+  if (seeds.empty()) throw Error("there are no seeds; give at least one");
+  const Want computed = includes(want, Want::dual) ? (want & Want::polyhedra) | Want::polygons : want;
+  if (!includes(offers_, computed)) throw std::logic_error("a backend of a surface was asked for polyhedra");
+  compute(seeds, computed, diagram);
+  if (!includes(computed, Want::polygons)) diagram.polygons = {};
+  if (!includes(computed, Want::polyhedra)) diagram.polyhedra = {};
+  if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
+  else diagram.dual = {};
+  diagram.has = want | computed;
+  return {diagram.moments.certification, diagram.moments.seconds};
+}
+
+void Backend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) {
+  Diagram diagram;
+  std::swap(diagram.moments, moments);
+  evaluate(seeds, Want::moments, diagram);
+  std::swap(diagram.moments, moments);
+}
+
+void Backend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) {
+  Diagram diagram;
+  std::swap(diagram.moments, moments);
+  evaluate(seeds, Want::polygons, diagram);
+  std::swap(diagram.moments, moments);
+  polygons = std::move(diagram.polygons);
+}
+
+void Backend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons,
+                       ClippedPolyhedra& polyhedra) {
+  Diagram diagram;
+  std::swap(diagram.moments, moments);
+  evaluate(seeds, Want::polygons | Want::polyhedra, diagram);
+  std::swap(diagram.moments, moments);
+  polygons = std::move(diagram.polygons);
+  polyhedra = std::move(diagram.polyhedra);
+}
+
+}  // namespace bisector
