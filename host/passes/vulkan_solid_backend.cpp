@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "backend/cpu_backend.h"
 #include "host/passes/cell_pass.h"
 #include "host/passes/polyhedra_pass.h"
 #include "host/passes/surface_stage.h"

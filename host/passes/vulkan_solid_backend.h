@@ -6,6 +6,7 @@
 
 #include "backend/backend.h"
 #include "host/passes/vulkan_backend.h"
+#include "voronoi/clipped.h"
 
 namespace bisector::host {
 

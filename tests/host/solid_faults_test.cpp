@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "backend/cpu_backend.h"
 #include "backend/fallback_backend.h"
 #include "check/parity.h"
 #include "host/device/faults.h"

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "backend/cpu_backend.h"
 #include "compute/compute.h"
 #include "host/passes/vulkan_solid_backend.h"
 #include "support/models.h"
