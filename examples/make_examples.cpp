@@ -1,6 +1,9 @@
 // Generates the two models that ship with Bisector: smooth.off, a closed organic surface of genus 1, and part.off, a
 // machined part of genus 4. Both are triangulated the way such models arrive: the one by marching tetrahedra, the other
 // as a CAD system exports faces. Usage: make_examples DIRECTORY
+#include <bisector/error.h>
+#include <bisector/io.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,15 +14,19 @@
 #include <string>
 #include <vector>
 
-#include "core/geometry.h"
-#include "io/mesh_io.h"
-
 namespace {
 
 using bisector::Index;
 using bisector::Triangle;
 using bisector::TriangleMesh;
 using bisector::Vec3;
+
+Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Vec3 operator*(double s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
+double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+double norm2(const Vec3& a) { return dot(a, a); }
+double norm(const Vec3& a) { return std::sqrt(norm2(a)); }
 
 // Coordinates are multiples of a power of two: short in the file, and the same whatever the last bit of a cosine is.
 double rounded(double x, double quantum) { return std::nearbyint(x / quantum) * quantum; }
