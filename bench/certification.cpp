@@ -152,7 +152,7 @@ void run(const Options& options) {
     for (const std::string& pattern : options.patterns)
       for (const std::string& rung : options.rungs) {
         table.rows.push_back(row_of({"bench_certification", model, "--once", "--seeds", std::to_string(options.seeds),
-                                     "--patterns", pattern, "--rungs", rung, "--device", options.device.word}));
+                                     "--patterns", pattern, "--rungs", rung, "--device", word_of(options.device.device)}));
         std::fprintf(stderr, "%s, %s, %s: done\n", model.c_str(), pattern.c_str(), rung.c_str());
       }
   fmt::print("{}", table.markdown());
@@ -164,7 +164,7 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  options.device.word = "vulkan";
+  options.device.device.kind = DeviceRequest::Kind::vulkan;
   CLI::App app{"Counts the pairs that climb each rung of certification on a device, with time and memory."};
   app.add_option("MESH", options.models, "surfaces; default: examples/smooth.off");
   app.add_option("--seeds", options.seeds, "about how many")->check(CLI::Range(2, 100'000'000));
@@ -172,7 +172,7 @@ int main(int argc, char** argv) {
       ->delimiter(',')->check(CLI::IsMember({"random", "grid", "dyadic"}));
   app.add_option("--rungs", options.rungs, "double; single; single-only, without the double rung")
       ->delimiter(',')->check(CLI::IsMember({"double", "single", "single-only"}));
-  app.add_option("--device", options.device.word, "of 'bisector devices'; default: the best");
+  add_device(app, options.device.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
   app.add_option("--json", options.json, "the same as JSON");
   app.add_flag("--once", options.once)->group("");

@@ -31,7 +31,8 @@ using namespace bisector::bench;
 struct Options {
   std::vector<std::string> models;
   std::vector<std::size_t> seeds{1'000, 3'000, 10'000, 30'000, 100'000};
-  std::string source = "nearest", csv, plot;
+  std::string csv, plot;
+  NeighbourSource source = NeighbourSource::nearest;
   unsigned threads = 1;
   std::size_t repeat = 3;
   DeviceOptions device;
@@ -107,9 +108,9 @@ std::string svg(const std::vector<Line>& lines) {
 
 std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Options& options) {
   ComputeOptions compute;
-  compute.device = options.device.word;
+  compute.device = options.device.device;
   compute.precision = options.device.precision;
-  compute.neighbours = options.source == "delaunay" ? NeighbourSource::delaunay : NeighbourSource::nearest;
+  compute.neighbours = options.source;
   return make_backend(solid, compute);
 }
 
@@ -161,7 +162,7 @@ void measure(const std::string& path, const Options& options, Table& table, std:
 void run(const Options& options) {
   const ThreadLimit limit(options.threads);
   fmt::print("{}\n", describe_machine());
-  if (options.device.word != "cpu") fmt::print("device: {}\n", describe_device(options.device));
+  if (!is_cpu(options.device.device)) fmt::print("device: {}\n", describe_device(options.device));
   fmt::print("{} threads; solids prepared once, not counted; times in ms\n\n", options.threads);
   Table table{{"model", "|T|", "|S|", "|X|", "|X_b|", "backend", "total", "neighbours", "surface", "clip", "CGAL", "ratio", "pairs",
                "uncertain", "wider", "mass error"}, {}};
@@ -181,7 +182,7 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", options.seeds, "counts of sites, uniform in the solid")->delimiter(',');
   app.add_option("--repeat", options.repeat, "runs of each")->check(CLI::Range(1, 1000));
   app.add_option("--threads", options.threads, "number of threads")->check(CLI::Range(1, 1024));
-  app.add_option("--source", options.source, "nearest or delaunay")->check(CLI::IsMember({"nearest", "delaunay"}));
+  cli::add_words(&app, "--source", options.source, cli::kNeighbourWords, cli::kNeighbourWords.list().c_str());
   add_device_options(app, options.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
   app.add_option("--plot", options.plot, "also plot total times to this file, as SVG");

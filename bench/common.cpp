@@ -73,27 +73,29 @@ std::string Table::json() const {
 }
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {
-  static const std::map<std::string, Precision> kPrecisions{
-      {"auto", Precision::automatic}, {"single", Precision::single}, {"double", Precision::double_}};
   static const std::map<std::string, bool> kSwitch{{"on", true}, {"off", false}};
-  app.add_option("--device", options.word, "cpu, vulkan, vulkan:INDEX or vulkan:UUID");
-  app.add_option("--precision", options.precision, "auto, single, double")->transform(CLI::CheckedTransformer(kPrecisions));
+  add_device(app, options.device);
+  cli::add_words(&app, "--precision", options.precision, cli::kPrecisionWords, cli::kPrecisionWords.list().c_str());
   app.add_option("--double-rung", options.double_rung, "on, off: of single precision")
       ->transform(CLI::CheckedTransformer(kSwitch));
 }
 
+void add_device(CLI::App& app, DeviceRequest& device) {
+  cli::add_parsed(&app, "--device", device, parse_device, "cpu, vulkan, vulkan:INDEX or vulkan:UUID");
+}
+
 std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options, NeighbourSource source) {
-  if (options.word == "cpu") return std::make_unique<CpuBackend>(surface, source);
+  if (is_cpu(options.device)) return std::make_unique<CpuBackend>(surface, source);
   host::VulkanOptions vulkan;
   vulkan.precision = options.precision;
   vulkan.neighbours = source;
   vulkan.double_rung = options.double_rung;
-  return host::make_vulkan_backend(surface, host::Device::open(options.word), vulkan);
+  return host::make_vulkan_backend(surface, host::Device::open(options.device), vulkan);
 }
 
 std::string describe_device(const DeviceOptions& options) {
-  if (options.word == "cpu") return "the CPU";
-  const DeviceDescription device = host::Device::open(options.word)->description();
+  if (is_cpu(options.device)) return "the CPU";
+  const DeviceDescription device = host::Device::open(options.device)->description();
   return fmt::format("{} ({}), driver {}, Vulkan {}", device.name, device.kind, device.driver, device.api);
 }
 

@@ -1,25 +1,19 @@
 // What the benchmarks share: medians, lists on the command line, tables, the machine.
 #pragma once
 
-#include <chrono>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "cli/parsed_option.h"
+#include "cli/words.h"
 #include "core/geometry.h"
+#include "core/stopwatch.h"
 #include "compute/compute.h"
 
 namespace bisector::bench {
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 // The middle value, or the mean of the two; 0 if there are none.
 double median(std::vector<double> values);
@@ -41,14 +35,18 @@ struct Table {
 std::string describe_machine();
 // A device and how it computes, from the command line.
 struct DeviceOptions {
-  std::string word = "cpu";
+  DeviceRequest device{.kind = DeviceRequest::Kind::cpu};
   Precision precision = Precision::automatic;
   bool double_rung = true;  // whether single precision hands uncertain pairs to double precision
 };
 
+// --device
+void add_device(CLI::App& app, DeviceRequest& device);
+// --device, --precision and --double-rung
 void add_device_options(CLI::App& app, DeviceOptions& options);
+inline bool is_cpu(const DeviceRequest& device) { return device.kind == DeviceRequest::Kind::cpu; }
 
-// Throws Error and DeviceError as bisector::make_backend() does. Not for "auto".
+// Throws Error and DeviceError as bisector::make_backend() does. Not for an automatic request.
 std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options, NeighbourSource source);
 std::string describe_device(const DeviceOptions& options);
 

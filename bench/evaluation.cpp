@@ -39,10 +39,6 @@ struct Options {
   bool once = false;  // one evaluation of the first of each list and nothing else, for its memory
 };
 
-NeighbourSource source_of(const std::string& name) {
-  return name == "delaunay" ? NeighbourSource::delaunay : NeighbourSource::nearest;
-}
-
 struct Run {
   double total = 0, gradient_norm = 0;
   Diagram diagram;
@@ -72,20 +68,16 @@ Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSo
   return run;
 }
 
-const char* precision_word(Precision precision) {
-  return precision == Precision::single ? "single" : precision == Precision::double_ ? "double" : "auto";
-}
-
 std::unique_ptr<Backend> device_of(const Surface& surface, const Options& options, NeighbourSource source) {
-  return options.device.word == "cpu" ? nullptr : make_device_backend(surface, options.device, source);
+  return is_cpu(options.device.device) ? nullptr : make_device_backend(surface, options.device, source);
 }
 
 // Peak resident memory, in MiB, of a process that reads the model and evaluates once. Must come before the first loop of
 // this process: a new process counts what its parent held.
 double peak_memory(const Options& options, std::size_t seeds, const std::string& source, unsigned threads) {
   std::vector<std::string> words{"bench_evaluation", options.model, "--once", "--seeds", std::to_string(seeds), "--sources",
-                                 source, "--threads", std::to_string(threads), "--device", options.device.word,
-                                 "--precision", precision_word(options.device.precision)};
+                                 source, "--threads", std::to_string(threads), "--device", word_of(options.device.device),
+                                 "--precision", std::string(cli::kPrecisionWords.word_of(options.device.precision))};
   if (!options.device.double_rung) words.insert(words.end(), {"--double-rung", "off"});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -137,12 +129,12 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
   const std::vector<Vec3> seeds = random_seeds(surface.mesh, count);
   const std::size_t repeat = count < kMany ? options.repeat : (options.repeat + 1) / 2;
   std::vector<double> delaunay;
-  for (Series& s : series) s.device = device_of(surface, options, source_of(s.source));
+  for (Series& s : series) s.device = device_of(surface, options, cli::kNeighbourWords.parse(s.source));
   for (std::size_t r = 0; r < repeat; ++r) {
     for (Series& s : series) {
       // Its own triangulation right before each: what slows one of the two slows the other.
       delaunay.push_back(delaunay_seconds(seeds));
-      s.add(evaluate(surface, seeds, source_of(s.source), s.threads, s.device.get()), delaunay.back());
+      s.add(evaluate(surface, seeds, cli::kNeighbourWords.parse(s.source), s.threads, s.device.get()), delaunay.back());
     }
     std::fprintf(stderr, "%zu seeds: round %zu of %zu\n", count, r + 1, repeat);
   }
@@ -158,7 +150,7 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
                           fmt::format("{:.0f}", s.memory), std::to_string(m.certification.pairs),
                           std::to_string(m.certification.uncertain), std::to_string(m.certification.wider),
                           fmt::format("{:.1e}", std::abs(m.mass - surface.mass) / surface.mass)});
-    if (options.device.word == "cpu") continue;
+    if (is_cpu(options.device.device)) continue;
     const DeviceSeconds& d = m.seconds.device;
     std::vector<std::string>& row = table.rows.back();
     row.insert(row.end(), {std::to_string(m.certification.doubled), std::to_string(m.certification.cpu)});
@@ -172,7 +164,7 @@ void run(const Options& options) {
     const ThreadLimit limit(options.threads.front());
     const Surface surface(read_mesh(options.model));
     const std::vector<Vec3> seeds = random_seeds(surface.mesh, options.seeds.front());
-    const NeighbourSource source = source_of(options.sources.front());
+    const NeighbourSource source = cli::kNeighbourWords.parse(options.sources.front());
     evaluate(surface, seeds, source, options.threads.front(), device_of(surface, options, source).get());
     return;
   }
@@ -197,7 +189,7 @@ void run(const Options& options) {
              1e3 * preparing.seconds());
   Table table{{"seeds", "source", "threads", "total", "neighbours", "owners", "clip", "CGAL", "ratio", "speed-up", "memory",
                "pairs", "uncertain", "wider", "mass error"}, {}};
-  if (options.device.word != "cpu") {
+  if (!is_cpu(options.device.device)) {
     fmt::print("device: {}\n\n", describe_device(options.device));
     for (const char* name : {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort",
                              "d. sum"})
@@ -218,8 +210,9 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", options.seeds, "counts, area-uniform random seeds")->delimiter(',');
   app.add_option("--repeat", options.repeat, "runs of each; half as many from 500,000 seeds on")->check(CLI::Range(1, 1000));
   app.add_option("--threads", options.threads, "numbers of threads")->delimiter(',')->check(CLI::Range(1, 1024));
-  app.add_option("--sources", options.sources, "nearest, delaunay")
-      ->delimiter(',')->check(CLI::IsMember({"nearest", "delaunay"}));
+  app.add_option("--sources", options.sources, cli::kNeighbourWords.list())
+      ->delimiter(',')
+      ->check(cli::parsed_by([](const std::string& word) { cli::kNeighbourWords.parse(word); }));
   add_device_options(app, options.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
   app.add_option("--json", options.json, "the same as JSON");

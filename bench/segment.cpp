@@ -33,7 +33,7 @@ using namespace bisector::bench;
 struct Options {
   std::vector<std::string> models;
   std::vector<std::size_t> proxies{22};
-  std::string surfaces = "all", start = "merging", csv, json;
+  std::string csv, json;
   SegmentOptions segment;
   std::size_t repeat = 3, spread = 0, peer_iterations = 100;
   unsigned threads = 1;
@@ -98,15 +98,15 @@ TriangleMesh shuffled(const TriangleMesh& mesh, std::uint64_t seed) {
   return result;
 }
 
+std::string surfaces_word(const Options& options) {
+  return std::string(cli::kSurfaceWords.word_of(options.segment.surfaces));
+}
+
+std::string start_word(const Options& options) { return std::string(cli::kStartWords.word_of(options.segment.start)); }
+
 SegmentOptions options_of(const Options& options, std::size_t proxies) {
   SegmentOptions segment = options.segment;
   segment.proxies = proxies;
-  segment.surfaces = options.surfaces == "planes"     ? SegmentSurfaces::planes
-                     : options.surfaces == "quadrics" ? SegmentSurfaces::quadrics
-                                                      : SegmentSurfaces::all;
-  segment.start = options.start == "insertion" ? SegmentStart::insertion
-                  : options.start == "random"  ? SegmentStart::random
-                                               : SegmentStart::merging;
   return segment;
 }
 
@@ -124,12 +124,12 @@ void add_run(Table& table, const Options& options, const std::string& name, cons
   TriangleMesh projected{result.projected, mesh.triangles};
   const double share = evaluation_seconds(mesh) * static_cast<double>(result.evaluations) / total;
   const SegmentSeconds& s = result.seconds;
-  table.rows.push_back({name, std::to_string(mesh.triangles.size()), options.surfaces, options.start,
+  table.rows.push_back({name, std::to_string(mesh.triangles.size()), surfaces_word(options), start_word(options),
                         std::to_string(result.regions.size()), fmt::format("{:.2f}", total),
                         fmt::format("{:.2f}", s.start), fmt::format("{:.2f}", s.lloyd + s.improve),
                         fmt::format("{:.3f}", s.smooth + s.classify + s.project), percent(result.rms_before, diagonal),
                         percent(result.rms, diagonal), fmt::format("{:.4f}", measure_distance(projected, mesh).rms),
-                        options.surfaces == "planes" ? percent(planar_rms(mesh, result.labels), diagonal) : "",
+                        options.segment.surfaces == SegmentSurfaces::planes ? percent(planar_rms(mesh, result.labels), diagonal) : "",
                         fmt::format("{:.2f}", result.border_after / result.border_before),
                         std::to_string(result.iterations), fmt::format("{:.2f}", share)});
 }
@@ -168,10 +168,10 @@ void add_spread(Table& table, const Options& options, const std::string& name, c
                                                                         : segment(shuffled(mesh, k + 1), wanted);
     errors.push_back(result.rms);
     totals.push_back(result.seconds.total);
-    std::fprintf(stderr, "%s, %s: %zu of %zu\n", name.c_str(), options.start.c_str(), k + 1, options.spread);
+    std::fprintf(stderr, "%s, %s: %zu of %zu\n", name.c_str(), start_word(options).c_str(), k + 1, options.spread);
   }
   const double diagonal = diagonal_of(mesh);
-  table.rows.push_back({name, options.surfaces, options.start, std::to_string(proxies), std::to_string(options.spread),
+  table.rows.push_back({name, surfaces_word(options), start_word(options), std::to_string(proxies), std::to_string(options.spread),
                         percent(*std::min_element(errors.begin(), errors.end()), diagonal),
                         percent(median(errors), diagonal),
                         percent(*std::max_element(errors.begin(), errors.end()), diagonal),
@@ -211,8 +211,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Times segmentations and measures their errors."};
   app.add_option("MESH", options.models, "surfaces; default: examples/smooth.off");
   app.add_option("--proxies", options.proxies, "regions, of each mesh or of all; default 22")->delimiter(',');
-  app.add_option("--surfaces", options.surfaces, "planes, quadrics or all")->check(CLI::IsMember({"planes", "quadrics", "all"}));
-  app.add_option("--start", options.start, "merging, insertion or random")->check(CLI::IsMember({"merging", "insertion", "random"}));
+  cli::add_words(&app, "--surfaces", options.segment.surfaces, cli::kSurfaceWords, cli::kSurfaceWords.list().c_str());
+  cli::add_words(&app, "--start", options.segment.start, cli::kStartWords, cli::kStartWords.list().c_str());
   app.add_option("--iterations", options.segment.iterations, "Lloyd steps at most")->check(CLI::Range(0, 100'000));
   app.add_option("--smooth", options.segment.smooth, "weight of the borders' length")->check(CLI::Range(0.0, 1e6));
   app.add_option("--fuzzy-rings", options.segment.fuzzy_rings, "width of the strip")->check(CLI::Range(1, 1000));

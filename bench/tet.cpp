@@ -99,7 +99,7 @@ void run(const Options& options) {
   tet.vertices = options.vertices;
   tet.random_seed = options.random_seed;
   tet.threads = options.threads;
-  tet.compute.device = "cpu";
+  tet.compute.device.kind = DeviceRequest::Kind::cpu;
   if (options.density == "lfs") tet.sizing.field.kind = DensityKind::lfs;
   std::fprintf(stderr, "bisector\n");
   const Stopwatch watch;

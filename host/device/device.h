@@ -26,9 +26,8 @@ struct DeviceLimits {
 // Everything that may fail throws DeviceError with one line; after that the object is only good for destruction.
 class Device {
  public:
-  // `request` is "vulkan", "vulkan:INDEX" or "vulkan:UUID"; throws Error if it is none of these, and DeviceError that says which
-  // devices there are.
-  static std::unique_ptr<Device> open(const std::string& request);
+  // Of the request, which must be of the kind `vulkan`. Throws DeviceError that says which devices there are.
+  static std::unique_ptr<Device> open(const DeviceRequest& request = {.kind = DeviceRequest::Kind::vulkan});
   ~Device();
 
   const DeviceDescription& description() const;

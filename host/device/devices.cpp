@@ -10,35 +10,12 @@
 namespace bisector::host {
 namespace {
 
-// One of the three ways to ask for a device: nothing but "vulkan", an index, or a UUID as 32 digits.
-struct Request {
-  std::optional<unsigned> index;
-  std::string uuid;
-};
-
 std::string uuid_digits(std::string_view text) {
   std::string digits;
   for (const char c : text) {
     if (c != '-') digits += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   return digits;
-}
-
-Request parse(const std::string& request) {
-  constexpr std::string_view kPrefix = "vulkan:";
-  if (request == "vulkan") return {};
-  if (request.starts_with(kPrefix)) {
-    const std::string_view which = std::string_view(request).substr(kPrefix.size());
-    const auto all = [](std::string_view text, int (*kind)(int)) {
-      return std::ranges::all_of(text, [&](char c) { return kind(static_cast<unsigned char>(c)) != 0; });
-    };
-    const std::string digits = uuid_digits(which);
-    if (digits.size() == 32 && all(digits, std::isxdigit)) return {.index = {}, .uuid = digits};
-    if (!which.empty() && which.size() <= 9 && all(which, std::isdigit)) {
-      return {.index = static_cast<unsigned>(std::stoul(std::string(which))), .uuid = {}};
-    }
-  }
-  throw Error("--device " + request + ": not vulkan, vulkan:INDEX or vulkan:UUID; see `bisector devices`");
 }
 
 std::string count_and_names(const std::vector<Candidate>& candidates) {
@@ -52,18 +29,18 @@ std::string count_and_names(const std::vector<Candidate>& candidates) {
   return text + ")";
 }
 
-std::string rejection(const std::string& request, const DeviceDescription& description) {
-  return "--device " + request + ": " + description.name + " cannot be used: " + description.rejected +
-         "; see `bisector devices`";
+std::string rejection(const DeviceRequest& request, const DeviceDescription& description) {
+  return word_of(request) + ": " + description.name + " cannot be used: " + description.rejected;
 }
 
 // The devices that fit the request, best first.
-std::vector<const Candidate*> matching(const std::vector<Candidate>& candidates, const Request& wanted) {
+std::vector<const Candidate*> matching(const std::vector<Candidate>& candidates, const DeviceRequest& wanted) {
   std::vector<const Candidate*> found;
+  const std::string wanted_digits = uuid_digits(wanted.uuid);
   for (const Candidate& candidate : candidates) {
     const DeviceDescription& description = candidate.description;
     if (wanted.index && description.index != *wanted.index) continue;
-    if (!wanted.uuid.empty() && uuid_digits(description.uuid) != wanted.uuid) continue;
+    if (!wanted_digits.empty() && uuid_digits(description.uuid) != wanted_digits) continue;
     found.push_back(&candidate);
   }
   std::ranges::stable_sort(found, [](const Candidate* a, const Candidate* b) {
@@ -74,13 +51,12 @@ std::vector<const Candidate*> matching(const std::vector<Candidate>& candidates,
 
 }  // namespace
 
-std::unique_ptr<Device> Device::open(const std::string& request) {
-  const Request wanted = parse(request);
+std::unique_ptr<Device> Device::open(const DeviceRequest& request) {
   const auto instance = std::make_shared<const Instance>();
   const std::vector<Candidate> candidates = enumerate_candidates(*instance);
-  const std::vector<const Candidate*> found = matching(candidates, wanted);
+  const std::vector<const Candidate*> found = matching(candidates, request);
   if (found.empty()) {
-    throw DeviceError("--device " + request + ": " + count_and_names(candidates) + "; see `bisector devices`");
+    throw DeviceError(word_of(request) + ": " + count_and_names(candidates), Reason::no_such_device);
   }
   std::string refusal;
   for (const Candidate* candidate : found) {
@@ -92,7 +68,7 @@ std::unique_ptr<Device> Device::open(const std::string& request) {
     }
     if (refusal.empty()) refusal = rejection(request, description);
   }
-  throw DeviceError(refusal);
+  throw DeviceError(refusal, Reason::no_such_device);
 }
 
 }  // namespace bisector::host
@@ -112,7 +88,7 @@ DeviceList list_devices() {
         description.rejected = error.what();
       }
     }
-    if (list.devices.empty()) list.problem = "there is no Vulkan device; use --device cpu";
+    if (list.devices.empty()) list.problem = "there is no Vulkan device";
   } catch (const DeviceError& error) {
     list.problem = error.what();
   }

@@ -5,7 +5,7 @@
 
 namespace bisector {
 namespace {
-constexpr const char* kWithout = "built without Vulkan; use --device cpu";
+constexpr const char* kWithout = "built without Vulkan";
 }
 
 DeviceList list_devices() { return {.devices = {}, .problem = kWithout}; }
@@ -14,8 +14,8 @@ namespace host {
 
 struct Device::Impl {};
 
-std::unique_ptr<Device> Device::open(const std::string& request) {
-  throw DeviceError("--device " + request + ": " + kWithout);
+std::unique_ptr<Device> Device::open(const DeviceRequest& request) {
+  throw DeviceError(word_of(request) + ": " + kWithout);
 }
 Device::~Device() = default;
 const DeviceDescription& Device::description() const { throw DeviceError(kWithout); }

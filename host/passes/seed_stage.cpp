@@ -20,7 +20,7 @@ constexpr double kFarthest = 1e12;  // coordinate on the device; beyond, squares
 Precisions choose_precisions(const Device& device, Precision asked, bool double_rung) {
   const DeviceDescription& description = device.description();
   if (asked == Precision::double_ && !description.float64)
-    throw DeviceError(description.name + " does not compute in double precision; use --precision single");
+    throw DeviceError(description.name + " does not compute in double precision", Reason::no_double_precision);
   const bool is_double = asked == Precision::double_ || (asked == Precision::automatic && description.float64);
   return {is_double, !is_double && double_rung && description.float64};
 }

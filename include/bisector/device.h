@@ -3,8 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "bisector/export.h"
 
 namespace bisector {
 
@@ -19,10 +23,28 @@ enum class NeighbourSource {
   delaunay,  // Delaunay 1-ring; falls back to `nearest` for seeds in a plane
 };
 
+// Which device is to compute.
+struct DeviceRequest {
+  enum class Kind {
+    automatic,  // the best GPU, or the CPU if there is none or it fails
+    cpu,
+    vulkan,     // the Vulkan device that `index` or `uuid` names, or else the best one, and no other
+  };
+
+  Kind kind = Kind::automatic;
+  std::optional<unsigned> index = {};  // DeviceDescription::index
+  std::string uuid = {};               // DeviceDescription::uuid; empty: none given
+
+  bool operator==(const DeviceRequest&) const = default;
+};
+
+// Reads "auto", "cpu", "vulkan", "vulkan:INDEX" or "vulkan:UUID". Throws Error for anything else.
+BISECTOR_API DeviceRequest parse_device(std::string_view word);
+// The word that parse_device() reads.
+BISECTOR_API std::string word_of(const DeviceRequest& request);
+
 struct ComputeOptions {
-  // "cpu"; "vulkan" (the best device), "vulkan:INDEX" or "vulkan:UUID" (that very one); or "auto": the best GPU, or the CPU if
-  // there is none or it fails.
-  std::string device = "auto";
+  DeviceRequest device;
   Precision precision = Precision::automatic;
   NeighbourSource neighbours = NeighbourSource::nearest;
 };
@@ -47,11 +69,10 @@ struct DeviceList {
 };
 
 // Never throws for lack of a loader, a driver or a device.
-DeviceList list_devices();
+BISECTOR_API DeviceList list_devices();
 
-// The word for the best usable device of a list that is not software, "vulkan:INDEX"; empty if there is none. With `double_`
-// only those count that have it.
-std::string best_gpu(DeviceList list, Precision precision = Precision::automatic);
+// The best usable device of a list that is not software; nothing if there is none. With `double_` only those count that have it.
+BISECTOR_API std::optional<DeviceRequest> best_gpu(DeviceList list, Precision precision = Precision::automatic);
 
 struct BackendDescription {
   std::string name;       // of the processor or device

@@ -265,7 +265,7 @@ bool agrees(const DeviceCheckRow& row) {
 }
 
 template <class Domain>
-std::vector<Precision> precisions_of(const Domain& domain, const std::string& device, Precision asked) {
+std::vector<Precision> precisions_of(const Domain& domain, const DeviceRequest& device, Precision asked) {
   if (asked != Precision::automatic) return {asked};
   const BackendDescription best = make_backend(domain, {device, asked, NeighbourSource::nearest})->description();
   if (best.kind == "cpu") return {Precision::double_};
@@ -275,7 +275,7 @@ std::vector<Precision> precisions_of(const Domain& domain, const std::string& de
 
 // What a check has to tell and to whom.
 struct Check {
-  std::string device;
+  DeviceRequest device;
   Precision asked;
   const Context& context;
   const std::function<void(const DeviceCheckRow&)>& done;
@@ -309,7 +309,7 @@ ParityLimits parity_limits(const BackendDescription& device) {
   return device.precision == "single" ? ParityLimits{1e-5, 1e-6} : ParityLimits{1e-12, 1e-12};
 }
 
-std::vector<DeviceCheckRow> check_device(const std::string& device, Precision precision, const Context& context,
+std::vector<DeviceCheckRow> check_device(const DeviceRequest& device, Precision precision, const Context& context,
                                          const std::function<void(const DeviceCheckRow&)>& done) {
   Check check{device, precision, context, done};
   for (Case& test : make_cases()) {

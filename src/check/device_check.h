@@ -31,9 +31,9 @@ struct DeviceCheckRow {
   bool passed = false;
 };
 
-// Checks the device of an exact request ("cpu", "vulkan...") in one precision, or with `automatic` in all it has. Each row
+// Checks the device of a request, which must not be automatic, in one precision, or with `automatic` in all it has. Each row
 // is handed out as it is done. Throws Error and DeviceError as make_backend does, and Cancelled.
-std::vector<DeviceCheckRow> check_device(const std::string& device, Precision precision, const Context& context,
+std::vector<DeviceCheckRow> check_device(const DeviceRequest& device, Precision precision, const Context& context,
                                          const std::function<void(const DeviceCheckRow&)>& done);
 
 }  // namespace bisector

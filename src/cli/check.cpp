@@ -1,23 +1,45 @@
+// bisector check
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "core/parallel.h"
 #include "check/device_check.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "commands.h"
 #include "console.h"
+#include "options.h"
 #include "outputs.h"
 #include "report.h"
+#include "words.h"
 
 namespace bisector::cli {
 namespace {
 
-std::string choose_device(const std::string& word) {
-  if (word != "auto") return word;
+struct CheckCommand {
+  DeviceRequest device;
+  Precision precision = Precision::automatic;
+  CommonOptions common;
+};
+
+void add_options(CLI::App* app, CheckCommand& command) {
+  add_device(app, command.device,
+             "what to check: auto (the best GPU; default), cpu (against\n"
+             "itself), vulkan, vulkan:INDEX or vulkan:UUID");
+  add_words(app, "--precision", command.precision, kPrecisionWords, "auto (both, where the device has double), single or double")
+      ->group("Computation");
+  add_common_options(app, command.common, "write a JSON report with one row for each case; - for\nstdout");
+}
+
+// The best GPU where the request leaves the choice open.
+DeviceRequest choose_device(const DeviceRequest& request) {
+  if (request.kind != DeviceRequest::Kind::automatic) return request;
   const DeviceList list = list_devices();
-  const std::string gpu = best_gpu(list);
-  if (!gpu.empty()) return gpu;
+  if (const auto gpu = best_gpu(list)) return *gpu;
   if (list.devices.empty()) throw Error(fmt::format("there is no GPU to check: {}", list.problem));
   throw Error("there is no GPU to check; --device vulkan checks what 'bisector devices' lists");
 }
@@ -41,15 +63,13 @@ double uncertain_share(const Certification& certification) {
   return static_cast<double>(certification.uncertain) / static_cast<double>(std::max<std::size_t>(certification.pairs, 1));
 }
 
-const char* word(NeighbourSource source) { return source == NeighbourSource::delaunay ? "delaunay" : "nearest"; }
-
 void print_row(Console& console, const DeviceCheckRow& row) {
   const Parity& p = row.parity;
   const Certification& c = row.certification;
   console.print(fmt::format(
       "{:<10} {:<10} {:<9} {:<7} {:>6} {:>7}  {:<7} {:>8.1e} {:>8.1e} {:>8.1e} {:>8.1e}  "
       "{:>8.3f}% {:>6} {:>6}  {:>8.4f} {:>8.4f}",
-      row.model, row.seeds, word(row.neighbours), row.device.precision, row.seed_count, c.pairs, differences(row),
+      row.model, row.seeds, kNeighbourWords.word_of(row.neighbours), row.device.precision, row.seed_count, c.pairs, differences(row),
       p.mass_error, p.centroid_error, p.energy_error, p.sum_error, 100 * uncertain_share(c), c.doubled, c.cpu, row.seconds,
       row.cpu_seconds));
 }
@@ -58,7 +78,7 @@ Json row_json(const DeviceCheckRow& row) {
   const Parity& p = row.parity;
   Json json{{"model", row.model},
           {"seeds", row.seeds},
-          {"neighbors", word(row.neighbours)},
+          {"neighbors", kNeighbourWords.word_of(row.neighbours)},
           {"precision", row.device.precision},
           {"triangles", row.triangles},
           {"seed_count", row.seed_count},
@@ -90,20 +110,18 @@ Json check_report(const std::vector<DeviceCheckRow>& rows, std::size_t failed, d
   return report;
 }
 
-}  // namespace
-
 void run(const CheckCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
   check_outputs({{}, report_output(report_path)}, {});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
-  const std::string device = choose_device(command.device);
+  const DeviceRequest device = choose_device(command.device);
 
   console.phase("making models");
   const Context context = console.context();
   bool first = true;
-  const auto rows = check_device(device, parse_precision(command.precision), context, [&](const DeviceCheckRow& row) {
+  const auto rows = check_device(device, command.precision, context, [&](const DeviceCheckRow& row) {
     if (std::exchange(first, false)) {
       console.print(fmt::format("{} ({}) against the CPU: results, worst relative errors, shares of exact work, times",
                                 row.device.name, row.device.kind));
@@ -115,7 +133,7 @@ void run(const CheckCommand& command) {
   const auto failed = static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [](const DeviceCheckRow& row) { return !row.passed; }));
   const std::string cases = counted(rows.size(), "case", "cases");
-  if (!report_path.empty()) write_report(report_path, check_report(rows, failed, total.seconds()));
+  if (!report_path.empty()) write_report(report_path, check_report(rows, failed, total.seconds()), console.warnings());
   if (failed > 0) {
     console.print(fmt::format("FAILED: {} of {} do not agree with the CPU", failed, cases));
     throw Error(fmt::format("{} of {} do not agree with the CPU; do not compute on this device, and please report this",
@@ -123,6 +141,20 @@ void run(const CheckCommand& command) {
   }
   console.print(fmt::format("passed: {}, all as the CPU has them; {:.1f} s", cases, total.seconds()));
   console.print_written({report_path});
+}
+
+}  // namespace
+
+Command add_check(CLI::App& program) {
+  const auto command = std::make_shared<CheckCommand>();
+  CLI::App* app = add_command(
+      program, "check", "Compare a device's diagrams with the CPU's.", "bisector check [--device DEVICE] [options]",
+      "Examples:\n"
+      "  bisector check\n"
+      "  bisector check --device vulkan:1 --precision single --report check.json\n\n"
+      "Prints one line for each case, and exits with 1 if any does not agree.");
+  add_options(app, *command);
+  return {app, {}, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

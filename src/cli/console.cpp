@@ -79,9 +79,10 @@ void Console::phase(const std::string& what) {
 }
 
 void Console::warn(std::string_view message) {
+  warnings_.push_back(one_line(message));
   if (quiet_) return;
   clear_line();
-  fmt::print(stderr, "bisector: warning: {}\n", one_line(message));
+  fmt::print(stderr, "bisector: warning: {}\n", warnings_.back());
 }
 
 void Console::print(std::string_view line) {

@@ -42,6 +42,8 @@ class Console {
   // Shows what is being done. Throws Cancelled after Ctrl-C.
   void phase(const std::string& what);
   void warn(std::string_view message);
+  // All so far, in order, with `quiet` too.
+  const std::vector<std::string>& warnings() const { return warnings_; }
   // One line of the summary.
   void print(std::string_view line);
   // The line that a summary ends with; empty names and "-" are left out.
@@ -57,6 +59,7 @@ class Console {
   bool quiet_;
   bool live_;             // stderr is a terminal and may show progress
   std::FILE* out_;
+  std::vector<std::string> warnings_;
   std::size_t shown_ = 0;  // characters of the progress line
   Clock::time_point start_ = Clock::now(), last_shown_{};
 };

@@ -1,17 +1,30 @@
+// bisector devices
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <memory>
+#include <string>
+
+#include "bisector/device.h"
 #include "core/parallel.h"
 #include "core/processor.h"
-#include "compute/compute.h"
 #include "commands.h"
 #include "console.h"
+#include "options.h"
 #include "outputs.h"
 #include "report.h"
 
 namespace bisector::cli {
 namespace {
+
+struct DevicesCommand {
+  std::string report;
+};
+
+void add_options(CLI::App* app, DevicesCommand& command) {
+  add_file(app, "--report", command.report, "FILE", "write a JSON report; - for stdout")->group("Output");
+}
 
 std::string gibibytes(double bytes) { return fmt::format("{:.1f} GiB", bytes / 0x1p30); }
 
@@ -55,8 +68,6 @@ std::string describe(const DeviceDescription& device) {
   return line;
 }
 
-}  // namespace
-
 void run(const DevicesCommand& command) {
   check_outputs({report_output(command.report)}, {});
   const DeviceList list = list_devices();
@@ -71,8 +82,18 @@ void run(const DevicesCommand& command) {
   report["devices"] = Json::array({cpu_entry()});
   for (const DeviceDescription& device : list.devices) report["devices"].push_back(device_entry(device));
   if (list.devices.empty()) report["problem"] = list.problem;
-  write_report(command.report, report);
+  write_report(command.report, report, console.warnings());
   console.print_written({command.report});
+}
+
+}  // namespace
+
+Command add_devices(CLI::App& program) {
+  const auto command = std::make_shared<DevicesCommand>();
+  CLI::App* app = add_command(program, "devices", "List what Bisector can compute on here.",
+                              "bisector devices [--report FILE]", "Example:\n  bisector devices");
+  add_options(app, *command);
+  return {app, {}, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -1,5 +1,6 @@
 #include "report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -40,7 +41,9 @@ void append(std::string& out, const Json& value, std::size_t indent) {
 
 }  // namespace
 
-Json start_report(const char* command) { return {{"command", command}, {"version", BISECTOR_VERSION}}; }
+Json start_report(const char* command) {
+  return {{"command", command}, {"version", BISECTOR_VERSION}, {"warnings", Json::array()}};
+}
 
 Json device_json(const BackendDescription& device) {
   Json json{{"name", device.name}, {"kind", device.kind}, {"precision", device.precision}};
@@ -53,6 +56,13 @@ Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& 
   return {{"transfer", seconds.transfer}, {"grid", seconds.grid}, {"neighbours", seconds.neighbours},
           {"owners", seconds.owners},     {"clip", seconds.clip}, {"sort", seconds.sort},
           {"sum", seconds.sum}};
+}
+
+Json seconds_json(const DiagramSeconds& seconds) {
+  return {{"delaunay", seconds.delaunay},
+          {"neighbors", seconds.neighbours},
+          {"pairs", seconds.pairs},
+          {"clip", seconds.clip}};
 }
 
 void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds) {
@@ -144,12 +154,19 @@ void add_distance(Json& quality, const DistanceReport& distance) {
   quality["distance_rms_from_reference"] = distance.rms_from_reference;
 }
 
+Json features_json(const FeatureResult& features, std::size_t edges) {
+  const FeatureDistance& d = features.distance;
+  return {{"curves", features.curves}, {"corners", features.corners}, {"broken", features.broken}, {"edges", edges},
+          {"vertices", features.seeds}, {"distance_vertices", d.vertices}, {"distance_max", std::max(d.to_reference, d.from_reference)}};
+}
+
 Json point_json(const Vec3& p) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) return nullptr;
   return Json::array({p.x, p.y, p.z});
 }
 
-void write_report(const std::string& path, const Json& report) {
+void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings) {
+  report["warnings"] = warnings;
   std::string text;
   append(text, report, 0);
   text += '\n';

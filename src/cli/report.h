@@ -1,9 +1,9 @@
 // JSON reports of runs. Their keys are a stable contract.
 #pragma once
 
-#include <chrono>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "core/geometry.h"
 #include "mesh/distance.h"
@@ -16,18 +16,12 @@ namespace bisector::cli {
 
 using Json = nlohmann::ordered_json;
 
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
-Json start_report(const char* command);  // command and version
+// Command and version, and room for the warnings.
+Json start_report(const char* command);
 Json device_json(const BackendDescription& device);
 // Null where no device took part.
 Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds);
+Json seconds_json(const DiagramSeconds& seconds);
 void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds);
 Json input_json(const TriangleMesh& mesh);   // faces as in the file
 Json output_json(const TriangleMesh& mesh);
@@ -39,10 +33,11 @@ Json quality_json(const QualityReport& quality);
 void add_tets(Json& quality, const TetQualityReport& tets);
 void add_tets(Json& topology, const TetTopology& tets);
 void add_distance(Json& quality, const DistanceReport& distance);
+Json features_json(const FeatureResult& features, std::size_t edges);
 // A point, or null if a coordinate is not finite.
 Json point_json(const Vec3& p);
 
-// Writes to a file, or to stdout if the path is "-". Throws Error.
-void write_report(const std::string& path, const Json& report);
+// Writes the report with the run's warnings to a file, or to stdout if the path is "-". Throws Error.
+void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings);
 
 }  // namespace bisector::cli

@@ -1,38 +1,91 @@
+// bisector segment
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <map>
+#include <memory>
 #include <numbers>
 #include <numeric>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "io/mesh_io.h"
+#include "mesh/distance.h"
+#include "mesh/quality.h"
 #include "preview/preview.h"
 #include "segment/dual_graph.h"
 #include "segment/segment.h"
 #include "cells.h"
 #include "commands.h"
-#include "common.h"
 #include "console.h"
+#include "options.h"
 #include "outputs.h"
 #include "report.h"
+#include "summary.h"
+#include "words.h"
 
 namespace bisector::cli {
 namespace {
 
 using Colour = std::array<unsigned char, 3>;
 
-SegmentOptions segment_options(const SegmentCommand& command) {
-  SegmentOptions options = command.options;
-  options.surfaces = command.surfaces == "planes"     ? SegmentSurfaces::planes
-                     : command.surfaces == "quadrics" ? SegmentSurfaces::quadrics
-                                                      : SegmentSurfaces::all;
-  options.start = command.start == "insertion" ? SegmentStart::insertion
-                  : command.start == "random"  ? SegmentStart::random
-                                               : SegmentStart::merging;
-  return options;
+struct SegmentCommand {
+  std::string input, output, preview;
+  SegmentOptions options;
+  CommonOptions common;
+};
+
+void add_options(CLI::App* app, SegmentCommand& command) {
+  SegmentOptions& options = command.options;
+  add_file(app, "IN", command.input, "FILE", "surface: .off, .obj, .ply or .stl")->required();
+  add_file(app, "-o", command.output, "FILE", "mesh to write, with the region of each triangle")
+      ->required()->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the regions")->group("Output");
+  app->add_flag("--project", options.project, "move the vertices onto the surfaces found")->group("Output");
+  app->add_option("--proxies", options.proxies, "so many regions")
+      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Regions");
+  app->add_option("--error", options.error,
+                  "as few regions as keep the root mean square distance to\n"
+                  "their surfaces below E percent of the bounding box's\n"
+                  "diagonal; default 0.1")
+      ->type_name("E")->check(number_above_zero())->group("Regions");
+  add_words(app, "--surfaces", options.surfaces, kSurfaceWords,
+            "what a region may be: planes, quadrics (planes too), or\n"
+            "all (tori too; default)")
+      ->group("Regions");
+  add_words(app, "--start", options.start, kStartWords,
+            "merging (of small pieces, the cheapest first; default),\n"
+            "insertion (of one region after the other where the error\n"
+            "is largest) or random (all regions at random triangles)")
+      ->group("Regions");
+  add_random_seed(app, options.random_seed, "another number, another random start; default 1")->group("Regions");
+  app->add_option("--iterations", options.iterations, "Lloyd steps at most, each time; default 30")
+      ->type_name("N")->check(whole_number(0, 100'000))->group("Regions");
+  app->add_option("--smooth", options.smooth,
+                  "weight of the borders' length against distances; 0:\n"
+                  "borders are left as they are; default 1, up to 10 for\n"
+                  "free forms")
+      ->type_name("LAMBDA")->check(number_below(1e6))->group("Borders");
+  app->add_option("--fuzzy-rings", options.fuzzy_rings,
+                  "triangles up to so many steps from a border may change\n"
+                  "sides; default 1, 2 or 3 for free forms")
+      ->type_name("K")->check(whole_number(1, 1000))->group("Borders");
+  add_common_options(app, command.common,
+                     "write a JSON report with type, parameters and error of\n"
+                     "each region; - for stdout");
+}
+
+void check_usage(const SegmentCommand& command, const Usage& usage) {
+  if (usage.given("--proxies") && usage.given("--error"))
+    throw CLI::ValidationError("--proxies and --error: give one of them");
+  if (command.options.start != SegmentStart::random && usage.given("--random-seed"))
+    throw CLI::ValidationError("--random-seed: only --start random is; add that or leave it out");
+  if (command.options.smooth == 0 && usage.given("--fuzzy-rings"))
+    throw CLI::ValidationError("--fuzzy-rings: borders are not smoothed with --smooth 0; leave one of the two out");
 }
 
 void warn_of_format(Console& console, const std::string& output) {
@@ -210,8 +263,6 @@ void print_summary(Console& console, const SegmentCommand& command, const Segmen
   console.print_written({command.output, command.preview, command.common.report});
 }
 
-}  // namespace
-
 void run(const SegmentCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
@@ -228,7 +279,7 @@ void run(const SegmentCommand& command) {
   double io = reading.seconds();
 
   console.phase("segmenting");
-  const SegmentResult result = segment(input, segment_options(command), context);
+  const SegmentResult result = segment(input, command.options, context);
   const TriangleMesh mesh = labelled_mesh(input, result);
   const std::vector<Colour> colours = region_colours(mesh, result);
   const double diagonal = bounding_box(input.vertices).diagonal();
@@ -257,9 +308,26 @@ void run(const SegmentCommand& command) {
   seconds["total"] = total.seconds();
   if (!report_path.empty()) {
     report["seconds"] = seconds;
-    write_report(report_path, report);
+    write_report(report_path, report, console.warnings());
   }
   print_summary(console, command, result, input, diagonal, seconds);
+}
+
+}  // namespace
+
+Command add_segment(CLI::App& program) {
+  const auto command = std::make_shared<SegmentCommand>();
+  CLI::App* app = add_command(
+      program, "segment", "Divide a surface into planes, quadrics and tori.",
+      "bisector segment IN -o OUT [--proxies N|--error E] [options]",
+      "Examples:\n"
+      "  bisector segment part.stl -o regions.ply --proxies 22 --preview regions.png\n"
+      "  bisector segment part.stl -o regions.obj --error 0.05 --report regions.json\n"
+      "  bisector segment bunny.off -o regions.ply --proxies 28 --smooth 5 --fuzzy-rings 2\n\n"
+      ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C stops the run; nothing is\n"
+      "written.");
+  add_options(app, *command);
+  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -1,29 +1,110 @@
+// bisector tet
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
+#include <string>
 #include <system_error>
 #include <utility>
 
 #include "core/parallel.h"
-#include "mesh/distance.h"
+#include "core/stopwatch.h"
 #include "io/mesh_io.h"
-#include "preview/tet_preview.h"
 #include "io/tet_io.h"
+#include "mesh/distance.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
+#include "preview/tet_preview.h"
 #include "tetmesh/tetmesh.h"
 #include "commands.h"
-#include "common.h"
 #include "console.h"
+#include "inputs.h"
+#include "options.h"
 #include "outputs.h"
 #include "report.h"
+#include "summary.h"
 
 namespace bisector::cli {
 namespace {
 
-constexpr double kPoorDihedral = 8;  // degrees
+// Degrees; a mesh with a dihedral angle below this is warned of.
+constexpr double kPoorDihedral = 8;
+
+struct TetCommand {
+  std::string input, output, seeds, boundary, preview;
+  std::string attribute;            // of the input's vertices, a density
+  std::string sizes, feature_file;
+  double edge_length_relative = 0;  // of the input's diagonal; 0: not given
+  double weld = -1;                 // not given
+  TetOptions options;
+  CommonOptions common;
+};
+
+void add_options(CLI::App* app, TetCommand& command) {
+  add_file(app, "IN", command.input, "FILE", "closed surface or tetrahedral mesh")->required();
+  add_file(app, "-o", command.output, "FILE", "mesh to write: .mesh, .msh or .vtu")->required()->group("Output");
+  add_file(app, "--boundary", command.boundary, "FILE", "also write the boundary's triangles: .off, .obj, .ply\nor .stl")
+      ->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the result, cut open")->group("Output");
+  app->add_option("-n", command.options.vertices, "vertices of the result, about; at least 8")
+      ->type_name("N")->check(whole_number(8, kMostSeeds))->group("Seeds");
+  add_file(app, "--seeds", command.seeds, "FILE.xyz",
+           "start from these points (\"x y z\" lines) inside the\n"
+           "solid; -n is then not needed")
+      ->group("Seeds");
+  add_random_seed(app, command.options.random_seed, "another number, another start; default 1")->group("Seeds");
+  add_edge_length(app, command.options.edge_length, command.edge_length_relative);
+  add_density(app, command.options.sizing.field, command.attribute,
+              "where tetrahedra are smaller: uniform (default),\n"
+              "lfs[:EXP] or curvature[:EXP] of the boundary, with the\n"
+              "edge lengths that 'bisector remesh' has for them, or\n"
+              "attribute:NAME (of the input's vertices; edges are as\n"
+              "long as its power -1/5)");
+  add_file(app, "--sizes", command.sizes, "FILE[:NAME]",
+           "edge lengths at the vertices of a mesh (.vtk, .vtu with\n"
+           "point data NAME; .mesh with a .sol beside it), instead\n"
+           "of a density; -n makes them a matter of proportion")
+      ->group("Size");
+  app->add_option("--gradation", command.options.sizing.field.gradation,
+                  "edge lengths grow by at most so much per length into\n"
+                  "the solid; default 0.2. Not for uniform density")
+      ->type_name("G")->check(number_below(10))->group("Size");
+  add_edge_bounds(app, command.options.sizing.field);
+  add_features(app, command.options.features,
+               "sharp edges to keep: auto (default), none, or all with a\n"
+               "dihedral deviation of so many degrees. Edges between face\n"
+               "labels are kept unless none");
+  add_feature_file(app, command.feature_file);
+  add_weld(app, command.weld);
+  app->add_option("--min-angle", command.options.min_angle,
+                  "degrees that all angles of the boundary's triangles\n"
+                  "should exceed; 0: as they are; default 40")
+      ->type_name("A")->check(number_below(60))->group("Optimisation");
+  app->add_option("--min-dihedral", command.options.min_dihedral,
+                  "degrees that all dihedral angles should exceed; 0: keep\n"
+                  "slivers; default 30")
+      ->type_name("A")->check(number_below(55))->group("Optimisation");
+  add_iterations(app, command.options.iterations, "steps, of which each phase may make a share; default 100");
+  add_tolerance(app, command.options.tolerance,
+                "end a phase when the energy falls by less than this\n"
+                "share per iteration; default 1e-6");
+  add_compute_options(app, command.options.compute);
+  add_common_options(app, command.common,
+                     "write a JSON report with quality, distance of the\n"
+                     "boundary to the input and timings; - for stdout");
+}
+
+void check_usage(const TetCommand& command, const Usage& usage) {
+  usage.check_number_of_vertices();
+  if (usage.given("--sizes")) usage.refuse("--density", "sizes come from --sizes; leave one of the two out");
+  const SizingOptions& sizing = command.options.sizing.field;
+  if (usage.given("--gradation") && sizing.gradation == 0)
+    throw CLI::ValidationError("--gradation: sizes inside a solid grow from its boundary; it must not be 0");
+  usage.check_edge_bounds(sizing);
+  if (sizing.kind == DensityKind::uniform && !usage.given("--sizes")) usage.check_uniform_density();
+}
 
 struct Input {
   bool solid = false;
@@ -67,14 +148,10 @@ SizeSamples read_sizes(const std::string& word) {
 
 TetOptions tet_options(const TetCommand& command, const Input& input) {
   TetOptions options = command.options;
-  const SizingOptions density = parse_density(command.density);
-  options.sizing.field.kind = density.kind;
-  options.sizing.field.exponent = density.exponent;
-  if (const std::string name = density_attribute(command.density); !name.empty())
-    options.sizing.field.attribute =
-        is_tet_format(command.input) ? read_tet_attribute(command.input, name) : read_vertex_attribute(command.input, name);
+  if (!command.attribute.empty())
+    options.sizing.field.attribute = is_tet_format(command.input) ? read_tet_attribute(command.input, command.attribute)
+                                                                  : read_vertex_attribute(command.input, command.attribute);
   if (!command.sizes.empty()) options.sizing.sizes = read_sizes(command.sizes);
-  options.features = parse_features(command.features);
   if (!command.feature_file.empty()) {
     TriangleMesh surface = input.surface;
     if (input.solid) {
@@ -87,7 +164,6 @@ TetOptions tet_options(const TetCommand& command, const Input& input) {
     options.edge_length = command.edge_length_relative * bounding_box(input.vertices()).diagonal();
   if (command.weld >= 0) options.weld = command.weld;
   options.threads = command.common.threads;
-  options.compute = compute_options(command.compute);
   if (!command.seeds.empty()) {
     options.seeds = read_seeds(command.seeds, options.vertices);
     options.vertices = options.seeds.size();
@@ -208,8 +284,6 @@ void warn_of(Console& console, const TetCommand& command, const TetResult& resul
                                                    : "no more fitted inside the boundary"));
 }
 
-}  // namespace
-
 void run(const TetCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
@@ -263,9 +337,26 @@ void run(const TetCommand& command) {
   seconds["total"] = total.seconds();
   if (!report_path.empty()) {
     report["seconds"] = seconds;
-    write_report(report_path, report);
+    write_report(report_path, report, console.warnings());
   }
   print_summary(console, command, result, measures, input_json(input), seconds);
+}
+
+}  // namespace
+
+Command add_tet(CLI::App& program) {
+  const auto command = std::make_shared<TetCommand>();
+  CLI::App* app = add_command(
+      program, "tet", "Make a high-quality tetrahedral mesh of a solid.",
+      "bisector tet IN -o OUT -n N|--edge-length L [options]",
+      "Examples:\n"
+      "  bisector tet bunny.off -o out.msh -n 10000\n"
+      "  bisector tet part.stl -o out.vtu --edge-length 0.5 --report out.json\n"
+      "  bisector tet coarse.mesh -o fine.mesh -n 50000 --sizes sizes.vtu:h\n\n"
+      "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, .vtk, .vtu). Ctrl-C stops the run;\n"
+      "nothing is written.");
+  add_options(app, *command);
+  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -1,22 +1,68 @@
+// bisector tree
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "io/mesh_io.h"
 #include "tree/coverage.h"
 #include "tree/tree.h"
 #include "tree/tree_io.h"
 #include "commands.h"
-#include "common.h"
 #include "console.h"
+#include "options.h"
 #include "outputs.h"
 #include "report.h"
+#include "summary.h"
+#include "words.h"
 
 namespace bisector::cli {
 namespace {
+
+struct TreeCommand {
+  std::string input, output, skeleton, labels, preview;
+  IgesUnit unit = IgesUnit::metre;
+  TreeOptions options;
+  CommonOptions common;
+};
+
+void add_options(CLI::App* app, TreeCommand& command) {
+  add_file(app, "POINTS", command.input, "FILE", "points of a tree's surface")->required();
+  add_file(app, "-o", command.output, "FILE", "surfaces to write: .obj, .ply, .off, .stl, or as B-splines\n.igs")
+      ->required()->group("Output");
+  add_file(app, "--skeleton", command.skeleton, "FILE.ply", "also write the branches' axes with radii")->group("Output");
+  add_file(app, "--labels", command.labels, "FILE.ply", "also write the points with the branch that each is of")
+      ->group("Output");
+  add_file(app, "--preview", command.preview, "FILE.png", "draw points and surfaces side by side")->group("Output");
+  add_words(app, "--unit", command.unit, kUnitWords, "of the points, for .igs: mm, cm, m (default) or in")
+      ->group("Output");
+  app->add_option("--ground", command.options.ground, "leave out points with z below this")->type_name("Z")->group("Scan");
+  add_words(app, "--components", command.options.components, kComponentWords,
+            "parts of the scan that are apart: bridge (join them over\n"
+            "their gaps; default) or separate (a tree each)")
+      ->group("Scan");
+  app->add_option("--clusters", command.options.clusters, "at most so many; default: as many as it takes")
+      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Clusters");
+  app->add_option("--delta", command.options.delta,
+                  "split clusters whose points are farther, rms, from a\n"
+                  "cylinder, in the largest extent; default 0.004")
+      ->type_name("D")->check(number_above_zero())->group("Clusters");
+  app->add_option("--max-cluster-points", command.options.max_cluster_points, "split clusters of more points too")
+      ->type_name("M")->check(whole_number(24, kMostSeeds))->group("Clusters");
+  add_common_options(app, command.common,
+                     "write a JSON report with branches, volume, distances of\n"
+                     "the points and timings; - for stdout");
+}
+
+void check_usage(const TreeCommand& command, const Usage& usage) {
+  const std::string extension = extension_of(command.output);
+  if (usage.given("--unit") && extension != ".igs" && extension != ".iges")
+    throw CLI::ValidationError("--unit: only .igs files tell a unit; leave it out");
+}
 
 // Of all branches together, and of the points.
 struct Measures {
@@ -121,15 +167,6 @@ void print_summary(Console& console, const TreeCommand& command, const std::vect
   console.print_written({command.output, command.skeleton, command.labels, command.preview, command.common.report});
 }
 
-IgesUnit parse_unit(const std::string& word) {
-  return word == "mm"   ? IgesUnit::millimetre
-         : word == "cm" ? IgesUnit::centimetre
-         : word == "in" ? IgesUnit::inch
-                        : IgesUnit::metre;
-}
-
-}  // namespace
-
 void run(const TreeCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
@@ -144,9 +181,7 @@ void run(const TreeCommand& command) {
   const std::vector<Vec3> points = read_points(command.input);
   double io = reading.seconds();
 
-  TreeOptions options = command.options;
-  options.components = command.components == "separate" ? TreeComponents::separate : TreeComponents::bridge;
-  const TreeResult tree = reconstruct_tree(points, options, console.context());
+  const TreeResult tree = reconstruct_tree(points, command.options, console.context());
   const Stopwatch meshing;
   const TriangleMesh mesh = tree_mesh(tree);
   Json seconds = tree_seconds(tree.seconds);
@@ -154,14 +189,14 @@ void run(const TreeCommand& command) {
 
   console.phase("measuring the distance of the points");
   const Stopwatch measuring;
-  const Measures measures = measure(points, options, tree, mesh);
+  const Measures measures = measure(points, command.options, tree, mesh);
   seconds["quality"] = measuring.seconds();
   warn_of_points(console, tree, measures);
 
   console.phase("writing " + command.output);
   stop_watching_interrupts();
   const Stopwatch writing;
-  write_tree(command.output, tree, mesh, parse_unit(command.unit));
+  write_tree(command.output, tree, mesh, command.unit);
   if (!command.skeleton.empty()) write_skeleton(command.skeleton, tree);
   if (!command.labels.empty()) write_tree_labels(command.labels, points, tree);
   io += writing.seconds();
@@ -173,9 +208,24 @@ void run(const TreeCommand& command) {
   if (!report_path.empty()) {
     Json report = tree_report(points, tree, measures);
     report["seconds"] = seconds;
-    write_report(report_path, report);
+    write_report(report_path, report, console.warnings());
   }
   print_summary(console, command, points, tree, measures, seconds);
+}
+
+}  // namespace
+
+Command add_tree(CLI::App& program) {
+  const auto command = std::make_shared<TreeCommand>();
+  CLI::App* app = add_command(
+      program, "tree", "Reconstruct the branches of a leafless tree from a laser scan.",
+      "bisector tree POINTS -o OUT [options]",
+      "Examples:\n"
+      "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
+      "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
+      "POINTS is a .ply file or \"x y z\" lines, z up, without leaves. Ctrl-C stops the run; nothing is written.");
+  add_options(app, *command);
+  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -22,11 +22,11 @@ std::unique_ptr<SolidBackend> cpu_backend(const Solid& solid, NeighbourSource so
   return std::make_unique<CpuSolidBackend>(solid, source, InnerCells::whole, std::move(fallback));
 }
 
-std::unique_ptr<Backend> device_backend(const Surface& surface, const std::string& device,
+std::unique_ptr<Backend> device_backend(const Surface& surface, const DeviceRequest& device,
                                         const host::VulkanOptions& options) {
   return host::make_vulkan_backend(surface, host::Device::open(device), options);
 }
-std::unique_ptr<SolidBackend> device_backend(const Solid& solid, const std::string& device,
+std::unique_ptr<SolidBackend> device_backend(const Solid& solid, const DeviceRequest& device,
                                              const host::VulkanOptions& options) {
   return host::make_vulkan_solid_backend(solid, host::Device::open(device), options);
 }
@@ -42,12 +42,12 @@ std::unique_ptr<SolidBackend> with_fallback(std::unique_ptr<SolidBackend> device
 template <class Domain>
 auto make_cpu_backend(const Domain& domain, const ComputeOptions& options) {
   if (options.precision == Precision::single)
-    throw Error("--precision single: the CPU computes in double precision only; use --precision double or a device");
+    throw Error("the CPU computes in double precision only", Reason::no_single_precision);
   return cpu_backend(domain, options.neighbours, {});
 }
 
 template <class Domain>
-auto make_device_backend(const Domain& domain, const std::string& device, const ComputeOptions& options) {
+auto make_device_backend(const Domain& domain, const DeviceRequest& device, const ComputeOptions& options) {
   host::VulkanOptions vulkan;
   vulkan.precision = options.precision;
   vulkan.neighbours = options.neighbours;
@@ -58,16 +58,15 @@ auto make_device_backend(const Domain& domain, const std::string& device, const 
 template <class Domain>
 auto make_best_backend(const Domain& domain, const ComputeOptions& options, const Context& context) {
   const DeviceList list = list_devices();
-  const std::string gpu = best_gpu(list, options.precision);
   std::string failure;
-  if (!gpu.empty()) {
+  if (const auto gpu = best_gpu(list, options.precision)) {
     try {
-      return with_fallback(make_device_backend(domain, gpu, options), options.neighbours, context);
+      return with_fallback(make_device_backend(domain, *gpu, options), options.neighbours, context);
     } catch (const DeviceError& error) {
       failure = error.what();
     }
-  } else if (const std::string other = best_gpu(list); !other.empty()) {
-    failure = fmt::format("--device {}: the device has no double precision", other);
+  } else if (const auto other = best_gpu(list)) {
+    failure = fmt::format("{}: the device has no double precision", word_of(*other));
   } else {
     return make_cpu_backend(domain, options);
   }
@@ -77,19 +76,22 @@ auto make_best_backend(const Domain& domain, const ComputeOptions& options, cons
 
 template <class Domain>
 auto make_backend_for(const Domain& domain, const ComputeOptions& options, const Context& context) {
-  if (options.device == "auto") return make_best_backend(domain, options, context);
-  if (options.device == "cpu") return make_cpu_backend(domain, options);
-  if (options.device.starts_with("vulkan")) return make_device_backend(domain, options.device, options);
-  throw Error(fmt::format("--device {}: is none of auto, cpu, vulkan, vulkan:INDEX, vulkan:UUID", options.device));
+  switch (options.device.kind) {
+    case DeviceRequest::Kind::automatic: return make_best_backend(domain, options, context);
+    case DeviceRequest::Kind::cpu: return make_cpu_backend(domain, options);
+    case DeviceRequest::Kind::vulkan: break;
+  }
+  return make_device_backend(domain, options.device, options);
 }
 
 }  // namespace
 
-std::string best_gpu(DeviceList list, Precision precision) {
+std::optional<DeviceRequest> best_gpu(DeviceList list, Precision precision) {
   if (precision == Precision::double_)
     std::erase_if(list.devices, [](const DeviceDescription& device) { return !device.float64; });
   const DeviceDescription* best = host::best_gpu(list);
-  return best ? fmt::format("vulkan:{}", best->index) : "";
+  if (!best) return {};
+  return DeviceRequest{.kind = DeviceRequest::Kind::vulkan, .index = best->index};
 }
 
 std::unique_ptr<Backend> make_backend(const Surface& surface, const ComputeOptions& options, const Context& context) {

@@ -12,8 +12,8 @@
 
 namespace bisector {
 
-// A backend for the surface, which must outlive it. Throws Error if the words cannot be understood and DeviceError if an exact
-// request cannot be met. With "auto" a device that fails later is replaced by the CPU: a warning to `context`, whose functions
+// A backend for the surface, which must outlive it. Throws Error if the CPU cannot meet the request and DeviceError if a device
+// cannot. If the request is automatic, a device that fails later is replaced by the CPU: a warning to `context`, whose functions
 // must stay callable, and Backend::description() tell why.
 std::unique_ptr<Backend> make_backend(const Surface& surface, const ComputeOptions& options, const Context& context = {});
 

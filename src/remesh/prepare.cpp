@@ -41,7 +41,7 @@ void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const 
   if (welded.degenerate_triangles + welded.duplicate_triangles)
     line += fmt::format(", removed {}", plural(welded.degenerate_triangles + welded.duplicate_triangles, "triangle"));
   line += fmt::format("; {} of {} left", welded.border_after, plural(welded.border_before, "border edge"));
-  if (!options.weld) line += "; --weld sets how far vertices may be apart";
+  if (!options.weld) line += "; a weld tolerance sets how far vertices may be apart";
   context.warn(line);
 }
 

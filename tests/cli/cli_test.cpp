@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/words.h"
 #include "compute/compute.h"
 #include "io/mesh_io.h"
 #include "io/tet_io.h"
@@ -151,6 +152,31 @@ TEST_F(Cli, HelpAndVersion) {
   EXPECT_NE(bare.out.find("bisector remesh"), std::string::npos);
 }
 
+// What options choose between is listed by the help and by the error for another word.
+TEST_F(Cli, HelpListsAllWords) {
+  const auto expect_words = [&](const char* command, const char* option, const std::string& list) {
+    const std::string help = run({command, "--help"}).out;
+    const std::size_t begin = help.find(option);
+    ASSERT_NE(begin, std::string::npos) << command << ' ' << option;
+    const std::string about = help.substr(begin, help.find("\n  -", begin) - begin);
+    std::istringstream words(list);
+    for (std::string word; std::getline(words >> std::ws, word, ',');)
+      EXPECT_NE(about.find(word), std::string::npos) << command << ' ' << option << ": " << word;
+    expect_failure(2, {command, option, "no-such-word"}, "none of " + list);
+  };
+  for (const char* command : {"remesh", "rvd", "tet"}) {
+    expect_words(command, "--precision", cli::kPrecisionWords.list());
+    expect_words(command, "--neighbors", cli::kNeighbourWords.list());
+  }
+  expect_words("check", "--precision", cli::kPrecisionWords.list());
+  expect_words("remesh", "--topology", cli::kTopologyWords.list());
+  expect_words("remesh", "--energy", cli::kEnergyWords.list());
+  expect_words("segment", "--surfaces", cli::kSurfaceWords.list());
+  expect_words("segment", "--start", cli::kStartWords.list());
+  expect_words("tree", "--components", cli::kComponentWords.list());
+  expect_words("tree", "--unit", cli::kUnitWords.list());
+}
+
 TEST_F(Cli, BadUsage) {
   const std::string sphere = in("sphere.off"), out = in("out.obj");
   write_text("points.xyz", "0 0 1\n0 1 0\n1 0 0\n-1 -1 -1\n");
@@ -174,6 +200,8 @@ TEST_F(Cli, BadUsage) {
   expect_failure(2, {"quality"}, "MESH");
   for (const char* option : {"--device", "--precision"})
     for (const char* value : {"nonsense", "gpu", ""}) expect_failure(2, {"check", option, value}, option);
+  for (const char* device : {"vulkan:", "vulkan:x", "vulkan:-1", "cpu:0"})
+    expect_failure(2, {"rvd", sphere, "-n", "10", "--device", device}, "vulkan:UUID");
   expect_failure(2, {"check", sphere}, "sphere.off");
 }
 
@@ -187,7 +215,7 @@ TEST_F(Cli, BadInputAndOutput) {
   expect_failure(1, {"remesh", in("flat.off"), "-o", out, "-n", "10", "--quiet"}, "area");
   expect_failure(1, {"remesh", sphere, "-o", out, "--seeds", in("two.xyz")}, "4 seeds");
   expect_failure(1, {"remesh", sphere, "-o", out, "--seeds", in("two.xyz"), "-n", "5"}, "-n");
-  for (const char* device : {"vulkan:9999", "vulkan:00000000-0000-0000-0000-00000000dead", "vulkan:", "vulkan:x"}) {
+  for (const char* device : {"vulkan:9999", "vulkan:00000000-0000-0000-0000-00000000dead"}) {
     expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", device}, device);
     expect_failure(1, {"rvd", sphere, "-n", "10", "--device", device}, device);
     expect_failure(1, {"check", "--device", device, "--report", in("r.json")}, device);
@@ -407,6 +435,7 @@ TEST_F(Cli, DevicesAreListed) {
   const DeviceList list = list_devices();
   const Json report = report_of({"devices", "--report", "-"});
   ASSERT_EQ(report["devices"].size(), 1 + list.devices.size());
+  EXPECT_EQ(report["warnings"], Json::array());
   EXPECT_EQ(report["devices"][0]["kind"], "cpu");
   EXPECT_GE(report["devices"][0]["threads"].get<int>(), 1);
   const std::string table = run({"devices"}).out;
@@ -438,6 +467,7 @@ TEST_F(Cli, CheckOfTheCpuAgainstItself) {
   EXPECT_NE(result.out.find("passed"), std::string::npos) << result.out;
   const Json report = Json::parse(read_text(in("r.json")));
   EXPECT_EQ(report["command"], "check");
+  EXPECT_EQ(report["warnings"], Json::array());
   EXPECT_EQ(report["device"]["kind"], "cpu");
   EXPECT_EQ(report["passed"], true);
   ASSERT_FALSE(report["rows"].empty());
@@ -451,12 +481,12 @@ TEST_F(Cli, CheckOfTheCpuAgainstItself) {
 }
 
 TEST_F(Cli, CheckWithoutAGpuSaysSo) {
-  if (!best_gpu(list_devices()).empty()) GTEST_SKIP() << "there is a GPU";
+  if (best_gpu(list_devices())) GTEST_SKIP() << "there is a GPU";
   expect_failure(1, {"check"}, "no GPU");
 }
 
 TEST_F(Cli, AutomaticDeviceIsTheCpuWithoutAGpu) {
-  if (!best_gpu(list_devices()).empty()) GTEST_SKIP() << "there is a GPU";
+  if (best_gpu(list_devices())) GTEST_SKIP() << "there is a GPU";
   const Json report = report_of({"rvd", in("sphere.off"), "-n", "50", "--report", "-"});
   EXPECT_EQ(report["device"]["kind"], "cpu");
   EXPECT_FALSE(report["device"].contains("fallback"));
@@ -1409,6 +1439,7 @@ TEST_F(Cli, WithoutALoaderOrADriverTheCpuComputes) {
         std::vector<std::string> exact = words;
         exact.insert(exact.end(), {"--device", device});
         expect_failure(1, exact, "Vulkan");
+        expect_failure(1, exact, "use --device cpu");
       }
     }
     expect_failure(1, {"check", "--device", "vulkan"}, "Vulkan");
@@ -1496,6 +1527,41 @@ TEST_F(Cli, WarningsAreLinesOnStderr) {
   EXPECT_EQ(result.code, 0);
   EXPECT_TRUE(result.err.starts_with("bisector: warning: ")) << result.err;
   EXPECT_EQ(run({"quality", in("loose.off"), "--quiet"}).err, "");
+}
+
+// Of each command that can warn; the reports of the others have an empty list.
+TEST_F(Cli, ReportsHaveTheWarnings) {
+  write_text("loose.off", "OFF\n5 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n9 9 9\n3 0 1 2\n3 1 3 2\n");
+  TriangleMesh ball = test::icosphere(2);
+  ball.vertices.push_back({9, 9, 9});
+  write_mesh(in("ball.off"), ball);
+  std::string points;
+  for (const Vec3& p : test::make_tree({.points = 6'000, .boughs = 3, .random_seed = 1}).points)
+    points += std::to_string(p.x) + ' ' + std::to_string(p.y) + ' ' + std::to_string(p.z) + '\n';
+  write_text("tree.xyz", points + "1000 1000 0\n1000 1000 0.001\n1000 1000.001 0\n");
+
+  std::vector<std::vector<std::string>> commands{
+      {"remesh", in("loose.off"), "-o", in("out.off"), "-n", "30"},
+      {"rvd", in("loose.off"), "-n", "4"},
+      {"segment", in("loose.off"), "-o", in("out.off"), "--proxies", "1"},
+      {"tree", in("tree.xyz"), "-o", in("out.off"), "--components", "separate"},
+      {"quality", in("loose.off")}};
+  if (!find_tetgen().empty()) commands.push_back({"tet", in("ball.off"), "-o", in("out.msh"), "-n", "60"});
+  for (std::vector<std::string> words : commands) {
+    words.insert(words.end(), {"--report", in("r.json")});
+    const Result loud = run(words);
+    ASSERT_EQ(loud.code, 0) << words[0] << ": " << loud.err;
+    const Json warnings = Json::parse(read_text(in("r.json")))["warnings"];
+    ASSERT_GE(warnings.size(), 1u) << words[0];
+    std::string lines;
+    for (const std::string line : warnings) lines += "bisector: warning: " + line + '\n';
+    EXPECT_EQ(loud.err, lines) << words[0];
+    words.push_back("--quiet");
+    const Result quiet = run(words);
+    EXPECT_EQ(quiet.err, "") << words[0];
+    EXPECT_EQ(Json::parse(read_text(in("r.json")))["warnings"], warnings) << words[0];
+  }
+  EXPECT_EQ(report_of({"quality", in("sphere.off"), "--report", "-"})["warnings"], Json::array());
 }
 
 TEST_F(Cli, InterruptLeavesNothing) {

@@ -67,7 +67,7 @@ class Compute : public testing::Test {
 
 TEST_F(Compute, CpuOnRequest) {
   for (const Precision precision : {Precision::automatic, Precision::double_}) {
-    const auto backend = make_backend(surface_, {"cpu", precision, NeighbourSource::nearest});
+    const auto backend = make_backend(surface_, {{.kind = DeviceRequest::Kind::cpu}, precision, NeighbourSource::nearest});
     EXPECT_EQ(backend->description().kind, "cpu");
     EXPECT_EQ(backend->description().precision, "double");
     EXPECT_EQ(backend->description().fallback, "");
@@ -76,16 +76,38 @@ TEST_F(Compute, CpuOnRequest) {
     const CellMoments moments = evaluate(*backend, seeds_).moments;
     EXPECT_EQ(moments.certification.cpu, moments.certification.uncertain);
   }
-  EXPECT_THROW(make_backend(surface_, {"cpu", Precision::single, NeighbourSource::nearest}), Error);
+  EXPECT_THROW(make_backend(surface_, {{.kind = DeviceRequest::Kind::cpu}, Precision::single, NeighbourSource::nearest}), Error);
 }
 
-TEST_F(Compute, WordsThatCannotBeMet) {
-  for (const char* word : {"", "gpu", "CPU", "cpu ", "vulkan:", "vulkan:x", "vulkan:-1", "vulkan:99999", "vulkan:1e3",
-                           "vulkann", "vulkan:00000000-0000-0000-0000-00000000dead"}) {
+TEST(DeviceWords, AreRequests) {
+  for (const char* word : {"auto", "cpu", "vulkan", "vulkan:0", "vulkan:12", "vulkan:00000000-0000-0000-0000-00000000dEaD",
+                           "vulkan:0123456789abcdef0123456789abcdef"})
+    EXPECT_EQ(word_of(parse_device(word)), word);
+  EXPECT_EQ(parse_device("auto"), DeviceRequest{});
+  EXPECT_EQ(parse_device("vulkan:12").index, 12u);
+  EXPECT_EQ(word_of(parse_device("vulkan:007")), "vulkan:7");
+}
+
+TEST(DeviceWords, OthersAreErrors) {
+  for (const char* word : {"", "gpu", "CPU", "cpu ", "vulkan:", "vulkan:x", "vulkan:-1", "vulkan:1e3", "vulkan:1 ",
+                           "vulkan:1234567890", "vulkann", "vulkan:0000", "vulkan:g0000000-0000-0000-0000-000000000000"}) {
     try {
-      make_backend(surface_, {word, Precision::automatic, NeighbourSource::nearest});
+      parse_device(word);
       ADD_FAILURE() << word;
     } catch (const Error& error) {
+      EXPECT_EQ(error.reason(), Reason::other);
+      EXPECT_NE(std::string(error.what()).find("vulkan:INDEX"), std::string::npos) << error.what();
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST_F(Compute, RequestsThatCannotBeMet) {
+  for (const char* word : {"vulkan:99999", "vulkan:00000000-0000-0000-0000-00000000dead"}) {
+    try {
+      make_backend(surface_, {parse_device(word), Precision::automatic, NeighbourSource::nearest});
+      ADD_FAILURE() << word;
+    } catch (const DeviceError& error) {
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
       EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
     }
@@ -93,12 +115,12 @@ TEST_F(Compute, WordsThatCannotBeMet) {
 }
 
 TEST_F(Compute, AutomaticWithoutAGpuIsTheCpu) {
-  if (!best_gpu(list_devices()).empty()) GTEST_SKIP() << "there is a GPU";
+  if (best_gpu(list_devices())) GTEST_SKIP() << "there is a GPU";
   std::vector<std::string> warnings;
   const auto backend = make_backend(surface_, {}, collecting(warnings));
   EXPECT_EQ(backend->description().kind, "cpu");
   EXPECT_TRUE(warnings.empty());
-  EXPECT_THROW(make_backend(surface_, {"auto", Precision::single, NeighbourSource::nearest}), Error);
+  EXPECT_THROW(make_backend(surface_, {{}, Precision::single, NeighbourSource::nearest}), Error);
 }
 
 TEST_F(Compute, ListIsPlausible) {
@@ -119,13 +141,13 @@ TEST_F(Compute, BestGpu) {
     d.rejected = rejected;
     return d;
   };
-  EXPECT_EQ(best_gpu({}), "");
-  EXPECT_EQ(best_gpu({{device(0, "software", true)}, ""}), "");
-  EXPECT_EQ(best_gpu({{device(0, "discrete", true, "too old")}, ""}), "");
+  EXPECT_EQ(best_gpu({}), std::nullopt);
+  EXPECT_EQ(best_gpu({{device(0, "software", true)}, ""}), std::nullopt);
+  EXPECT_EQ(best_gpu({{device(0, "discrete", true, "too old")}, ""}), std::nullopt);
   const DeviceList list{{device(0, "software", true), device(1, "integrated", true), device(2, "discrete", false)}, ""};
-  EXPECT_EQ(best_gpu(list), "vulkan:2");
-  EXPECT_EQ(best_gpu(list, Precision::single), "vulkan:2");
-  EXPECT_EQ(best_gpu(list, Precision::double_), "vulkan:1");
+  EXPECT_EQ(best_gpu(list), parse_device("vulkan:2"));
+  EXPECT_EQ(best_gpu(list, Precision::single), parse_device("vulkan:2"));
+  EXPECT_EQ(best_gpu(list, Precision::double_), parse_device("vulkan:1"));
 }
 
 TEST_F(Compute, AFailedDeviceIsReplacedOnce) {
@@ -224,7 +246,7 @@ TEST_F(Compute, RemeshTellsItsDevice) {
   RemeshOptions options;
   options.vertices = 100;
   options.iterations = 5;
-  options.compute.device = "cpu";
+  options.compute.device.kind = DeviceRequest::Kind::cpu;
   const RemeshResult result = remesh(mesh_, options);
   EXPECT_EQ(result.device.kind, "cpu");
   EXPECT_EQ(result.seconds.diagrams.device.clip, 0);

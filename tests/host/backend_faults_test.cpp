@@ -34,35 +34,37 @@ using host::VulkanOptions;
 
 // --- Devices ---
 
-// A request for a device, preferably one with double precision and that is no software; empty where there is none.
-std::string device_word() {
-  if (const char* named = std::getenv("BISECTOR_TEST_DEVICE")) return named;
+// A request for a device, preferably one with double precision and that is no software; nothing where there is none.
+std::optional<DeviceRequest> device_request() {
+  if (const char* named = std::getenv("BISECTOR_TEST_DEVICE")) return parse_device(named);
   static const DeviceList list = list_devices();
   for (const Precision precision : {Precision::double_, Precision::automatic})
-    if (const std::string gpu = best_gpu(list, precision); !gpu.empty()) return gpu;
+    if (const auto gpu = best_gpu(list, precision)) return gpu;
   for (const bool float64 : {true, false})
     for (const DeviceDescription& device : list.devices)
-      if (device.rejected.empty() && device.float64 >= float64) return "vulkan:" + std::to_string(device.index);
+      if (device.rejected.empty() && device.float64 >= float64) {
+        return DeviceRequest{.kind = DeviceRequest::Kind::vulkan, .index = device.index};
+      }
   return {};
 }
 
 bool has_double() {
-  static const bool has = Device::open(device_word())->description().float64;
+  static const bool has = Device::open(device_request().value())->description().float64;
   return has;
 }
 
 std::string device_name() {
-  static const std::string name = Device::open(device_word())->description().name;
+  static const std::string name = Device::open(device_request().value())->description().name;
   return name;
 }
 
 // Skips without a device, and without one that has the precision.
 #define SKIP_WITHOUT_DEVICE(precision)                                                     \
-  if (device_word().empty()) GTEST_SKIP() << "no Vulkan device";                           \
+  if (!device_request()) GTEST_SKIP() << "no Vulkan device";                           \
   if ((precision) == Precision::double_ && !has_double()) GTEST_SKIP() << "no double precision"
 
 std::unique_ptr<Backend> device_backend(const Surface& surface, const VulkanOptions& options) {
-  return host::make_vulkan_backend(surface, Device::open(device_word()), options);
+  return host::make_vulkan_backend(surface, Device::open(device_request().value()), options);
 }
 
 VulkanOptions with_precision(Precision precision) {
@@ -212,7 +214,7 @@ class EveryCall : public Faultless, public testing::WithParamInterface<Precision
   }
 
   std::unique_ptr<Backend> make(const FaultProblem& problem) const {
-    return make_backend(problem.surface, {device_word(), GetParam(), NeighbourSource::nearest});
+    return make_backend(problem.surface, {device_request().value(), GetParam(), NeighbourSource::nearest});
   }
 
   void expect_right(const FaultProblem& problem, const Results& results) const {
@@ -350,7 +352,7 @@ TEST_F(LostInARun, GivesTheCpusMesh) {
 // --- Without double precision ---
 
 std::unique_ptr<Device> device_without_double() {
-  std::unique_ptr<Device> device = Device::open(device_word());
+  std::unique_ptr<Device> device = Device::open(device_request().value());
   host::hide_float64(*device);
   return device;
 }
@@ -425,7 +427,7 @@ TEST_P(Room, FacetsComeInChunks) {
   const Surface surface(mesh);
   ASSERT_GT(surface.facets.size(), 2 * kFacets);
   const std::vector<Vec3> seeds = random_seeds(mesh, 3000, 34);
-  std::unique_ptr<Device> device = Device::open(device_word());
+  std::unique_ptr<Device> device = Device::open(device_request().value());
   host::limit_storage_range(*device, kRange);
   VulkanOptions options = with_precision(GetParam());
   options.rooms = {10'000, 1 << 15, 1 << 16, 0};
@@ -443,7 +445,7 @@ TEST_P(Room, EndsAtWhatTheDeviceBinds) {
   for (const std::size_t range : {std::size_t{100} << 10, std::size_t{600} << 10}) {
     SCOPED_TRACE(range);
     const std::string text = message_of([&] {
-      std::unique_ptr<Device> device = Device::open(device_word());
+      std::unique_ptr<Device> device = Device::open(device_request().value());
       host::limit_storage_range(*device, range);
       VulkanOptions options = with_precision(GetParam());
       options.rooms = {10'000, 64, 64, 64};

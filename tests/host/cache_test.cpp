@@ -133,7 +133,7 @@ TEST_F(CacheFile, ServesDevices) {
   HostTest::SetUp();
   if (IsSkipped()) return;
   const Environment cache("BISECTOR_CACHE", path.string());
-  const auto use = [] { Device::open("vulkan"); };
+  const auto use = [] { Device::open(); };
   use();
   const Bytes good = content(path);
   ASSERT_FALSE(good.empty());

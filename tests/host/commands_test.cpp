@@ -12,7 +12,7 @@ class CommandsTest : public HostTest {
  protected:
   void SetUp() override {
     HostTest::SetUp();
-    if (!IsSkipped()) device = Device::open("vulkan");
+    if (!IsSkipped()) device = Device::open();
   }
 
   std::unique_ptr<Device> device;

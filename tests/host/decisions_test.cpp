@@ -443,7 +443,7 @@ const Opened& opened() {
     register_modules(decision_modules);
     const char* named = std::getenv("BISECTOR_TEST_DEVICE");
     try {
-      return Opened{Device::open(named ? named : "vulkan"), {}};
+      return Opened{Device::open(parse_device(named ? named : "vulkan")), {}};
     } catch (const DeviceError& error) {
       if (named) throw;
       return Opened{nullptr, error.what()};

@@ -14,7 +14,7 @@ constexpr std::uint32_t kCount = 1000;
 
 // Throws DeviceError, or returns whether the result was right.
 bool scenario() {
-  const std::unique_ptr<Device> device = Device::open("vulkan");
+  const std::unique_ptr<Device> device = Device::open();
   Buffer a(*device), b(*device);
   Commands commands(*device);
   const std::vector<std::uint32_t> values(kCount, 3);

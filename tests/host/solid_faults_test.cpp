@@ -35,7 +35,7 @@ Processor processor_of(Precision precision) { return precision == Precision::sin
 
 std::unique_ptr<SolidBackend> device_backend(const Solid& solid, const VulkanOptions& options,
                                              InnerCells inner = InnerCells::whole) {
-  return host::make_vulkan_solid_backend(solid, Device::open(device_for(processor_of(options.precision))), options, inner);
+  return host::make_vulkan_solid_backend(solid, Device::open(device_for(processor_of(options.precision)).value()), options, inner);
 }
 
 bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
@@ -160,7 +160,7 @@ TEST_P(SolidFaults, RoomEndsAtWhatTheDeviceBinds) {
   for (const std::size_t range : {std::size_t{8} << 10, std::size_t{20} << 10}) {
     SCOPED_TRACE(range);
     const std::string text = message_of([&] {
-      std::unique_ptr<Device> device = Device::open(device_for(processor_of(GetParam())));
+      std::unique_ptr<Device> device = Device::open(device_for(processor_of(GetParam())).value());
       host::limit_storage_range(*device, range);
       VulkanOptions options = with_precision(GetParam());
       options.rooms = {1000, 64, 64, 64};
@@ -202,7 +202,7 @@ TEST(SolidWithoutDouble, IsSingleAndUncertainPairsReachTheCpu) {
   const Solid solid(shaken(tet_grid(2, 2, 2), 0.2, 63));
   const std::vector<Vec3> seeds = hard_seeds(solid.mesh);
   const auto poor = [] {
-    std::unique_ptr<Device> device = Device::open(device_for(Processor::single));
+    std::unique_ptr<Device> device = Device::open(device_for(Processor::single).value());
     host::hide_float64(*device);
     return device;
   };

@@ -126,7 +126,7 @@ Device* device() {
     register_modules(decision_modules);
     const char* named = std::getenv("BISECTOR_TEST_DEVICE");
     try {
-      return Device::open(named ? named : "vulkan");
+      return Device::open(parse_device(named ? named : "vulkan"));
     } catch (const DeviceError&) {
       if (named) throw;
       return nullptr;

@@ -29,7 +29,7 @@ class Validation : public HostTest {};
 TEST_F(Validation, HearsOfWritesOutOfBounds) {
   if (validation_level() < 2) GTEST_SKIP() << "BISECTOR_VULKAN_VALIDATION is not 2";
   const std::size_t before = validation_messages();
-  const std::unique_ptr<Device> device = Device::open("vulkan");
+  const std::unique_ptr<Device> device = Device::open();
   Buffer values(*device);
   Commands commands(*device);
   values.reserve(64 * 4);

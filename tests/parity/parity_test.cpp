@@ -434,7 +434,7 @@ TEST_P(Certified, FewPairsReachTheCpu) {
   options.precision = precision_of(processor);
   options.double_rung = false;
   const std::unique_ptr<Backend> backend =
-      host::make_vulkan_backend(surface, host::Device::open(device_for(processor)), options);
+      host::make_vulkan_backend(surface, host::Device::open(device_for(processor).value()), options);
   const Diagram found = diagram_of(*backend, seeds);
   expect_parity(surface, test::diagram_of(surface, seeds, NeighbourSource::nearest), found, processor);
   const Certification& counts = found.moments.certification;

@@ -226,7 +226,7 @@ std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Setup& setup,
   host::VulkanOptions options;
   options.precision = precision_of(setup.processor);
   options.neighbours = setup.source;
-  return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor)), options, inner);
+  return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor).value()), options, inner);
 }
 
 struct ModelCase {

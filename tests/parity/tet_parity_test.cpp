@@ -46,7 +46,7 @@ TEST_P(TetRuns, AreTheCpus) {
   SKIP_WITHOUT_DEVICE(setup.processor);
   const TetResult found = run_on(problem, options_of(setup));
   ComputeOptions cpu;
-  cpu.device = "cpu";
+  cpu.device.kind = DeviceRequest::Kind::cpu;
   const TetResult expected = run_on(problem, cpu);
   const TetTopology topology = analyse_tet_topology(found.mesh);
   EXPECT_TRUE(topology.conforming);

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -56,29 +57,28 @@ inline Precision precision_of(Processor processor) {
   return processor == Processor::single ? Precision::single : Precision::double_;
 }
 
-// A request for a device that can do it, preferably one that is no software; empty where there is none.
-inline std::string device_for(Processor processor) {
-  if (processor == Processor::cpu) return "cpu";
-  if (const char* named = std::getenv("BISECTOR_TEST_DEVICE")) return named;
+// A request for a device that can do it, preferably one that is no software; nothing where there is none.
+inline std::optional<DeviceRequest> device_for(Processor processor) {
+  if (processor == Processor::cpu) return DeviceRequest{.kind = DeviceRequest::Kind::cpu};
+  if (const char* named = std::getenv("BISECTOR_TEST_DEVICE")) return parse_device(named);
   static const DeviceList list = list_devices();
-  const std::string gpu = best_gpu(list, precision_of(processor));
-  if (!gpu.empty()) return gpu;
+  if (const auto gpu = best_gpu(list, precision_of(processor))) return gpu;
   for (const DeviceDescription& device : list.devices)
     if (device.rejected.empty() && (device.float64 || processor == Processor::single))
-      return "vulkan:" + std::to_string(device.index);
+      return DeviceRequest{.kind = DeviceRequest::Kind::vulkan, .index = device.index};
   return {};
 }
 
 inline ComputeOptions options_of(const Setup& setup) {
   ComputeOptions options;
-  options.device = device_for(setup.processor);
+  options.device = device_for(setup.processor).value();
   options.precision = precision_of(setup.processor);
   options.neighbours = setup.source;
   return options;
 }
 
 #define SKIP_WITHOUT_DEVICE(processor) \
-  if (device_for(processor).empty()) GTEST_SKIP() << "no Vulkan device for this"
+  if (!device_for(processor)) GTEST_SKIP() << "no Vulkan device for this"
 
 inline Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
   Diagram d;

@@ -1,10 +1,6 @@
-#include "common.h"
+#include "summary.h"
 
 #include <fmt/format.h>
-
-#include <algorithm>
-
-#include "io/mesh_io.h"
 
 namespace bisector::cli {
 namespace {
@@ -16,18 +12,6 @@ void print_phases(Console& console, const char* title, const Json& seconds) {
 }
 
 }  // namespace
-
-ComputeOptions compute_options(const ComputeWords& words) {
-  return {words.device, parse_precision(words.precision),
-          words.neighbours == "delaunay" ? NeighbourSource::delaunay : NeighbourSource::nearest};
-}
-
-Json seconds_json(const DiagramSeconds& seconds) {
-  return {{"delaunay", seconds.delaunay},
-          {"neighbors", seconds.neighbours},
-          {"pairs", seconds.pairs},
-          {"clip", seconds.clip}};
-}
 
 const char* yes_no(bool b) { return b ? "yes" : "no"; }
 
@@ -53,20 +37,6 @@ void print_device(Console& console, const BackendDescription& device) {
     console.print(fmt::format("device     {}, {} precision", device.name, device.precision));
   else if (!device.fallback.empty())
     console.print(fmt::format("device     {}; {}", device.name, device.fallback));
-}
-
-std::vector<Vec3> read_seeds(const std::string& path, std::size_t count) {
-  std::vector<Vec3> seeds = read_points(path);
-  if (count != 0 && count != seeds.size())
-    throw Error(fmt::format("{}: {} in the file, but -n asks for {}; leave -n out", path,
-                            counted(seeds.size(), "seed", "seeds"), count));
-  return seeds;
-}
-
-Json features_json(const FeatureResult& features, std::size_t edges) {
-  const FeatureDistance& d = features.distance;
-  return {{"curves", features.curves}, {"corners", features.corners}, {"broken", features.broken}, {"edges", edges},
-          {"vertices", features.seeds}, {"distance_vertices", d.vertices}, {"distance_max", std::max(d.to_reference, d.from_reference)}};
 }
 
 }  // namespace bisector::cli

@@ -1,0 +1,240 @@
+#include "options.h"
+
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "words.h"
+
+namespace bisector::cli {
+namespace {
+
+// The number that the whole text is, or nothing.
+template <class Number>
+std::optional<Number> number_in(const std::string& text) {
+  Number value{};
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || stop != text.data() + text.size()) return {};
+  return value;
+}
+
+CLI::Validator not_empty() {
+  return CLI::Validator([](std::string& text) { return std::string(text.empty() ? "the name is empty" : ""); }, "");
+}
+
+struct Density {
+  DensityKind kind = DensityKind::uniform;
+  double exponent = SizingOptions{}.exponent;
+  std::string attribute;  // NAME of "attribute:NAME"
+};
+
+Density parse_density(const std::string& word) {
+  const std::size_t colon = word.find(':');
+  const std::string kind = word.substr(0, colon), rest = colon == std::string::npos ? "" : word.substr(colon + 1);
+  Density density;
+  if (word == "uniform") return density;
+  if (kind == "attribute" && !rest.empty()) {
+    density.kind = DensityKind::attribute;
+    density.attribute = rest;
+    return density;
+  }
+  if (kind == "lfs") density.kind = DensityKind::lfs;
+  else if (kind == "curvature") density.kind = DensityKind::curvature;
+  else throw Error("'" + word + "' is none of uniform, lfs[:EXP], curvature[:EXP], attribute:NAME");
+  if (colon == std::string::npos) return density;
+  const std::optional<double> exponent = number_in<double>(rest);
+  if (!exponent || !(*exponent > 0 && *exponent <= 8))
+    throw Error("'" + word + "': the exponent is not a number above 0 and at most 8");
+  density.exponent = *exponent;
+  return density;
+}
+
+FeatureOptions parse_features(const std::string& word) {
+  FeatureOptions options;
+  if (word == "auto") return options;
+  if (word == "none") {
+    options.mode = FeatureMode::none;
+    return options;
+  }
+  const std::optional<double> angle = number_in<double>(word);
+  if (!angle || !(*angle > 0 && *angle < 180))
+    throw Error("'" + word + "' is none of auto, none, or degrees above 0 and below 180");
+  options.mode = FeatureMode::degrees;
+  options.angle = *angle;
+  return options;
+}
+
+}  // namespace
+
+Help::Help(std::string usage) : usage_(std::move(usage)) {
+  column_width(32);
+  label("REQUIRED", "(required)");
+  label("Positionals", "Arguments");
+}
+
+std::string Help::make_usage(const CLI::App*, std::string) const { return "\nUsage: " + usage_ + "\n\n"; }
+
+// One blank line between groups, where CLI11 leaves two.
+std::string Help::make_group(std::string name, bool is_positional, std::vector<const CLI::Option*> options) const {
+  const std::string group = CLI::Formatter::make_group(name, is_positional, options).substr(1);
+  return is_positional ? group + "\n" : group;
+}
+
+CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer) {
+  CLI::App* app = program.add_subcommand(name, about);
+  app->group("Commands")->footer(footer);
+  app->formatter(std::make_shared<Help>(usage));
+  app->get_help_ptr()->description("print this and exit")->group("Output");
+  return app;
+}
+
+CLI::Validator whole_number(std::uint64_t least, std::uint64_t most) {
+  return CLI::Validator(
+      [=](std::string& text) -> std::string {
+        const std::optional<std::uint64_t> value = number_in<std::uint64_t>(text);
+        if (!value || *value < least || *value > most)
+          return "'" + text + "' is not a whole number from " + std::to_string(least) + " to " + std::to_string(most);
+        text = std::to_string(*value);
+        return {};
+      },
+      "");
+}
+
+CLI::Validator number_below(double most) {
+  return CLI::Validator(
+      [=](std::string& text) -> std::string {
+        const std::optional<double> value = number_in<double>(text);
+        if (value && *value >= 0 && *value < most) return {};
+        return "'" + text + "' is not a number of at least 0 and less than " + CLI::detail::to_string(most);
+      },
+      "");
+}
+
+CLI::Validator number_above_zero() {
+  return CLI::Validator(
+      [](std::string& text) -> std::string {
+        const std::optional<double> value = number_in<double>(text);
+        if (value && *value > 0 && std::isfinite(*value)) return {};
+        return "'" + text + "' is not a positive number";
+      },
+      "");
+}
+
+CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const char* type, const char* help) {
+  return app->add_option(name, path, help)->type_name(type)->check(not_empty());
+}
+
+CLI::Option* add_device(CLI::App* app, DeviceRequest& device, const char* help) {
+  return add_parsed(app, "--device", device, parse_device, help)->type_name("DEVICE")->group("Computation");
+}
+
+void add_compute_options(CLI::App* app, ComputeOptions& options) {
+  add_device(app, options.device,
+             "what computes: auto (the best GPU, or the CPU; default),\n"
+             "cpu, vulkan (the best device), vulkan:INDEX or\n"
+             "vulkan:UUID as 'bisector devices' lists them");
+  add_words(app, "--precision", options.precision, kPrecisionWords,
+            "auto (double where the device has it), single or double;\n"
+            "the CPU has double only")
+      ->group("Computation");
+  add_words(app, "--neighbors", options.neighbours, kNeighbourWords,
+            "where neighbours of seeds come from: auto, nearest or\n"
+            "delaunay; the result is the same")
+      ->group("Computation");
+}
+
+void add_common_options(CLI::App* app, CommonOptions& options, const char* about) {
+  app->add_option("--threads", options.threads, "at most so many; default: all cores. The result is the same")
+      ->type_name("N")->check(whole_number(1, 1024))->group("Computation");
+  add_file(app, "--report", options.report, "FILE", about)->group("Output");
+  app->add_flag("--quiet", options.quiet, "print errors only")->group("Output");
+  app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
+}
+
+CLI::Option* add_random_seed(CLI::App* app, std::uint64_t& random_seed, const char* help) {
+  return app->add_option("--random-seed", random_seed, help)->type_name("N")->check(whole_number(0, UINT64_MAX));
+}
+
+void add_edge_length(CLI::App* app, double& length, double& relative) {
+  app->add_option("--edge-length", length,
+                  "mean edge length of the result, in the mesh's unit,\n"
+                  "instead of -n")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-length-relative", relative,
+                  "the same as a share of the bounding box's diagonal")
+      ->type_name("R")->check(number_above_zero())->group("Size");
+}
+
+void add_edge_bounds(CLI::App* app, SizingOptions& sizing) {
+  app->add_option("--edge-min", sizing.min_edge, "edges aimed at are no shorter, in the mesh's unit")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+  app->add_option("--edge-max", sizing.max_edge, "and no longer")
+      ->type_name("L")->check(number_above_zero())->group("Size");
+}
+
+void add_iterations(CLI::App* app, int& iterations, const char* help) {
+  app->add_option("--iterations", iterations, help)
+      ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
+}
+
+void add_tolerance(CLI::App* app, double& tolerance, const char* help) {
+  app->add_option("--tolerance", tolerance, help)->type_name("T")->check(number_below(1))->group("Optimisation");
+}
+
+void add_density(CLI::App* app, SizingOptions& sizing, std::string& attribute, const char* help) {
+  const auto set = [&](const std::string& word) {
+    const Density density = parse_density(word);
+    sizing.kind = density.kind;
+    sizing.exponent = density.exponent;
+    attribute = density.attribute;
+  };
+  app->add_option_function<std::string>("--density", set, help)
+      ->type_name("WORD")->check(parsed_by(parse_density))->group("Size");
+}
+
+void add_features(CLI::App* app, FeatureOptions& features, const char* help) {
+  add_parsed(app, "--features", features, parse_features, help)->group("Features");
+}
+
+void add_feature_file(CLI::App* app, std::string& path) {
+  add_file(app, "--feature-file", path, "FILE",
+           "also keep these edges: lines of two vertex numbers,\n"
+           "counted from 0 in the input")
+      ->group("Features");
+}
+
+void add_weld(CLI::App* app, double& tolerance) {
+  app->add_option("--weld", tolerance,
+                  "join borders that are no farther apart, in the mesh's\n"
+                  "unit; default: only what lies at the same point")
+      ->type_name("T")->check(number_below(1e100))->group("Features");
+}
+
+void Usage::refuse(const char* option, const char* why) const {
+  if (given(option)) throw CLI::ValidationError(std::string(option) + ": " + why);
+}
+
+void Usage::check_number_of_vertices() const {
+  const int sizes = given("-n") + given("--edge-length") + given("--edge-length-relative");
+  if (!given("--seeds") && sizes == 0)
+    throw CLI::ValidationError("how many vertices? give -n N, --edge-length L or --seeds FILE.xyz");
+  if (sizes > 1) throw CLI::ValidationError("-n, --edge-length and --edge-length-relative: give one of them");
+  if (!given("--seeds")) return;
+  for (const char* option : {"--edge-length", "--edge-length-relative"})
+    refuse(option, "seeds from a file have their own number; leave one of the two out");
+  refuse("--random-seed", "seeds from a file are not random; leave one of the two out");
+}
+
+void Usage::check_edge_bounds(const SizingOptions& sizing) const {
+  if (sizing.max_edge > 0 && sizing.min_edge > sizing.max_edge)
+    throw CLI::ValidationError("--edge-min is more than --edge-max");
+}
+
+void Usage::check_uniform_density() const {
+  for (const char* option : {"--gradation", "--edge-min", "--edge-max"})
+    refuse(option, "a uniform density has edges of one length; choose another --density");
+}
+
+}  // namespace bisector::cli

@@ -1,0 +1,20 @@
+// Parts of the summaries that runs end with.
+#pragma once
+
+#include <string>
+
+#include "bisector/device.h"
+#include "mesh/topology.h"
+#include "console.h"
+#include "report.h"
+
+namespace bisector::cli {
+
+const char* yes_no(bool b);
+std::string size_of(const Json& mesh);  // "8 vertices, 12 faces"
+std::string describe(const MeshTopology& topology);
+void print_seconds(Console& console, const Json& seconds, const Json& device_seconds = nullptr);
+// What computed, where that was not the CPU all along.
+void print_device(Console& console, const BackendDescription& device);
+
+}  // namespace bisector::cli
