@@ -6,8 +6,8 @@
 
 namespace bisector {
 
-void project_to_cells(const Surface& surface, const Csr<Index>& cells, const std::vector<SeedPlace>& places,
-                      std::vector<Vec3>& seeds, std::vector<Vec3>& normals) {
+void project_to_cells(const Surface& surface, const Csr<Index>& cells, std::span<const SeedPlace> places,
+                      std::span<Vec3> seeds, std::vector<Vec3>& normals) {
   normals.resize(seeds.size());
   parallel_each(seeds.size(), [&](std::size_t i) {
     if (!places.empty() && places[i].kind == SeedPlace::Kind::interior) return;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "mesh/sampling.h"
 #include "mesh/topology.h"
@@ -16,10 +17,6 @@ constexpr std::size_t kPerComponent = 4;      // a tetrahedron
 constexpr std::size_t kCoarsest = 100;        // seeds on the coarsest level, at least
 constexpr int kLevels = 3;
 constexpr double kNearMiddle = 0.25;          // of the distance of two seeds
-
-bool on_surface(const std::vector<SeedPlace>& places, Index i) {
-  return places.empty() || places[i].kind == SeedPlace::Kind::surface;
-}
 
 }  // namespace
 
@@ -76,8 +73,9 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
 namespace {
 
 // The midpoints of the dual edges, as many as there is room for; where edges are too few, also points of cells of high energy.
-void append_midpoints(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
-                      const std::vector<SeedPlace>& places, std::vector<DualEdge> edges, std::size_t count, std::vector<Vec3>& finer) {
+void add_midpoints(const Diagram& diagram, const PlacedSeeds& coarse, std::vector<DualEdge> edges, std::size_t count,
+                   PlacedSeeds& finer) {
+  const std::vector<Vec3>& seeds = coarse.positions();
   const std::size_t room = count > finer.size() ? count - finer.size() : 0;
   if (edges.size() > room) {
     std::stable_sort(edges.begin(), edges.end(), [&](const DualEdge& e, const DualEdge& f) {
@@ -89,35 +87,24 @@ void append_midpoints(const RestrictedPolygons& polygons, const CellMoments& mom
     const Vec3 a = seeds[edge.a], b = seeds[edge.b], middle = 0.5 * (a + b);
     // On a smooth surface the middle is the better start; where the edge crosses elsewhere, it may be off the sheet.
     const bool near = norm2(middle - edge.crossing) < kNearMiddle * kNearMiddle * norm2(b - a);
-    finer.push_back(near ? middle : edge.crossing);
+    finer.add(near ? middle : edge.crossing);
   }
-  if (finer.size() < count) {
-    const std::vector<Vec3> more = insertion_points(polygons, seeds, places, moments, count - finer.size());
-    finer.insert(finer.end(), more.begin(), more.end());
-  }
+  if (finer.size() < count) finer.add(insertion_points(diagram, coarse, count - finer.size()));
 }
 
 }  // namespace
 
-std::vector<Vec3> refine(const RestrictedPolygons& polygons, const CellMoments& moments, const std::vector<Vec3>& seeds,
-                         std::size_t count) {
-  std::vector<Vec3> finer = seeds;
-  append_midpoints(polygons, moments, seeds, {}, extract_dual_edges(polygons, seeds), count, finer);
-  return finer;
-}
-
-PlacedSeeds refine(const RestrictedPolygons& polygons, const CellMoments& moments, const PlacedSeeds& coarse,
-                   const FeatureCurves& curves, const PlacedSeeds& features, std::size_t count) {
-  PlacedSeeds finer = features;
-  for (std::size_t i = 0; i < coarse.seeds.size(); ++i)
-    if (coarse.places[i].kind == SeedPlace::Kind::surface) finer.seeds.push_back(coarse.seeds[i]);
-  const std::vector<std::array<Index, 2>> along = curve_neighbours(curves, coarse.places);
-  std::vector<DualEdge> edges = extract_dual_edges(polygons, coarse.seeds);
+PlacedSeeds refine(const Diagram& diagram, const PlacedSeeds& coarse, const FeatureCurves& curves,
+                   const PlacedSeeds& on_features, std::size_t count) {
+  PlacedSeeds finer = on_features;
+  for (std::size_t i = 0; i < coarse.size(); ++i)
+    if (coarse.on_surface(i)) finer.add(coarse.position(i));
+  const std::vector<std::array<Index, 2>> along = curve_neighbours(curves, coarse.places());
+  std::vector<DualEdge> edges = extract_dual_edges(diagram.polygons, coarse.positions());
   std::erase_if(edges, [&](const DualEdge& e) {
     return std::binary_search(along.begin(), along.end(), std::array<Index, 2>{e.a, e.b});
   });
-  append_midpoints(polygons, moments, coarse.seeds, coarse.places, std::move(edges), count, finer.seeds);
-  finer.places.resize(finer.seeds.size());
+  add_midpoints(diagram, coarse, std::move(edges), count, finer);
   return finer;
 }
 
@@ -148,8 +135,10 @@ std::vector<std::array<Index, 2>> curve_neighbours(const FeatureCurves& curves, 
   return pairs;
 }
 
-std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds,
-                                   const std::vector<SeedPlace>& places, const CellMoments& moments, std::size_t count) {
+std::vector<Vec3> insertion_points(const Diagram& diagram, const PlacedSeeds& placed, std::size_t count) {
+  const RestrictedPolygons& polygons = diagram.polygons;
+  const std::vector<Moments>& cells = diagram.moments.cells;
+  const std::vector<Vec3>& seeds = placed.positions();
   std::vector<double> squared(seeds.size(), -1);
   std::vector<Vec3> corner(seeds.size());
   for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
@@ -165,7 +154,7 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
   std::vector<Index> order(seeds.size());
   std::iota(order.begin(), order.end(), Index{0});
   std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-    return moments.cells[a].second > moments.cells[b].second;
+    return cells[a].second > cells[b].second;
   });
   std::vector<std::vector<Index>> around(seeds.size());
   for (const DualEdge& e : extract_dual_edges(polygons, seeds)) {
@@ -179,7 +168,7 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
     std::vector<char> blocked(seeds.size(), 0);
     for (Index i : order) {
       if (points.size() == count) return points;
-      if (!on_surface(places, i) || squared[i] <= 0 || taken[i] || blocked[i]) continue;
+      if (!placed.on_surface(i) || squared[i] <= 0 || taken[i] || blocked[i]) continue;
       taken[i] = 1;
       // A corner belongs to several cells.
       if (!distinct.insert({corner[i].x, corner[i].y, corner[i].z}).second) continue;
@@ -191,50 +180,47 @@ std::vector<Vec3> insertion_points(const RestrictedPolygons& polygons, const std
   return points;
 }
 
-void set_count(const RestrictedPolygons& polygons, const CellMoments& moments, std::size_t count,
-               std::vector<Vec3>& seeds, std::vector<SeedPlace>& places) {
-  if (seeds.size() < count) {
-    const std::vector<Vec3> more = insertion_points(polygons, seeds, places, moments, count - seeds.size());
-    seeds.insert(seeds.end(), more.begin(), more.end());
-    if (!places.empty()) places.resize(seeds.size());
-  }
+void set_count(const Diagram& diagram, std::size_t count, PlacedSeeds& seeds) {
+  if (seeds.size() < count) seeds.add(insertion_points(diagram, seeds, count - seeds.size()));
   if (seeds.size() <= count) return;
-  std::vector<DualEdge> edges = extract_dual_edges(polygons, seeds);
+  const std::vector<DualEdge> edges = extract_dual_edges(diagram.polygons, seeds.positions());
   std::vector<double> squared(edges.size());
   std::vector<std::size_t> order(edges.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  for (std::size_t k = 0; k < edges.size(); ++k) squared[k] = norm2(seeds[edges[k].a] - seeds[edges[k].b]);
+  for (std::size_t k = 0; k < edges.size(); ++k) 
+    squared[k] = norm2(seeds.position(edges[k].a) - seeds.position(edges[k].b));
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return squared[a] < squared[b]; });
   std::vector<char> removed(seeds.size(), 0);
   std::size_t left = seeds.size();
   const auto remove = [&](Index i) {
-    if (left > count && !removed[i] && on_surface(places, i)) {
+    if (left > count && !removed[i] && seeds.on_surface(i)) {
       removed[i] = 1;
       --left;
     }
   };
   for (Index i = 0; i < seeds.size(); ++i)
-    if (moments.cells[i].mass <= 0) remove(i);
+    if (diagram.moments.cells[i].mass <= 0) remove(i);
   for (bool spread : {true, false}) {
     std::vector<char> blocked(seeds.size(), 0);
     for (std::size_t k : order) {
       const DualEdge& e = edges[k];
       if (left == count) break;
       if (removed[e.a] || removed[e.b] || (spread && (blocked[e.a] || blocked[e.b]))) continue;
-      const Index gone = on_surface(places, e.b) ? e.b : e.a;
-      if (!on_surface(places, gone)) continue;
+      const Index gone = seeds.on_surface(e.b) ? e.b : e.a;
+      if (!seeds.on_surface(gone)) continue;
       remove(gone);
       blocked[e.a] = blocked[e.b] = 1;
     }
   }
-  std::size_t n = 0;
-  for (Index i = 0; i < seeds.size(); ++i)
-    if (!removed[i]) {
-      if (!places.empty()) places[n] = places[i];
-      seeds[n++] = seeds[i];
-    }
-  seeds.resize(n);
-  if (!places.empty()) places.resize(n);
+  seeds.remove(removed);
+}
+
+void meet_count(CvtRun& run, std::size_t count) {
+  for (std::size_t size = 0; run.seeds.size() != count && run.seeds.size() != size;) {
+    run.context().check();
+    size = run.seeds.size();
+    set_count(run.diagram(Want::polygons), count, run.seeds);
+  }
 }
 
 }  // namespace bisector

@@ -1,11 +1,13 @@
 #include "cvt/optimise.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <utility>
 
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "cvt/constrain.h"
 #include "cvt/lbfgs.h"
 #include "cvt/multilevel.h"
@@ -13,74 +15,65 @@
 namespace bisector {
 namespace {
 
-constexpr double kArmijo = 1e-4;
+constexpr double kArmijo = 1e-4;           // share of the slope's promise that a step must keep
 constexpr double kFlatGradient = 1e-8;     // relative to the first; what is left is rounding
-constexpr int kLineSearchTrials = 8;
-constexpr std::size_t kDecreaseWindow = 5;
-constexpr int kReseedTrials = 10;
+constexpr int kLineSearchTrials = 8;       // evaluations per step at most
+constexpr std::size_t kDecreaseWindow = 5; // steps over which the energy's fall is judged
+constexpr int kReseedTrials = 10;          // rounds of giving empty cells another place
 
 using Kind = SeedPlace::Kind;
 
-Kind kind_of(const CvtState& state, std::size_t i) { return state.places.empty() ? Kind::surface : state.places[i].kind; }
+// Seeds with all that is known about them.
+struct Iterate {
+  PlacedSeeds seeds;
+  DiagramOfSeeds known;
+  std::vector<Vec3> gradient;
+  std::vector<Vec3> normals;  // of the surface at each seed, if constrained
+  double energy = 0;
+  double gradient_norm = 0;
+
+  const CellMoments& moments() const { return known.diagram.moments; }
+};
 
 // The part of a seed's gradient along what it is held on (thesis 4.4.2 and 4.4.3, equations 4.7 and 4.8).
-Vec3 held(const Vec3& g, const CvtState& state, std::size_t i, const OptimiseOptions& options) {
-  switch (kind_of(state, i)) {
+Vec3 held(const Vec3& g, const SeedPlace& place, const FeatureCurves& curves, const Vec3* normal) {
+  switch (place.kind) {
     case Kind::fixed: return {};
     case Kind::curve: {
-      const Vec3 tangent = options.curves->tangent(state.places[i].curve, state.places[i].position);
+      const Vec3 tangent = curves.tangent(place.curve, place.position);
       return dot(g, tangent) * tangent;
     }
     case Kind::interior: return g;
     case Kind::surface: break;
   }
-  return options.constrained ? g - dot(g, state.normals[i]) * state.normals[i] : g;
+  return normal ? g - dot(g, *normal) * *normal : g;
 }
 
-// Puts the seeds back to where they are held; `cells` are the triangles of each cell before the seeds moved, `before` the
-// seeds then.
-void hold(const Surface& surface, const Csr<Index>& cells, const std::vector<Vec3>& before, const OptimiseOptions& options,
-          CvtState& state) {
-  if (options.constrained) project_to_cells(surface, cells, state.places, state.seeds, state.normals);
-  for (std::size_t i = 0; i < state.places.size(); ++i) {
-    SeedPlace& place = state.places[i];
-    if (place.kind == Kind::fixed) state.seeds[i] = before[i];
-    if (place.kind != Kind::curve) continue;
-    const double reach = 2 * norm(state.seeds[i] - before[i]);
-    place.position = options.curves->nearest(place.curve, state.seeds[i], place.position, reach);
-    state.seeds[i] = options.curves->point(place.curve, place.position);
-  }
-}
-
-void evaluate(Backend& backend, const OptimiseOptions& options, CvtState& state, OptimiseTotals& totals) {
-  backend.evaluate(state.seeds, state.moments);
-  totals.count(state.moments);
-  const double total = backend.mass();
-  // A diagram whose cells do not add up is never used.
-  const bool covers = std::abs(state.moments.mass - total) <= backend.mass_tolerance() * total;
-  state.energy = covers ? state.moments.energy : std::numeric_limits<double>::infinity();
-  state.gradient.resize(state.seeds.size());
-  parallel_each(state.seeds.size(), [&](std::size_t i) {
-    state.gradient[i] = held(-2.0 * state.moments.cells[i].first, state, i, options);
+std::vector<Vec3> gradient_of(const std::vector<Moments>& cells, const PlacedSeeds& seeds, const FeatureCurves& curves,
+                              const std::vector<Vec3>* normals) {
+  std::vector<Vec3> gradient(seeds.size());
+  parallel_each(seeds.size(), [&](std::size_t i) {
+    gradient[i] = held(-2.0 * cells[i].first, seeds.place(i), curves, normals ? &(*normals)[i] : nullptr);
   });
-  state.gradient_norm = std::sqrt(inner(state.gradient, state.gradient));
+  return gradient;
 }
 
-bool is_lost(const CvtState& state, std::size_t i) {
-  const Kind kind = kind_of(state, i);
-  return state.moments.cells[i].mass <= 0 && (kind == Kind::surface || kind == Kind::interior);
+double length_of(const std::vector<Vec3>& gradient) { return std::sqrt(inner(gradient, gradient)); }
+
+bool is_lost(const Iterate& now, std::size_t i) {
+  const Kind kind = now.seeds.kind(i);
+  return now.moments().cells[i].mass <= 0 && (kind == Kind::surface || kind == Kind::interior);
 }
 
-bool has_empty_cell(const CvtState& state) {
-  for (std::size_t i = 0; i < state.seeds.size(); ++i)
-    if (is_lost(state, i)) return true;
+bool has_empty_cell(const Iterate& now) {
+  for (std::size_t i = 0; i < now.seeds.size(); ++i)
+    if (is_lost(now, i)) return true;
   return false;
 }
 
 // Puts seeds inside a solid that own nothing into the cells of highest energy, half the root mean square distance of their
 // points from the seed.
-void reseed_interior(CvtState& state, const std::vector<Index>& empty) {
-  const std::vector<Moments>& cells = state.moments.cells;
+void reseed_interior(const std::vector<Moments>& cells, const std::vector<Index>& empty, std::span<Vec3> positions) {
   std::vector<Index> order;
   for (Index i = 0; i < cells.size(); ++i)
     if (cells[i].mass > 0) order.push_back(i);
@@ -93,38 +86,8 @@ void reseed_interior(CvtState& state, const std::vector<Index>& empty) {
     const Vec3 towards = (1 / cell.mass) * cell.first;
     const double length = norm(towards), spread = 0.5 * std::sqrt(cell.second / cell.mass);
     const Vec3 step = length > 0.1 * spread ? (spread / length) * towards : Vec3{spread, 0, 0};
-    state.seeds[empty[k]] = state.seeds[order[k]] + step;
+    positions[empty[k]] = positions[order[k]] + step;
   }
-}
-
-// Puts the seeds of empty cells at far corners of the cells of highest energy.
-void reseed(Backend& backend, CvtState& state) {
-  RestrictedPolygons polygons;
-  backend.evaluate(state.seeds, state.moments, polygons);
-  std::vector<Index> empty, inside;
-  for (Index i = 0; i < state.seeds.size(); ++i)
-    if (is_lost(state, i)) (kind_of(state, i) == Kind::interior ? inside : empty).push_back(i);
-  reseed_interior(state, inside);
-  const std::vector<Vec3> points = insertion_points(polygons, state.seeds, state.places, state.moments, empty.size());
-  for (std::size_t k = 0; k < points.size(); ++k) state.seeds[empty[k]] = points[k];
-}
-
-void start(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
-           const Context& context) {
-  for (int trial = 0;; ++trial) {
-    context.check();
-    if (options.constrained) {
-      backend.evaluate(state.seeds, state.moments);
-      totals.count(state.moments);
-      state.normals.resize(state.seeds.size());
-      hold(backend.surface(), state.moments.triangles, std::vector<Vec3>(state.seeds), options, state);
-    }
-    evaluate(backend, options, state, totals);
-    if (trial == kReseedTrials || !has_empty_cell(state)) break;
-    reseed(backend, state);
-  }
-  if (!std::isfinite(state.energy))
-    throw Error("the diagram does not cover the domain; its coordinates may span too many magnitudes");
 }
 
 std::vector<double> preconditioner(const CellMoments& moments) {
@@ -134,104 +97,195 @@ std::vector<double> preconditioner(const CellMoments& moments) {
   return d;
 }
 
-// Whether a step lowers the energy enough; where rounding hides that, whether the slope says so: the approximate Wolfe
-// condition (Hager and Zhang 2005, section 2).
-bool is_descent(const Backend& backend, const CvtState& state, const CvtState& next, const std::vector<Vec3>& direction,
-                double slope, double step) {
-  if (next.energy <= state.energy + kArmijo * step * slope) return true;
-  const double noise = backend.energy_noise() * state.energy;
-  return noise > 0 && next.energy <= state.energy + noise &&
-         inner(next.gradient, direction) <= (2 * kArmijo - 1) * slope;
+}  // namespace
+
+// The iterates of one optimisation, with the run's seeds, diagram and normals while it lasts.
+class Descent {
+ public:
+  Descent(CvtRun& run, const OptimiseOptions& options) : run_(run), options_(options) {
+    now_.seeds = std::move(run.seeds);
+    now_.known = std::move(run.diagram_);
+    now_.normals = std::move(run.normals_);
+  }
+
+  void minimise();
+
+ private:
+  void hold(const CellMoments& moments, const std::vector<Vec3>& before, Iterate& next) const;
+  void measure(Iterate& iterate) const;
+  void reseed();
+  void start();
+  bool is_descent(const std::vector<Vec3>& direction, double slope, double step) const;
+  bool line_search(const std::vector<Vec3>& direction);
+  void accept();
+  void hand_back();
+
+  CvtRun& run_;
+  const OptimiseOptions& options_;
+  Lbfgs history_;
+  Iterate now_, next_;
+};
+
+// Puts the seeds back to where they are held. `moments` are those of the cells before the seeds moved, `before` where they
+// were then.
+void Descent::hold(const CellMoments& moments, const std::vector<Vec3>& before, Iterate& next) const {
+  const std::span<Vec3> positions = next.seeds.edit_positions();
+  const std::span<SeedPlace> places = next.seeds.edit_places();
+  if (options_.constrained) project_to_cells(run_.surface(), moments.triangles, places, positions, next.normals);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    SeedPlace& place = places[i];
+    if (place.kind == Kind::fixed) positions[i] = before[i];
+    if (place.kind != Kind::curve) continue;
+    const double reach = 2 * norm(positions[i] - before[i]);
+    place.position = run_.curves().nearest(place.curve, positions[i], place.position, reach);
+    positions[i] = run_.curves().point(place.curve, place.position);
+  }
 }
 
-// Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then `next`
-// is not to be used.
-bool line_search(Backend& backend, const CvtState& state, const std::vector<Vec3>& direction,
-                 const OptimiseOptions& options, CvtState& next, OptimiseTotals& totals) {
-  const double slope = inner(state.gradient, direction);
+void Descent::measure(Iterate& iterate) const {
+  run_.evaluate(iterate.seeds.positions(), Want::moments, iterate.known);
+  const CellMoments& moments = iterate.moments();
+  iterate.energy = run_.covers(iterate.known.diagram) ? moments.energy : std::numeric_limits<double>::infinity();
+  iterate.gradient =
+      gradient_of(moments.cells, iterate.seeds, run_.curves(), options_.constrained ? &iterate.normals : nullptr);
+  iterate.gradient_norm = length_of(iterate.gradient);
+}
+
+// Puts the seeds of empty cells at far corners of the cells of highest energy.
+void Descent::reseed() {
+  run_.evaluate(now_.seeds.positions(), Want::polygons, now_.known);
+  std::vector<Index> empty, inside;
+  for (Index i = 0; i < now_.seeds.size(); ++i)
+    if (is_lost(now_, i)) (now_.seeds.kind(i) == Kind::interior ? inside : empty).push_back(i);
+  const std::span<Vec3> positions = now_.seeds.edit_positions();
+  reseed_interior(now_.moments().cells, inside, positions);
+  const std::vector<Vec3> points = insertion_points(now_.known.diagram, now_.seeds, empty.size());
+  for (std::size_t k = 0; k < points.size(); ++k) positions[empty[k]] = points[k];
+}
+
+void Descent::start() {
+  for (int trial = 0;; ++trial) {
+    run_.context().check();
+    if (options_.constrained) {
+      run_.evaluate(now_.seeds.positions(), Want::moments, now_.known);
+      now_.normals.resize(now_.seeds.size());
+      hold(now_.moments(), std::vector<Vec3>(now_.seeds.positions()), now_);
+    }
+    measure(now_);
+    if (trial == kReseedTrials || !has_empty_cell(now_)) break;
+    reseed();
+  }
+  if (!std::isfinite(now_.energy))
+    throw Error("the diagram does not cover the domain; its coordinates may span too many magnitudes");
+}
+
+// Whether a step lowers the energy enough; where rounding hides that, whether the slope says so: the approximate Wolfe
+// condition (Hager and Zhang 2005, section 2).
+bool Descent::is_descent(const std::vector<Vec3>& direction, double slope, double step) const {
+  if (next_.energy <= now_.energy + kArmijo * step * slope) return true;
+  const double noise = run_.backend().energy_noise() * now_.energy;
+  return noise > 0 && next_.energy <= now_.energy + noise &&
+         inner(next_.gradient, direction) <= (2 * kArmijo - 1) * slope;
+}
+
+// Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then `next_` is
+// not to be used.
+bool Descent::line_search(const std::vector<Vec3>& direction) {
+  const double slope = inner(now_.gradient, direction);
   if (!(slope < 0)) return false;
   double step = 1;
   for (int trial = 0; trial < kLineSearchTrials; ++trial) {
-    next.seeds = state.seeds;
-    parallel_each(next.seeds.size(), [&](std::size_t i) { next.seeds[i] += step * direction[i]; });
-    next.normals = state.normals;
-    next.places = state.places;
-    hold(backend.surface(), state.moments.triangles, state.seeds, options, next);
-    evaluate(backend, options, next, totals);
-    if (is_descent(backend, state, next, direction, slope, step)) return true;
-    const double excess = next.energy - state.energy - step * slope;
+    next_.seeds = now_.seeds;
+    const std::span<Vec3> positions = next_.seeds.edit_positions();
+    parallel_each(positions.size(), [&](std::size_t i) { positions[i] += step * direction[i]; });
+    next_.normals = now_.normals;
+    hold(now_.moments(), now_.seeds.positions(), next_);
+    measure(next_);
+    if (is_descent(direction, slope, step)) return true;
+    const double excess = next_.energy - now_.energy - step * slope;
     const double vertex = std::isfinite(excess) ? -0.5 * slope * step * step / excess : 0;
     step = std::clamp(vertex, 0.1 * step, 0.5 * step);
   }
   return false;
 }
 
-}  // namespace
-
-void OptimiseTotals::count(const CellMoments& moments) {
-  ++evaluations;
-  seconds += moments.seconds;
-}
-
-void complete(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals) {
-  if (options.constrained) {
-    backend.evaluate(state.seeds, state.moments);
-    std::vector<Vec3> feet = state.seeds;
-    state.normals.resize(feet.size());
-    project_to_cells(backend.surface(), state.moments.triangles, state.places, feet, state.normals);
+// Goes to the point that the line search found. Where a cell has become empty there, its seed is put elsewhere, and the
+// history says nothing about that.
+void Descent::accept() {
+  ++run_.totals.iterations;
+  if (has_empty_cell(next_)) {
+    std::swap(now_, next_);
+    start();
+    history_.clear();
+    return;
   }
-  evaluate(backend, options, state, totals);
+  std::vector<Vec3> s = next_.seeds.positions(), y = next_.gradient;
+  parallel_each(s.size(), [&](std::size_t i) {
+    s[i] -= now_.seeds.position(i);
+    y[i] -= now_.gradient[i];
+  });
+  history_.push(std::move(s), std::move(y));
+  std::swap(now_, next_);
 }
 
-void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
-              const Context& context) {
-  const auto begin = std::chrono::steady_clock::now();
-  const DiagramSeconds before = totals.seconds;
-  start(backend, state, options, totals, context);
+void Descent::hand_back() {
+  run_.seeds = std::move(now_.seeds);
+  run_.diagram_ = std::move(now_.known);
+  run_.normals_ = std::move(now_.normals);
+  run_.energy = now_.energy;
+  run_.gradient_norm = now_.gradient_norm;
+}
 
-  Lbfgs history;
-  CvtState next;
-  std::vector<double> energies{state.energy};
-  const double first_norm = state.gradient_norm;
+void Descent::minimise() {
+  start();
+  std::vector<double> energies{now_.energy};
+  const double first_norm = now_.gradient_norm;
   bool restarted = false;
-  for (int iteration = 0; iteration < options.iterations; ++iteration) {
-    context.check();
-    if (state.gradient_norm <= kFlatGradient * first_norm) break;
-    const std::vector<Vec3> direction = history.direction(state.gradient, preconditioner(state.moments));
-    if (!line_search(backend, state, direction, options, next, totals)) {
+  for (int iteration = 0; iteration < options_.iterations; ++iteration) {
+    run_.context().check();
+    if (now_.gradient_norm <= kFlatGradient * first_norm) break;
+    const std::vector<Vec3> direction = history_.direction(now_.gradient, preconditioner(now_.moments()));
+    if (!line_search(direction)) {
       // Once from scratch along the gradient; if that finds nothing either, this is the minimum to rounding.
       if (restarted) break;
       restarted = true;
-      history.clear();
+      history_.clear();
       continue;
     }
     restarted = false;
-    ++totals.iterations;
-    if (has_empty_cell(next)) {
-      std::swap(state, next);
-      start(backend, state, options, totals, context);
-      history.clear();
-    } else {
-      std::vector<Vec3> s = next.seeds, y = next.gradient;
-      parallel_each(s.size(), [&](std::size_t i) {
-        s[i] -= state.seeds[i];
-        y[i] -= state.gradient[i];
-      });
-      history.push(std::move(s), std::move(y));
-      std::swap(state, next);
-    }
-    energies.push_back(state.energy);
-    context.report({options.phase, iteration + 1, options.iterations, state.energy, state.gradient_norm,
-                    options.done + options.share * (iteration + 1) / options.iterations});
+    accept();
+    energies.push_back(now_.energy);
+    run_.context().report({options_.phase, iteration + 1, options_.iterations, now_.energy, now_.gradient_norm,
+                           options_.done + options_.share * (iteration + 1) / options_.iterations});
     const std::size_t n = energies.size();
     if (n > kDecreaseWindow &&
-        energies[n - 1 - kDecreaseWindow] - energies[n - 1] < kDecreaseWindow * options.tolerance * energies[n - 1])
+        energies[n - 1 - kDecreaseWindow] - energies[n - 1] < kDecreaseWindow * options_.tolerance * energies[n - 1])
       break;
   }
-  const double total = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  const DiagramSeconds& after = totals.seconds;
-  totals.seconds_lbfgs += total - (after.delaunay - before.delaunay) - (after.neighbours - before.neighbours) -
-                          (after.pairs - before.pairs) - (after.clip - before.clip);
+  hand_back();
+}
+
+void optimise(CvtRun& run, const OptimiseOptions& options) {
+  const Stopwatch watch;
+  const DiagramSeconds before = run.totals.seconds;
+  Descent(run, options).minimise();
+  const DiagramSeconds& after = run.totals.seconds;
+  run.totals.seconds_lbfgs += watch.seconds() - (after.delaunay - before.delaunay) - (after.neighbours - before.neighbours) -
+                              (after.pairs - before.pairs) - (after.clip - before.clip);
+}
+
+std::vector<Vec3> complete(CvtRun& run, bool constrained) {
+  const Diagram& diagram = run.diagram();
+  if (constrained) {
+    std::vector<Vec3> feet = run.seeds.positions();
+    run.normals_.resize(feet.size());
+    project_to_cells(run.surface(), diagram.moments.triangles, run.seeds.places(), feet, run.normals_);
+  }
+  const std::vector<Vec3> gradient =
+      gradient_of(diagram.moments.cells, run.seeds, run.curves(), constrained ? &run.normals_ : nullptr);
+  run.energy = run.covers(diagram) ? diagram.moments.energy : std::numeric_limits<double>::infinity();
+  run.gradient_norm = length_of(gradient);
+  return gradient;
 }
 
 }  // namespace bisector

@@ -22,12 +22,6 @@ struct SeedPlace {
   double position = 0;   // arc length along `curve`, if there is one
 };
 
-// Seeds and their places, parallel.
-struct PlacedSeeds {
-  std::vector<Vec3> seeds;
-  std::vector<SeedPlace> places;
-};
-
 class FeatureCurves {
  public:
   FeatureCurves() = default;

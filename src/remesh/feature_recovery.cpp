@@ -57,9 +57,9 @@ std::map<std::array<Index, 2>, Index> dual_edge_counts(const Dual& dual, const s
 }
 
 Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
-                  const RestrictedPolygons& polygons) {
-  const std::vector<std::vector<CurveInterval>> traces = trace.trace(polygons);
-  const std::map<std::array<Index, 2>, Index> dual_edges = dual_edge_counts(extract_dual(polygons), places);
+                  const Diagram& diagram) {
+  const std::vector<std::vector<CurveInterval>> traces = trace.trace(diagram.polygons);
+  const std::map<std::array<Index, 2>, Index> dual_edges = dual_edge_counts(diagram.dual, places);
   Found found;
   std::map<std::array<Index, 2>, Index> taken;  // the curve that has an edge of the dual
   std::vector<Index> visits(places.size(), 0);
@@ -134,54 +134,43 @@ double position_at_radius(const FeatureCurves& curves, Index curve, int end, dou
 
 // Where on the curve to meet a foreign seed: as far from the corner they share as that seed, else across from it; in the middle
 // of the fault where that is elsewhere.
-double meeting_position(const FeatureCurves& curves, const CvtState& state, const Fault& fault) {
+double meeting_position(const FeatureCurves& curves, const PlacedSeeds& seeds, const Fault& fault) {
   const double middle = 0.5 * (fault.from + fault.to), length = fault.to - fault.from;
-  if (fault.cell == kNone || state.places[fault.cell].curve == kNone) return middle;
-  const Index foreign = state.places[fault.cell].curve;
+  if (fault.cell == kNone || seeds.place(fault.cell).curve == kNone) return middle;
+  const Index foreign = seeds.place(fault.cell).curve;
   double position = middle, nearest = std::numeric_limits<double>::infinity();
   for (int end : {0, 1}) {
     const Index corner = curves.ends(fault.curve)[end];
     if (corner == kNone || (corner != curves.ends(foreign)[0] && corner != curves.ends(foreign)[1])) continue;
-    const double radius = norm(state.seeds[fault.cell] - curves.corner(corner));
+    const double radius = norm(seeds.position(fault.cell) - curves.corner(corner));
     if (radius > nearest) continue;
     nearest = radius;
     position = position_at_radius(curves, fault.curve, end, radius);
   }
   if (std::isinf(nearest))
-    position = curves.nearest(fault.curve, state.seeds[fault.cell], curves.wrap(fault.curve, middle), 2 * length);
+    position = curves.nearest(fault.curve, seeds.position(fault.cell), curves.wrap(fault.curve, middle), 2 * length);
   return std::abs(position - middle) <= 2 * length ? position : middle;
 }
 
-void remove(CvtState& state, const std::vector<char>& removed) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < state.seeds.size(); ++i)
-    if (!removed[i]) {
-      state.seeds[kept] = state.seeds[i];
-      state.places[kept++] = state.places[i];
-    }
-  state.seeds.resize(kept);
-  state.places.resize(kept);
-}
-
 // The seeds of each curve.
-std::vector<std::vector<Index>> seeds_by_curve(const FeatureCurves& curves, const CvtState& state) {
+std::vector<std::vector<Index>> seeds_by_curve(const FeatureCurves& curves, const PlacedSeeds& seeds) {
   std::vector<std::vector<Index>> on(curves.size());
-  for (Index i = 0; i < state.seeds.size(); ++i)
-    if (state.places[i].curve != kNone) on[state.places[i].curve].push_back(i);
+  for (Index i = 0; i < seeds.size(); ++i)
+    if (seeds.place(i).curve != kNone) on[seeds.place(i).curve].push_back(i);
   return on;
 }
 
 // Puts the sliding ones of a curve's seeds at equal distances between those that are fixed.
-void space_evenly(const FeatureCurves& curves, const CurveMeasure& measure, Index curve, const std::vector<Index>& seeds,
-                  CvtState& state) {
+void space_evenly(const FeatureCurves& curves, const CurveMeasure& measure, Index curve, const std::vector<Index>& on,
+                  PlacedSeeds& seeds) {
   std::vector<std::pair<double, Index>> row;
-  for (Index i : seeds) row.push_back({measure.at(curve, state.places[i].position), i});
+  for (Index i : on) row.push_back({measure.at(curve, seeds.place(i).position), i});
   if (row.empty()) return;
   std::sort(row.begin(), row.end());
   const bool closed = curves.closed(curve);
   const double whole = measure.whole(curve);
   // Fixed points of the row: corners, protected seeds, and on a closed curve the first seed, before and after a lap.
-  const auto fixed = [&](std::size_t k) { return state.places[row[k].second].kind == Kind::fixed; };
+  const auto fixed = [&](std::size_t k) { return seeds.kind(row[k].second) == Kind::fixed; };
   std::size_t first = 0;
   if (closed) {
     while (first < row.size() && !fixed(first)) ++first;
@@ -200,65 +189,74 @@ void space_evenly(const FeatureCurves& curves, const CurveMeasure& measure, Inde
     for (std::size_t k = a + 1; k < b; ++k) {
       const double t = static_cast<double>(k - a) / static_cast<double>(b - a);
       const double at = row[a].first + t * (row[b].first - row[a].first);
-      SeedPlace& place = state.places[row[k].second];
+      SeedPlace place = seeds.place(row[k].second);
       place.position = measure.position(curve, at >= whole ? at - whole : at);
-      state.seeds[row[k].second] = curves.point(curve, place.position);
+      seeds.put(row[k].second, curves.point(curve, place.position), place);
     }
     a = b;
   }
 }
 
+// A curve at one of the corners that it ends in.
+struct Arm {
+  Index curve;
+  int end;
+  double reach = 0;               // length of the curve, from the corner on, in which it is protected
+  std::vector<double> positions;  // of the seeds that protect it
+};
+
+// From the corner to a position on the arm.
+double length_along(const FeatureCurves& curves, const Arm& arm, double position) {
+  return arm.end == 0 ? position : curves.length(arm.curve) - position;
+}
+
+// Gives the arms of a corner positions at the same distances from it, shell by shell, as far as they stay close to each other.
+void protect_arms(const FeatureCurves& curves, const CurveMeasure& measure, double c, std::vector<Arm>& arms) {
+  // The edge length near the corner, by the first arm; shells must be the same for all.
+  const double edge = measure.edge_length(arms[0].curve, arms[0].end == 0 ? 0 : curves.length(arms[0].curve), c);
+  double radius = edge;
+  for (std::size_t shell = 0; shell < kMostShells; ++shell) {
+    std::vector<double> at(arms.size(), -1);
+    for (std::size_t a = 0; a < arms.size(); ++a) {
+      const double position = position_at_radius(curves, arms[a].curve, arms[a].end, radius);
+      // The other half of a curve belongs to its other end.
+      if (length_along(curves, arms[a], position) < 0.5 * curves.length(arms[a].curve)) at[a] = position;
+    }
+    std::vector<char> close(arms.size(), 0);
+    double narrowest = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < arms.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b) {
+        if (at[a] < 0 || at[b] < 0) continue;
+        const double gap = norm(curves.point(arms[a].curve, at[a]) - curves.point(arms[b].curve, at[b]));
+        if (gap >= kAcute * edge) continue;
+        close[a] = close[b] = true;
+        narrowest = std::min(narrowest, gap);
+      }
+    if (std::isinf(narrowest)) return;
+    for (std::size_t a = 0; a < arms.size(); ++a) {
+      // An arm is protected from the corner on, without gaps.
+      if (!close[a] || arms[a].positions.size() < shell) continue;
+      arms[a].positions.push_back(at[a]);
+      arms[a].reach = length_along(curves, arms[a], at[a]) + 0.5 * edge;
+    }
+    // Between close curves triangles are as large as the gap, if that is not too small.
+    radius += std::clamp(narrowest, kLeastStep * edge, edge);
+  }
+}
+
 // Where curves leave a corner close to each other, gives them fixed seeds at the same distances from it, as far as they
 // stay close, in place of those that they have there.
-void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& measure, double c, CvtState& state) {
-  struct Arm {
-    Index curve;
-    int end;
-    double reach = 0;                // as far as seeds are protected
-    std::vector<double> positions;  // of those
-  };
-  std::vector<std::vector<Arm>> arms(curves.graph().corners.size());
+void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& measure, double c, PlacedSeeds& seeds) {
+  std::vector<std::vector<Arm>> corners(curves.graph().corners.size());
   for (Index k = 0; k < curves.size(); ++k)
     for (int end : {0, 1})
-      if (!curves.closed(k)) arms[curves.ends(k)[end]].push_back({k, end, 0, {}});
-  std::vector<char> removed(state.seeds.size(), 0);
+      if (!curves.closed(k)) corners[curves.ends(k)[end]].push_back({k, end, 0, {}});
   std::vector<std::pair<Index, double>> protected_places;
   std::vector<std::vector<std::array<double, 2>>> zones(curves.size());
-  for (Index corner = 0; corner < arms.size(); ++corner) {
-    std::vector<Arm>& around = arms[corner];
-    if (around.size() < 2) continue;
-    // The edge length near the corner, by the first arm; shells must be the same for all.
-    const double edge = measure.edge_length(around[0].curve, around[0].end == 0 ? 0 : curves.length(around[0].curve), c);
-    double radius = edge;
-    for (std::size_t shell = 0; shell < kMostShells; ++shell) {
-      std::vector<double> at(around.size(), -1);
-      for (std::size_t a = 0; a < around.size(); ++a) {
-        const double position = position_at_radius(curves, around[a].curve, around[a].end, radius);
-        const double along = around[a].end == 0 ? position : curves.length(around[a].curve) - position;
-        // The other half of a curve belongs to its other end.
-        if (along < 0.5 * curves.length(around[a].curve)) at[a] = position;
-      }
-      std::vector<char> close(around.size(), 0);
-      double narrowest = std::numeric_limits<double>::infinity();
-      for (std::size_t a = 0; a < around.size(); ++a)
-        for (std::size_t b = 0; b < a; ++b) {
-          if (at[a] < 0 || at[b] < 0) continue;
-          const double gap = norm(curves.point(around[a].curve, at[a]) - curves.point(around[b].curve, at[b]));
-          if (gap >= kAcute * edge) continue;
-          close[a] = close[b] = true;
-          narrowest = std::min(narrowest, gap);
-        }
-      if (std::isinf(narrowest)) break;
-      for (std::size_t a = 0; a < around.size(); ++a) {
-        // An arm is protected from the corner on, without gaps.
-        if (!close[a] || around[a].positions.size() < shell) continue;
-        around[a].positions.push_back(at[a]);
-        around[a].reach = (around[a].end == 0 ? at[a] : curves.length(around[a].curve) - at[a]) + 0.5 * edge;
-      }
-      // Between close curves triangles are as large as the gap, if that is not too small.
-      radius += std::clamp(narrowest, kLeastStep * edge, edge);
-    }
-    for (const Arm& arm : around) {
+  for (std::vector<Arm>& arms : corners) {
+    if (arms.size() < 2) continue;
+    protect_arms(curves, measure, c, arms);
+    for (const Arm& arm : arms) {
       if (arm.positions.empty()) continue;
       const double length = curves.length(arm.curve);
       zones[arm.curve].push_back(arm.end == 0 ? std::array<double, 2>{0, arm.reach}
@@ -266,42 +264,40 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
       for (double position : arm.positions) protected_places.push_back({arm.curve, position});
     }
   }
-  for (std::size_t i = 0; i < state.seeds.size(); ++i) {
-    const SeedPlace& place = state.places[i];
+  std::vector<char> replaced(seeds.size(), 0);
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    const SeedPlace& place = seeds.place(i);
     if (place.curve == kNone) continue;
     for (const auto& [from, to] : zones[place.curve])
-      if (place.position >= from && place.position <= to) removed[i] = 1;
+      if (place.position >= from && place.position <= to) replaced[i] = 1;
   }
-  remove(state, removed);
-  for (const auto& [curve, position] : protected_places) {
-    state.seeds.push_back(curves.point(curve, position));
-    state.places.push_back({Kind::fixed, curve, kNone, position});
-  }
-  const std::vector<std::vector<Index>> on = seeds_by_curve(curves, state);
+  seeds.remove(replaced);
+  for (const auto& [curve, position] : protected_places)
+    seeds.add(curves.point(curve, position), {Kind::fixed, curve, kNone, position});
+  const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
   for (Index k = 0; k < curves.size(); ++k)
-    if (!zones[k].empty()) space_evenly(curves, measure, k, on[k], state);
+    if (!zones[k].empty()) space_evenly(curves, measure, k, on[k], seeds);
 }
 
 // True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved away.
 bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<Fault>& faults, bool crowd,
-          bool last, CvtState& state) {
+          bool last, PlacedSeeds& seeds) {
   std::vector<std::size_t> wanted(curves.size());
   for (Index k = 0; k < curves.size(); ++k) wanted[k] = measure.edges(k, c) - (curves.closed(k) ? 0 : 1);
-  for (const SeedPlace& place : state.places)
+  for (const SeedPlace& place : seeds.places())
     if (place.curve != kNone && wanted[place.curve] > 0) --wanted[place.curve];
-  std::vector<char> used(state.seeds.size(), 0), removed(state.seeds.size(), 0);
+  std::vector<char> used(seeds.size(), 0), removed(seeds.size(), 0);
   std::set<Index> loosened;
   // Missing links wait until no foreign seed is left to meet: that may be all they need.
   const bool meeting = std::any_of(faults.begin(), faults.end(), [](const Fault& f) { return f.cell != kNone; });
   bool changed = false;
   const auto put = [&](Index seed, Index curve, double position, Kind kind) {
-    state.seeds[seed] = curves.point(curve, position);
-    state.places[seed] = {kind, curve, kNone, position};
+    seeds.put(seed, curves.point(curve, position), {kind, curve, kNone, position});
   };
   for (const Fault& fault : faults) {
-    const double position = curves.wrap(fault.curve, meeting_position(curves, state, fault));
+    const double position = curves.wrap(fault.curve, meeting_position(curves, seeds, fault));
     const double length = fault.to - fault.from;
-    if (fault.cell != kNone && state.places[fault.cell].kind == Kind::surface) {
+    if (fault.cell != kNone && seeds.on_surface(fault.cell)) {
       if (std::exchange(used[fault.cell], 1)) continue;
       changed = true;
       if (last || ((crowd || wanted[fault.curve] > 0) && length >= kRoomToSnap * measure.edge_length(fault.curve, position, c))) {
@@ -312,7 +308,8 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
         loosened.insert(fault.curve);
       } else {
         const Vec3 on = curves.point(fault.curve, curves.wrap(fault.curve, 0.5 * (fault.from + fault.to)));
-        state.seeds[fault.cell] += kPush * (state.seeds[fault.cell] - on);
+        Vec3& pushed = seeds.edit_positions()[fault.cell];
+        pushed += kPush * (pushed - on);
       }
       continue;
     }
@@ -322,16 +319,15 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
     if (length < least * measure.edge_length(fault.curve, position, c)) continue;
     changed = true;
     const bool meets = fault.cell != kNone;
-    if (meets) state.places[fault.cell].kind = Kind::fixed;
-    state.seeds.emplace_back();
-    state.places.emplace_back();
+    if (meets) seeds.edit_places()[fault.cell].kind = Kind::fixed;
+    seeds.add(Vec3{});
     removed.push_back(0);
-    put(static_cast<Index>(state.seeds.size() - 1), fault.curve, position, meets ? Kind::fixed : Kind::curve);
+    put(static_cast<Index>(seeds.size() - 1), fault.curve, position, meets ? Kind::fixed : Kind::curve);
   }
-  remove(state, removed);
+  seeds.remove(removed);
   if (!last && !loosened.empty()) {
-    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, state);
-    for (Index k : loosened) space_evenly(curves, measure, k, on[k], state);
+    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
+    for (Index k : loosened) space_evenly(curves, measure, k, on[k], seeds);
   }
   return changed;
 }
@@ -339,65 +335,58 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
 }  // namespace
 
 FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
-                             const RestrictedPolygons& polygons) {
-  return find_faults(trace, curves, places, polygons).report;
+                             const Diagram& diagram) {
+  return find_faults(trace, curves, places, diagram).report;
 }
 
-void clear_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-                    const CurveMeasure& measure, OptimiseOptions options, OptimiseTotals& totals, const Context& context) {
-  const std::size_t count = state.seeds.size();
+void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options) {
+  const FeatureCurves& curves = run.curves();
+  PlacedSeeds& seeds = run.seeds;
+  const std::size_t count = seeds.size();
   options.iterations = kClearingSteps;
   for (int round = 0; round < kClearingRounds; ++round) {
-    backend.evaluate(state.seeds, state.moments, polygons);
-    std::vector<char> removed(state.seeds.size(), 0);
-    for (const std::vector<CurveInterval>& intervals : trace.trace(polygons))
+    std::vector<char> removed(seeds.size(), 0);
+    for (const std::vector<CurveInterval>& intervals : trace.trace(run.diagram(Want::polygons).polygons))
       for (const CurveInterval& i : intervals)
-        if (state.places[i.cell].kind == Kind::surface) removed[i.cell] = 1;
-    remove(state, removed);
-    const std::vector<std::vector<Index>> on = seeds_by_curve(*options.curves, state);
-    for (Index c = 0; c < on.size(); ++c) space_evenly(*options.curves, measure, c, on[c], state);
-    if (state.seeds.size() == count) return;
-    backend.evaluate(state.seeds, state.moments, polygons);
-    set_count(polygons, state.moments, count, state.seeds, state.places);
-    optimise(backend, state, options, totals, context);
+        if (seeds.on_surface(i.cell)) removed[i.cell] = 1;
+    seeds.remove(removed);
+    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
+    for (Index c = 0; c < on.size(); ++c) space_evenly(curves, measure, c, on[c], seeds);
+    if (seeds.size() == count) return;
+    set_count(run.diagram(Want::polygons), count, seeds);
+    optimise(run, options);
   }
 }
 
-FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-                               const CurveMeasure& measure, double c, OptimiseOptions options, OptimiseTotals& totals,
-                               const Context& context) {
-  const FeatureCurves& curves = *options.curves;
-  const std::size_t count = state.seeds.size(), most = count + count / 4 + kMostAdded;
-  protect_acute_corners(curves, measure, c, state);
+FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, double c,
+                               OptimiseOptions options) {
+  constexpr Want kChains = Want::polygons | Want::dual;
+  const FeatureCurves& curves = run.curves();
+  const std::size_t count = run.seeds.size(), most = count + count / 4 + kMostAdded;
+  protect_acute_corners(curves, measure, c, run.seeds);
   PlacedSeeds best;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (int round = 0;; ++round) {
-    context.check();
-    backend.evaluate(state.seeds, state.moments, polygons);
-    const Found found = find_faults(trace, curves, state.places, polygons);
+    run.context().check();
+    const Found found = find_faults(trace, curves, run.seeds.places(), run.diagram(kChains));
     if (found.faults.empty()) return found.report;
     if (found.faults.size() < fewest) {
       fewest = found.faults.size();
-      best = {state.seeds, state.places};
+      best = run.seeds;
     }
     const bool last = round >= kMovingRounds;
-    if (round == kMovingRounds + kInsertingRounds || state.seeds.size() > most ||
-        !mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, state))
+    if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most ||
+        !mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, run.seeds))
       break;
     if (last) continue;
-    if (state.seeds.size() != count) {
-      backend.evaluate(state.seeds, state.moments, polygons);
-      set_count(polygons, state.moments, count, state.seeds, state.places);
-    }
+    if (run.seeds.size() != count) set_count(run.diagram(Want::polygons), count, run.seeds);
     options.phase = "features, round " + std::to_string(round + 1);
     options.iterations = kFirstSteps + (kLastSteps - kFirstSteps) * round / (kMovingRounds - 1);
-    optimise(backend, state, options, totals, context);
+    optimise(run, options);
   }
   // Sheets that intersect, or curves that cross another sheet, cannot all be had.
-  state.seeds = std::move(best.seeds);
-  state.places = std::move(best.places);
-  backend.evaluate(state.seeds, state.moments, polygons);
-  return find_faults(trace, curves, state.places, polygons).report;
+  run.seeds = std::move(best);
+  return find_faults(trace, curves, run.seeds.places(), run.diagram(kChains)).report;
 }
 
 }  // namespace bisector

@@ -21,19 +21,17 @@ struct FeatureReport {
   std::vector<Index> broken;                // curves that are not in the dual, ascending
 };
 
+// `diagram` is that of seeds with these places, with polygons and dual.
 FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
-                             const RestrictedPolygons& polygons);
+                             const Diagram& diagram);
 
 // Puts seeds on the surface whose cells reach a curve elsewhere, where the energy is high, and optimises again, for a bounded
 // number of rounds: curves have as many seeds of their own as they need.
-void clear_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-                    const CurveMeasure& measure, OptimiseOptions options, OptimiseTotals& totals, const Context& context);
+void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options);
 
 // Mends the curves that are broken and optimises again, for a bounded number of rounds. The count is kept in the first rounds;
-// in the last ones seeds are inserted and nothing moves. `c` is the scale of CurveMeasure. `polygons` and
-// state.moments end as those of the final seeds.
-FeatureReport recover_features(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-                               const CurveMeasure& measure, double c, OptimiseOptions options, OptimiseTotals& totals,
-                               const Context& context);
+// in the last ones seeds are inserted and nothing moves. `c` is the scale of CurveMeasure.
+FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, double c,
+                               OptimiseOptions options);
 
 }  // namespace bisector

@@ -19,8 +19,7 @@ double interpolate(const std::vector<double>& measures, double fraction) {
 
 void append_corners(const FeatureCurves& curves, PlacedSeeds& placed) {
   for (Index c = 0; c < curves.graph().corners.size(); ++c) {
-    placed.seeds.push_back(curves.corner(c));
-    placed.places.push_back({SeedPlace::Kind::fixed, kNone, c, 0});
+    placed.add(curves.corner(c), {SeedPlace::Kind::fixed, kNone, c, 0});
   }
 }
 
@@ -109,8 +108,7 @@ PlacedSeeds seeds_on_features(const FeatureCurves& curves, const CurveMeasure& m
       double at = interpolate(rows, static_cast<double>(k) / static_cast<double>(count));
       if (at >= whole) at -= whole;
       const double position = measure.position(curve, at);
-      placed.seeds.push_back(curves.point(curve, position));
-      placed.places.push_back({SeedPlace::Kind::curve, curve, kNone, position});
+      placed.add(curves.point(curve, position), {SeedPlace::Kind::curve, curve, kNone, position});
     }
   }
   return placed;

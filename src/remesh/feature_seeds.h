@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "features/curves.h"
+#include "features/placed_seeds.h"
 #include "voronoi/surface.h"
 
 namespace bisector {

@@ -37,11 +37,9 @@ enum class Star : unsigned char { disk, fan, other };
 
 // All that is asked of a diagram, by seed.
 struct Snapshot {
-  std::vector<Vec3> seeds;
-  std::vector<SeedPlace> places;  // as many
-  CellMoments moments;
+  PlacedSeeds seeds;
+  DiagramOfSeeds known;
   bool covers = false;            // the diagram is one of the whole surface
-  Dual dual;
   std::vector<double> costs;      // of the dual's triangles
   std::vector<ShapeExcess> excess;
   Csr<Index> stars;               // triangles at each seed
@@ -51,6 +49,9 @@ struct Snapshot {
   long long euler = 0;            // of the dual
   double average = 0;             // cost
   ShapeExcess worst;
+
+  const Dual& dual() const { return known.diagram.dual; }
+  const CellMoments& moments() const { return known.diagram.moments; }
 };
 
 Csr<Index> stars_of(const Dual& dual, std::size_t seeds) {
@@ -126,17 +127,16 @@ struct Change {
 
 class Improver {
  public:
-  Improver(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-           const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context);
+  Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options);
 
   ImproveReport run();
 
  private:
   enum class Aim { better, fewer, more };
 
-  bool featured() const { return step_.curves && step_.curves->size() > 0; }
+  bool has_curves() const { return run_.curves().size() > 0; }
   double irregular_price() const { return kIrregular * now_.average; }
-  std::size_t wanted() const { return options_.vertices ? options_.vertices : state_.seeds.size(); }
+  std::size_t wanted() const { return options_.vertices ? options_.vertices : run_.seeds.size(); }
   void measure(Snapshot& s);
   ShapeExcess worst_excess(const Snapshot& s, Index seed) const;
   bool as_good(const Snapshot& next) const;
@@ -161,14 +161,9 @@ class Improver {
   void smooth();
   std::vector<std::vector<Index>> colours(const std::vector<PatchVertex>& vertices) const;
 
-  Backend& backend_;
-  CvtState& state_;
-  RestrictedPolygons& polygons_;
+  CvtRun& run_;
   const FeatureTrace& trace_;
   const ImproveOptions& options_;
-  OptimiseOptions step_;
-  OptimiseTotals& totals_;
-  const Context& context_;
   ShapeGoal goal_;
   std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
   std::size_t poor_left_ = 0;     // poor seeds that may still be tried
@@ -177,39 +172,36 @@ class Improver {
   ImproveReport report_;
 };
 
-Improver::Improver(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-                   const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context)
-    : backend_(backend), state_(state), polygons_(polygons), trace_(trace), options_(options), step_(std::move(step)),
-      totals_(totals), context_(context), goal_(shape_goal(options.min_angle, options.max_angle)) {
-  if (!featured()) return;
-  corner_curves_.resize(step_.curves->graph().corners.size());
-  for (Index curve = 0; curve < step_.curves->size(); ++curve)
-    for (const Index corner : step_.curves->ends(curve))
+Improver::Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options)
+    : run_(run), trace_(trace), options_(options), goal_(shape_goal(options.min_angle, options.max_angle)) {
+  if (!has_curves()) return;
+  corner_curves_.resize(run.curves().graph().corners.size());
+  for (Index curve = 0; curve < run.curves().size(); ++curve)
+    for (const Index corner : run.curves().ends(curve))
       if (corner != kNone) corner_curves_[corner].push_back(curve);
 }
 
 void Improver::measure(Snapshot& s) {
-  context_.check();
-  backend_.evaluate(s.seeds, s.moments, polygons_);
-  totals_.count(s.moments);
-  const double total = backend_.surface().mass;
-  s.covers = std::abs(s.moments.mass - total) <= backend_.mass_tolerance() * total;
-  const std::size_t n = s.seeds.size();
-  s.dual = extract_dual(polygons_);
-  s.costs.resize(s.dual.triangles.size());
+  run_.context().check();
+  run_.evaluate(s.seeds.positions(), Want::polygons | Want::dual, s.known);
+  s.covers = run_.covers(s.known.diagram);
+  const Dual& dual = s.dual();
+  const std::vector<Vec3>& seeds = s.seeds.positions();
+  const std::size_t n = seeds.size();
+  s.costs.resize(dual.triangles.size());
   s.excess.resize(s.costs.size());
   parallel_each(s.costs.size(), [&](std::size_t k) {
-    const Triangle& t = s.dual.triangles[k];
-    s.costs[k] = shape_cost(s.seeds[t[0]], s.seeds[t[1]], s.seeds[t[2]], goal_);
-    s.excess[k] = shape_excess(s.seeds[t[0]], s.seeds[t[1]], s.seeds[t[2]], goal_);
+    const Triangle& t = dual.triangles[k];
+    s.costs[k] = shape_cost(seeds[t[0]], seeds[t[1]], seeds[t[2]], goal_);
+    s.excess[k] = shape_excess(seeds[t[0]], seeds[t[1]], seeds[t[2]], goal_);
   });
   s.average = fixed_sum(s.costs.size(), [&](std::size_t k) { return s.costs[k]; });
   s.average /= static_cast<double>(s.costs.size());
   for (const ShapeExcess& excess : s.excess) s.worst.take(excess);
-  s.stars = stars_of(s.dual, n);
+  s.stars = stars_of(dual, n);
   s.kinds.resize(n);
   std::vector<std::vector<Index>> rings(n);
-  parallel_each(n, [&](std::size_t v) { s.kinds[v] = look_around(s.dual, s.stars, static_cast<Index>(v), rings[v]); });
+  parallel_each(n, [&](std::size_t v) { s.kinds[v] = look_around(dual, s.stars, static_cast<Index>(v), rings[v]); });
   s.rings = {};
   for (const std::vector<Index>& ring : rings) {
     s.rings.values.insert(s.rings.values.end(), ring.begin(), ring.end());
@@ -217,8 +209,8 @@ void Improver::measure(Snapshot& s) {
   }
   const auto vertices = std::count_if(rings.begin(), rings.end(), [](const auto& ring) { return !ring.empty(); });
   const auto edges = static_cast<long long>(s.rings.values.size() / 2);
-  s.euler = vertices - edges + static_cast<long long>(s.dual.triangles.size());
-  if (featured()) s.features = check_features(trace_, *step_.curves, s.places, polygons_);
+  s.euler = vertices - edges + static_cast<long long>(dual.triangles.size());
+  if (has_curves()) s.features = check_features(trace_, run_.curves(), s.seeds.places(), s.known.diagram);
 }
 
 ShapeExcess Improver::worst_excess(const Snapshot& s, Index seed) const {
@@ -254,11 +246,11 @@ std::vector<Index> Improver::seeds_around(Index middle) const {
 // Seeds at a border that is no feature stay, or it would creep inwards.
 PatchVertex Improver::vertex_of(Index seed, const CellMap& map) const {
   PatchVertex vertex;
-  vertex.x = now_.seeds[seed];
-  vertex.place = now_.places[seed];
+  vertex.x = now_.seeds.position(seed);
+  vertex.place = now_.seeds.place(seed);
   vertex.owner = vertex.seed = seed;
   vertex.free = vertex.place.kind != Kind::surface || now_.kinds[seed] == Star::disk;
-  if (vertex.place.kind == Kind::surface && now_.moments.triangles.size(seed) > 0)
+  if (vertex.place.kind == Kind::surface && now_.moments().triangles.size(seed) > 0)
     map.project(vertex.x, vertex.owner, vertex.normal);
   return vertex;
 }
@@ -269,12 +261,12 @@ ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& 
   for (const Index v : seeds) triangles.insert(triangles.end(), now_.stars.begin(v), now_.stars.end(v));
   std::sort(triangles.begin(), triangles.end());
   triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-  ImprovePatch patch(map, step_.curves, goal_);
+  ImprovePatch patch(map, &run_.curves(), goal_);
   std::vector<Index> members = seeds;
   for (const Index v : seeds) patch.add_vertex(vertex_of(v, map));
   std::vector<std::array<Index, 2>> locked;
   for (const Index t : triangles) {
-    const Triangle& corners = now_.dual.triangles[t];
+    const Triangle& corners = now_.dual().triangles[t];
     Triangle local;
     for (int m = 0; m < 3; ++m) {
       const auto member = std::find(members.begin(), members.end(), corners[m]);
@@ -336,11 +328,11 @@ Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::siz
   for (Index k = 0; k < best->vertices().size(); ++k) {
     const PatchVertex& vertex = best->vertices()[k];
     if (vertex.place.curve != kNone) change.curves.push_back(vertex.place.curve);
-    if (const Index corner = vertex.place.corner; corner != kNone && featured())
+    if (const Index corner = vertex.place.corner; corner != kNone && has_curves())
       change.curves.insert(change.curves.end(), corner_curves_[corner].begin(), corner_curves_[corner].end());
     if (vertex.removed) {
       change.removed.push_back(vertex.seed);
-    } else if (vertex.seed == kNone || !(vertex.x == now_.seeds[vertex.seed])) {
+    } else if (vertex.seed == kNone || !(vertex.x == now_.seeds.position(vertex.seed))) {
       change.moved.push_back({vertex.seed, vertex.x, vertex.place});
       change.added += vertex.seed == kNone;
     }
@@ -373,7 +365,7 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
   const auto missing = static_cast<long long>(wanted()) - static_cast<long long>(now_.seeds.size());
   const std::size_t most = aim == Aim::better ? now_.seeds.size()
                                               : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
-  std::vector<char> taken(now_.dual.triangles.size(), 0);
+  std::vector<char> taken(now_.dual().triangles.size(), 0);
   std::vector<Index> middles;
   for (const Candidate& candidate : candidates) {
     const bool poor = aim == Aim::better && candidate.excess == 0;
@@ -416,7 +408,7 @@ std::vector<char> Improver::choose_changes(const std::vector<Change>& changes, A
 std::size_t Improver::batch(Aim aim) {
   const std::vector<Index> middles = choose_middles(aim);
   if (middles.empty()) return 0;
-  const CellMap map(backend_.surface(), now_.seeds, now_.moments.triangles, now_.rings);
+  const CellMap map(run_.surface(), now_.seeds.positions(), now_.moments().triangles, now_.rings);
   std::vector<Change> changes(middles.size());
   std::vector<std::size_t> trials(middles.size(), 0);
   parallel_each(middles.size(), [&](std::size_t k) { changes[k] = best_change(middles[k], map, aim, trials[k]); }, 1);
@@ -449,24 +441,19 @@ std::size_t Improver::batch(Aim aim) {
 Snapshot Improver::assemble(const std::vector<Change>& changes, const std::vector<char>& on, std::vector<Index>& index,
                             std::vector<std::vector<Index>>& seeds_of) const {
   Snapshot next;
-  std::vector<Vec3> seeds = now_.seeds;
-  std::vector<SeedPlace> places = now_.places;
-  index.assign(seeds.size(), 0);
+  next.seeds = now_.seeds;
+  std::vector<char> removed(next.seeds.size(), 0);
   for (std::size_t c = 0; c < changes.size(); ++c) {
     if (!on[c]) continue;
-    for (const Index v : changes[c].removed) index[v] = kNone;
+    for (const Index v : changes[c].removed) removed[v] = 1;
     for (const Change::Moved& m : changes[c].moved)
-      if (m.seed != kNone) {
-        seeds[m.seed] = m.x;
-        places[m.seed] = m.place;
-      }
+      if (m.seed != kNone) next.seeds.put(m.seed, m.x, m.place);
   }
-  for (std::size_t v = 0; v < seeds.size(); ++v) {
-    if (index[v] == kNone) continue;
-    index[v] = static_cast<Index>(next.seeds.size());
-    next.seeds.push_back(seeds[v]);
-    next.places.push_back(places[v]);
-  }
+  next.seeds.remove(removed);
+  index.assign(removed.size(), kNone);
+  Index kept = 0;
+  for (std::size_t v = 0; v < removed.size(); ++v)
+    if (!removed[v]) index[v] = kept++;
   seeds_of.assign(changes.size(), {});
   for (std::size_t c = 0; c < changes.size(); ++c) {
     if (!on[c]) continue;
@@ -475,8 +462,7 @@ Snapshot Improver::assemble(const std::vector<Change>& changes, const std::vecto
     for (const Change::Moved& m : changes[c].moved)
       if (m.seed == kNone) {
         seeds_of[c].push_back(static_cast<Index>(next.seeds.size()));
-        next.seeds.push_back(m.x);
-        next.places.push_back(m.place);
+        next.seeds.add(m.x, m.place);
       }
   }
   return next;
@@ -497,7 +483,7 @@ double cost_at(const Snapshot& s, std::vector<Index> seeds, double average, doub
   double sum = 0;
   for (const Index t : triangles) sum += s.costs[t] - average;
   for (const Index v : seeds)
-    if (s.places[v].kind == Kind::surface) sum += irregular * std::abs(static_cast<double>(s.stars.size(v)) - 6);
+    if (s.seeds.on_surface(v)) sum += irregular * std::abs(static_cast<double>(s.stars.size(v)) - 6);
   return sum;
 }
 
@@ -559,16 +545,16 @@ std::vector<std::vector<Index>> Improver::colours(const std::vector<PatchVertex>
 
 // Relaxes all seeds; those where the dual does not take it well stay.
 void Improver::smooth() {
-  const CellMap map(backend_.surface(), now_.seeds, now_.moments.triangles, now_.rings);
+  const CellMap map(run_.surface(), now_.seeds.positions(), now_.moments().triangles, now_.rings);
   const std::size_t n = now_.seeds.size();
   std::vector<PatchVertex> vertices(n);
   parallel_each(n, [&](std::size_t v) { vertices[v] = vertex_of(static_cast<Index>(v), map); });
-  ImprovePatch all(map, step_.curves, goal_);
+  ImprovePatch all(map, &run_.curves(), goal_);
   for (const PatchVertex& vertex : vertices) all.add_vertex(vertex);
-  for (const Triangle& t : now_.dual.triangles) all.add_triangle(t);
+  for (const Triangle& t : now_.dual().triangles) all.add_triangle(t);
   const std::vector<std::vector<Index>> classes = colours(vertices);
   for (int sweep = 0; sweep < kSmoothingSweeps; ++sweep) {
-    context_.check();
+    run_.context().check();
     for (const std::vector<Index>& seeds : classes)
       parallel_each(seeds.size(), [&](std::size_t k) { all.relax(seeds[k], kHold); }, 256);
   }
@@ -577,19 +563,15 @@ void Improver::smooth() {
   for (int round = 0; round < kReverts; ++round) {
     Snapshot next;
     next.seeds = now_.seeds;
-    next.places = now_.places;
     for (std::size_t v = 0; v < n; ++v)
-      if (!back[v]) {
-        next.seeds[v] = all.vertices()[v].x;
-        next.places[v] = all.vertices()[v].place;
-      }
+      if (!back[v]) next.seeds.put(v, all.vertices()[v].x, all.vertices()[v].place);
     measure(next);
     std::vector<char> worse(n, 0);
     parallel_each(n, [&](std::size_t k) {
-      const Index v = static_cast<Index>(k), curve = now_.places[v].curve;
+      const Index v = static_cast<Index>(k), curve = now_.seeds.place(v).curve;
       worse[v] = next.kinds[v] != now_.kinds[v] || !worst_excess(next, v).within(worst_excess(now_, v)) ||
                  (curve != kNone && newly_broken(next, curve));
-      if (const Index corner = now_.places[v].corner; corner != kNone && featured())
+      if (const Index corner = now_.seeds.place(v).corner; corner != kNone && has_curves())
         for (const Index c : corner_curves_[corner]) worse[v] |= newly_broken(next, c);
     });
     bool changed = false;
@@ -611,30 +593,31 @@ void Improver::smooth() {
 
 // Seeds on the surface without a triangle are no vertices of the mesh.
 void Improver::drop_idle() {
+  std::vector<char> idle(now_.seeds.size(), 0);
+  for (std::size_t v = 0; v < idle.size(); ++v) idle[v] = now_.seeds.on_surface(v) && now_.stars.size(v) == 0;
+  if (std::find(idle.begin(), idle.end(), 1) == idle.end()) return;
   Snapshot next;
-  for (Index v = 0; v < now_.seeds.size(); ++v) {
-    if (now_.places[v].kind == Kind::surface && now_.stars.size(v) == 0) continue;
-    next.seeds.push_back(now_.seeds[v]);
-    next.places.push_back(now_.places[v]);
-  }
-  if (next.seeds.size() == now_.seeds.size()) return;
+  next.seeds = now_.seeds;
+  next.seeds.remove(idle);
   measure(next);
   if (as_good(next)) now_ = std::move(next);
 }
 
 ImproveReport Improver::run() {
-  now_.seeds = state_.seeds;
-  now_.places = state_.places;
-  now_.places.resize(now_.seeds.size());
+  now_.seeds = run_.seeds;
+  now_.known = run_.take_diagram(Want::polygons | Want::dual);
   measure(now_);
-  if (now_.dual.triangles.empty()) return report_;
+  if (now_.dual().triangles.empty()) {
+    run_.adopt(std::move(now_.seeds), std::move(now_.known));
+    return report_;
+  }
   drop_idle();
   const double average = now_.average;
   poor_left_ = kPoorTried + now_.seeds.size() / kPoorShare;
   done_.assign(now_.seeds.size(), 0);
   smooth();
   for (int round = 0; round < kBatches; ++round) {
-    context_.report({"improving", round + 1, kBatches, now_.moments.energy, 0, 1});
+    run_.context().report({"improving", round + 1, kBatches, now_.moments().energy, 0, 1});
     if (batch(Aim::better) == 0) break;
   }
   done_.assign(now_.seeds.size(), 0);
@@ -642,28 +625,21 @@ ImproveReport Improver::run() {
     batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
   if (report_.made > 0) smooth();
   if (now_.average > average) {
-    now_.seeds = state_.seeds;
-    now_.places = state_.places;
-    now_.places.resize(now_.seeds.size());
+    now_.seeds = run_.seeds;
     measure(now_);
     report_ = {report_.trials, 0, 0, 0, 0};
   }
 
   for (const ShapeExcess& excess : now_.excess) report_.missed += excess.most() > 0;
-  if (!state_.places.empty()) state_.places = now_.places;
-  state_.seeds = std::move(now_.seeds);
-  step_.constrained = true;
-  complete(backend_, state_, step_, totals_);
-  // What was measured last need not be what is left.
-  backend_.evaluate(state_.seeds, state_.moments, polygons_);
+  run_.adopt(std::move(now_.seeds), std::move(now_.known));
+  complete(run_, true);
   return report_;
 }
 
 }  // namespace
 
-ImproveReport improve(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-                      const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context) {
-  return Improver(backend, state, polygons, trace, options, std::move(step), totals, context).run();
+ImproveReport improve(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options) {
+  return Improver(run, trace, options).run();
 }
 
 }  // namespace bisector

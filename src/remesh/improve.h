@@ -24,11 +24,10 @@ struct ImproveReport {
   std::size_t missed = 0;                 // triangles of the result with an angle beyond the goal
 };
 
-// `polygons` must be those of state.seeds, which must lie on the surface, and `trace` that of step.curves; in the end polygons
-// and the complete state belong to the new seeds. Corners and other fixed seeds do not move, nor do seeds at a border that is no
+// The seeds must lie on the surface, and `trace` must be that of run.curves(); afterwards run.energy and run.gradient_norm are
+// those of the new seeds, held on the surface. Corners and other fixed seeds do not move, nor do seeds at a border that is no
 // feature. No angle beyond the goal gets worse than the worst before, and neither does the mean cost of a triangle (shape_cost in
 // improve_patch.h). The count moves to the one wanted where that costs little. Throws Cancelled.
-ImproveReport improve(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const FeatureTrace& trace,
-                      const ImproveOptions& options, OptimiseOptions step, OptimiseTotals& totals, const Context& context);
+ImproveReport improve(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options);
 
 }  // namespace bisector

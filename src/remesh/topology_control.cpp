@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "core/parallel.h"
@@ -35,10 +36,6 @@ constexpr std::size_t kGrown = 300, kAnyway = 5000;
 constexpr double kCrossing = 0.01, kTouching = 0.1;
 constexpr double kApart = 2;             // squared distance of points inserted together, over that to the seeds there are
 constexpr double kTurned = -0.2;         // cosine of the angle at which a surface faces away
-
-bool is_free(const CvtState& state, Index i) {
-  return state.places.empty() || state.places[i].kind == SeedPlace::Kind::surface;
-}
 
 // A point to insert, and the square of its distance to the nearest seed.
 struct Candidate {
@@ -218,15 +215,10 @@ void mark_neighbours(const std::vector<DualEdge>& edges, std::vector<char>& mark
 
 class Control {
  public:
-  Control(Backend& backend, CvtState& state, RestrictedPolygons& polygons, OptimiseOptions options, OptimiseTotals& totals,
-          const Context& context)
-      : backend_(backend),
-        state_(state),
-        polygons_(polygons),
+  Control(CvtRun& run, OptimiseOptions options)
+      : run_(run),
         options_(std::move(options)),
-        totals_(totals),
-        context_(context),
-        wanted_(state.seeds.size()),
+        wanted_(run.seeds.size()),
         given_(wanted_),
         most_(std::max(budget(), kGrown)) {
     options_.done = 1;
@@ -234,17 +226,17 @@ class Control {
   }
 
   TopologyOutcome run() {
-    look();
+    check();
     keep_best();
     if (!outcome_.ball.holds) {
       grow();
-      const Seeds start = best_;
+      const SavedSeeds start = best_;
       most_ = budget();
       for (const double gap : {kCrossing, kTouching, kInfinity}) {
         restore(start);
         gap_ = gap;
         if (gap == kInfinity) most_ = std::max(budget(), kAnyway);
-        look();
+        check();
         keep_best();
         if (refine()) break;
       }
@@ -255,15 +247,15 @@ class Control {
       } else {
         restore(best_);
       }
-      complete();
+      finish();
     }
     return std::move(outcome_);
   }
 
  private:
-  struct Seeds {
-    std::vector<Vec3> positions;
-    std::vector<SeedPlace> places;
+  // Seeds to come back to.
+  struct SavedSeeds {
+    PlacedSeeds seeds;
     std::size_t given = 0;
     double gap = kCrossing;
   };
@@ -271,27 +263,32 @@ class Control {
   // Seeds that may be added before sheets are taken for what keeps the property from holding.
   std::size_t budget() const { return wanted_ + std::max(wanted_ / 4 + kMostAdded, std::min(wanted_, kAnyway)); }
 
-  // Evaluates the seeds' diagram, divides cells of sheets that touch, and checks the result.
-  void look() {
-    context_.check();
-    backend_.evaluate(state_.seeds, state_.moments, polygons_);
-    totals_.count(state_.moments);
-    outcome_.ball = check_ball_property(backend_.surface(), polygons_);
-    vertices_ = state_.seeds;
-    if (!outcome_.ball.holds && (!coarse() || gap_ == kInfinity) &&
-        divide_cells(backend_.surface(), outcome_.ball, gap_, polygons_, vertices_))
-      outcome_.ball = check_ball_property(backend_.surface(), polygons_);
+  // Checks the diagram of the seeds, with the cells of sheets that touch divided.
+  void check() {
+    run_.context().check();
+    polygons_ = &run_.diagram(Want::polygons).polygons;
+    outcome_.ball = check_ball_property(run_.surface(), *polygons_);
+    vertices_ = run_.seeds.positions();
+    if (!outcome_.ball.holds && (!too_few_seeds() || gap_ == kInfinity)) divide();
     outcome_.gap = gap_;
-    outcome_.sheets.assign(vertices_.begin() + static_cast<std::ptrdiff_t>(state_.seeds.size()), vertices_.end());
+    outcome_.sheets.assign(vertices_.begin() + static_cast<std::ptrdiff_t>(run_.seeds.size()), vertices_.end());
+  }
+
+  void divide() {
+    RestrictedPolygons divided = *polygons_;
+    if (!divide_cells(run_.surface(), outcome_.ball, gap_, divided, vertices_)) return;
+    divided_ = std::move(divided);
+    polygons_ = &divided_;
+    outcome_.ball = check_ball_property(run_.surface(), divided_);
   }
 
   // Whether so many cells fail that they are not to be mended one by one.
-  bool coarse() const { return kCoarse * outcome_.ball.cells.size() > state_.seeds.size(); }
+  bool too_few_seeds() const { return kCoarse * outcome_.ball.cells.size() > run_.seeds.size(); }
 
   bool insert(bool far) {
-    std::vector<Vec3> points = Repair(backend_.surface(), polygons_, vertices_, far).points(outcome_.ball);
-    if (points.empty() || state_.seeds.size() + points.size() > most_) return false;
-    edit_seeds({}, points, state_);
+    std::vector<Vec3> points = Repair(run_.surface(), *polygons_, vertices_, far).points(outcome_.ball);
+    if (points.empty() || run_.seeds.size() + points.size() > most_) return false;
+    run_.seeds.add(points);
     outcome_.inserted += points.size();
     ++outcome_.rounds;
     return true;
@@ -300,13 +297,13 @@ class Control {
   void optimise_again(int steps) {
     options_.iterations = steps;
     options_.phase = fmt::format("topology, round {}", outcome_.rounds);
-    optimise(backend_, state_, options_, totals_, context_);
-    look();
+    optimise(run_, options_);
+    check();
   }
 
   void grow() {
-    for (int round = 0; round < kGrowingRounds && coarse() && insert(false); ++round) {
-      given_ = wanted_ = state_.seeds.size();
+    for (int round = 0; round < kGrowingRounds && too_few_seeds() && insert(false); ++round) {
+      given_ = wanted_ = run_.seeds.size();
       optimise_again(kGrowingSteps);
       keep_best();
     }
@@ -317,7 +314,7 @@ class Control {
     const std::size_t hopeless = kDivergence * outcome_.ball.failures() + kMostAdded;
     for (int round = 0; round < kRefiningRounds && !outcome_.ball.holds; ++round) {
       if (outcome_.ball.failures() > hopeless || !insert(round % kFarRounds == kFarRounds - 1)) break;
-      look();
+      check();
       keep_best();
     }
     return outcome_.ball.holds;
@@ -331,8 +328,8 @@ class Control {
       const std::vector<Index> spared = spared_seeds(surplus);
       given_ -= spared.size();
       outcome_.removed += spared.size();
-      edit_seeds(spared, {}, state_);
-      look();
+      run_.seeds.remove(spared);
+      check();
       keep_best();
       if (!refine()) break;
     }
@@ -340,8 +337,8 @@ class Control {
   }
 
   // Free seeds of the lowest energy, no two of them neighbours, away from those that were inserted; ascending.
-  std::vector<Index> spared_seeds(std::size_t count) const {
-    const std::vector<DualEdge> edges = extract_dual_edges(polygons_, vertices_);
+  std::vector<Index> spared_seeds(std::size_t count) {
+    const std::vector<DualEdge> edges = extract_dual_edges(*polygons_, vertices_);
     std::vector<char> blocked(vertices_.size(), 0);
     std::fill(blocked.begin() + static_cast<std::ptrdiff_t>(given_), blocked.end(), char{1});
     for (int ring = 0; ring < 2; ++ring) mark_neighbours(edges, blocked);
@@ -350,15 +347,16 @@ class Control {
       around[e.a].push_back(e.b);
       around[e.b].push_back(e.a);
     }
+    const std::vector<Moments>& cells = run_.diagram().moments.cells;
     std::vector<Index> order(given_);
     std::iota(order.begin(), order.end(), Index{0});
     std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-      return state_.moments.cells[a].second < state_.moments.cells[b].second;
+      return cells[a].second < cells[b].second;
     });
     std::vector<Index> spared;
     for (Index i : order) {
       if (spared.size() == count) break;
-      if (blocked[i] || !is_free(state_, i)) continue;
+      if (blocked[i] || !run_.seeds.on_surface(i)) continue;
       spared.push_back(i);
       for (Index j : around[i]) blocked[j] = 1;
     }
@@ -371,58 +369,58 @@ class Control {
     const std::size_t failures = outcome_.ball.failures();
     const std::size_t surplus = vertices_.size() - std::min(vertices_.size(), wanted_);
     const bool better = failures != fewest_ ? failures < fewest_ : failures == 0 && surplus < least_surplus_;
-    if (!best_coarse_ && (coarse() || !better)) return;
-    best_coarse_ = coarse();
+    if (!best_coarse_ && (too_few_seeds() || !better)) return;
+    best_coarse_ = too_few_seeds();
     fewest_ = failures;
     least_surplus_ = surplus;
-    best_ = {state_.seeds, state_.places, given_, gap_};
+    best_ = {run_.seeds, given_, gap_};
   }
 
-  void restore(const Seeds& seeds) {
-    state_.seeds = seeds.positions;
-    state_.places = seeds.places;
-    given_ = seeds.given;
-    gap_ = seeds.gap;
-    look();
+  void restore(const SavedSeeds& saved) {
+    run_.seeds = saved.seeds;
+    given_ = saved.given;
+    gap_ = saved.gap;
+    check();
   }
 
   // Seeds of what fails, and their neighbours.
   std::vector<char> failing_neighbourhood() const {
     std::vector<char> failing = failing_seeds(outcome_.ball, vertices_.size());
-    mark_neighbours(extract_dual_edges(polygons_, vertices_), failing);
-    failing.resize(state_.seeds.size());
+    mark_neighbours(extract_dual_edges(*polygons_, vertices_), failing);
+    failing.resize(run_.seeds.size());
     return failing;
   }
 
   // Moves the seeds that are not held as far as the property goes on holding: where it would not, seeds go back, and are held
   // from then on. False, and nothing is moved, if that does not help.
-  bool move(const CvtState& before, const std::vector<Vec3>& next, std::vector<char>& held) {
-    state_.places = before.places;
+  bool move(const PlacedSeeds& before, const std::vector<Vec3>& next, std::vector<char>& held) {
+    run_.seeds = before;
     for (int retreat = 0; retreat <= kRetreats; ++retreat) {
-      for (std::size_t i = 0; i < next.size(); ++i) state_.seeds[i] = held[i] ? before.seeds[i] : next[i];
-      look();
+      const std::span<Vec3> positions = run_.seeds.edit_positions();
+      for (std::size_t i = 0; i < next.size(); ++i) positions[i] = held[i] ? before.position(i) : next[i];
+      check();
       if (outcome_.ball.holds) return true;
       const std::vector<char> failing = failing_neighbourhood();
       for (std::size_t i = 0; i < held.size(); ++i) held[i] |= failing[i];
     }
-    state_ = before;
-    look();
+    run_.seeds = before;
+    check();
     return false;
   }
 
   std::vector<char> held_seeds() const {
-    std::vector<char> held(state_.seeds.size());
-    for (Index i = 0; i < held.size(); ++i) held[i] = !is_free(state_, i);
+    std::vector<char> held(run_.seeds.size());
+    for (std::size_t i = 0; i < held.size(); ++i) held[i] = !run_.seeds.on_surface(i);
     return held;
   }
 
   // The optimiser's steps.
   void polish() {
-    const CvtState before = state_;
+    const PlacedSeeds before = run_.seeds;
     options_.iterations = kPolishingSteps;
     options_.phase = "topology, polishing";
-    optimise(backend_, state_, options_, totals_, context_);
-    const std::vector<Vec3> next = state_.seeds;
+    optimise(run_, options_);
+    const std::vector<Vec3> next = run_.seeds.positions();
     std::vector<char> held = held_seeds();
     move(before, next, held);
   }
@@ -431,45 +429,44 @@ class Control {
   void smooth() {
     std::vector<char> held = held_seeds();
     for (int step = 0; step < kSmoothingSteps; ++step) {
-      const CvtState before = state_;
-      std::vector<Vec3> next = state_.seeds, normals(next.size());
+      const PlacedSeeds before = run_.seeds;
+      const CellMoments& moments = run_.diagram().moments;
+      std::vector<Vec3> next = before.positions(), normals(next.size());
       for (std::size_t i = 0; i < next.size(); ++i)
-        if (const Moments& m = state_.moments.cells[i]; m.mass > 0) next[i] += (1 / m.mass) * m.first;
-      if (options_.constrained) project_to_cells(backend_.surface(), state_.moments.triangles, {}, next, normals);
+        if (const Moments& m = moments.cells[i]; m.mass > 0) next[i] += (1 / m.mass) * m.first;
+      if (options_.constrained) project_to_cells(run_.surface(), moments.triangles, {}, next, normals);
       if (!move(before, next, held)) return;
     }
   }
 
-  // What the optimiser leaves in the state, for seeds that it did not place.
-  void complete() {
+  // Leaves the run as the optimiser does, with its energy and gradient, for seeds that the optimiser did not place.
+  void finish() {
     options_.iterations = 0;
-    optimise(backend_, state_, options_, totals_, context_);
-    look();
+    optimise(run_, options_);
+    check();
   }
 
-  Backend& backend_;
-  CvtState& state_;
-  RestrictedPolygons& polygons_;
+  CvtRun& run_;
   OptimiseOptions options_;
-  OptimiseTotals& totals_;
-  const Context& context_;
   std::size_t wanted_;       // vertices
   std::size_t given_;        // seeds before those inserted by refining
   std::size_t most_;         // seeds
   double gap_ = kCrossing;   // see divide_cells
   TopologyOutcome outcome_;
+  const RestrictedPolygons* polygons_ = nullptr;  // of the run's diagram, or divided_
+  RestrictedPolygons divided_;
   std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells
-  Seeds best_;
+  SavedSeeds best_;
   std::size_t fewest_ = 0;      // failures of the best seeds
   std::size_t least_surplus_ = 0;
-  bool best_coarse_ = true;
+  bool best_coarse_ = true;     // too many cells of the best seeds fail
 };
 
 }  // namespace
 
-TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons& polygons) {
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual) {
   TriangleMesh mesh;
-  mesh.triangles = extract_dual(polygons).triangles;
+  mesh.triangles = dual.triangles;
   std::vector<Index> index(seeds.size(), kNone);
   for (const Triangle& t : mesh.triangles)
     for (Index v : t) index[v] = 0;
@@ -504,29 +501,9 @@ std::vector<TopologyFault> topology_faults(const BallReport& report, const std::
   return faults;
 }
 
-void edit_seeds(const std::vector<Index>& removed, const std::vector<Vec3>& added, CvtState& state) {
-  std::size_t n = 0, r = 0;
-  for (Index i = 0; i < state.seeds.size(); ++i) {
-    if (r < removed.size() && removed[r] == i) {
-      ++r;
-      continue;
-    }
-    if (!state.places.empty()) state.places[n] = state.places[i];
-    state.seeds[n++] = state.seeds[i];
-  }
-  const bool placed = !state.places.empty();
-  state.seeds.resize(n);
-  state.seeds.insert(state.seeds.end(), added.begin(), added.end());
-  if (placed) state.places.resize(n);
-  if (placed) state.places.resize(state.seeds.size());
-}
-
-TopologyOutcome enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
-                                 OptimiseOptions options, OptimiseTotals& totals, const Context& context) {
-  if (input.manifold && input.oriented)
-    return Control(backend, state, polygons, std::move(options), totals, context).run();
-  backend.evaluate(state.seeds, state.moments, polygons);
-  return {check_ball_property(backend.surface(), polygons), 0, 0, 0, {}, 0};
+TopologyOutcome enforce_topology(CvtRun& run, const MeshTopology& input, OptimiseOptions options) {
+  if (input.manifold && input.oriented) return Control(run, std::move(options)).run();
+  return {check_ball_property(run.surface(), run.diagram(Want::polygons).polygons), 0, 0, 0, {}, 0};
 }
 
 }  // namespace bisector

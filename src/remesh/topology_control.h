@@ -11,8 +11,8 @@
 
 namespace bisector {
 
-// The restricted Delaunay triangulation with the seeds that have triangles as vertices, in their order.
-TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const RestrictedPolygons& polygons);
+// A restricted Delaunay triangulation as a mesh: its vertices are the seeds that have triangles, in their order.
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual);
 
 // Whether `dual` is manifold, oriented, closed and of Euler characteristic and components as the input.
 bool same_topology(const MeshTopology& dual, const MeshTopology& input);
@@ -24,10 +24,6 @@ struct TopologyFault {
   std::string what;          // "2 components", "closed", ...
 };
 std::vector<TopologyFault> topology_faults(const BallReport& report, const std::vector<Vec3>& seeds);
-
-// Removes the seeds named (ascending) and appends free ones, with the places kept parallel. Every change of the number of seeds
-// for the sake of topology goes through here.
-void edit_seeds(const std::vector<Index>& removed, const std::vector<Vec3>& added, CvtState& state);
 
 struct TopologyOutcome {
   BallReport ball;           // of the final diagram
@@ -43,13 +39,11 @@ struct TopologyOutcome {
 // - Then without optimising, for a density that makes cells larger than the surface is thick would draw the new seeds away.
 // - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are optimised as
 //   far as the property goes on holding.
-// Cells of sheets that cross or nearly touch are divided (sheets.h): `polygons` and the report then name the sheets in
+// Cells of sheets that cross or nearly touch are divided (sheets.h): the report then names the sheets in
 // TopologyOutcome::sheets by indices after those of the seeds.
 //
 // Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to the seeds
 // with the fewest failures, which topology_faults lists. Surfaces that are not manifold and oriented are only checked.
-// `polygons` and state.moments are those of the final seeds.
-TopologyOutcome enforce_topology(Backend& backend, CvtState& state, RestrictedPolygons& polygons, const MeshTopology& input,
-                                 OptimiseOptions options, OptimiseTotals& totals, const Context& context);
+TopologyOutcome enforce_topology(CvtRun& run, const MeshTopology& input, OptimiseOptions options);
 
 }  // namespace bisector

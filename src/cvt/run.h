@@ -1,0 +1,73 @@
+// A run: the domain's backend, the seeds, the diagram of exactly those seeds, and what all its evaluations cost.
+#pragma once
+
+#include <vector>
+
+#include "backend/backend.h"
+#include "bisector/context.h"
+#include "features/placed_seeds.h"
+#include "voronoi/diagram.h"
+
+namespace bisector {
+
+struct RunTotals {
+  int iterations = 0;   // accepted steps of the optimiser
+  int evaluations = 0;  // diagrams computed
+  DiagramSeconds seconds;
+  double seconds_lbfgs = 0;  // of the optimiser outside the diagrams
+};
+
+// A diagram and the positions it is of.
+struct DiagramOfSeeds {
+  Diagram diagram;
+  std::vector<Vec3> positions;  // empty: there is no diagram yet
+};
+
+class CvtRun {
+ public:
+  // All must outlive the run. `curves` are those that places refer to.
+  CvtRun(Backend& backend, const FeatureCurves& curves, const Context& context)
+      : backend_(&backend), curves_(curves), context_(context) {}
+
+  Backend& backend() const { return *backend_; }
+  // The surface, or the boundary of the solid.
+  const Surface& surface() const { return backend_->surface(); }
+  const FeatureCurves& curves() const { return curves_; }
+  // Whether there are feature curves or corners for seeds to be on.
+  bool has_features() const { return !curves_.graph().edges.empty() || !curves_.graph().corners.empty(); }
+  const Context& context() const { return context_; }
+
+  // Free to be changed: a diagram is only used for the positions that it was computed for.
+  PlacedSeeds seeds;
+  RunTotals totals;
+  // Of the seeds as the optimiser left them last, or complete() found them.
+  double energy = 0;
+  double gradient_norm = 0;
+
+  // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other positions, or
+  // lacks something. The reference is good until the next call that computes one.
+  const Diagram& diagram(Want want = Want::moments);
+  // The diagram of the seeds as they are, to be kept beside a copy of them.
+  DiagramOfSeeds take_diagram(Want want = Want::moments);
+  // Sets seeds whose diagram is known.
+  void adopt(PlacedSeeds placed, DiagramOfSeeds diagram);
+  // Brings a diagram kept elsewhere up to date, and counts the evaluation if that takes one.
+  void evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& diagram);
+  // Whether a diagram covers the domain: the masses of its cells sum to the domain's. One that does not is never used.
+  bool covers(const Diagram& diagram) const;
+  // Goes on with another backend, whose domain may be another.
+  void change_backend(Backend& backend);
+
+ private:
+  friend class Descent;
+  friend std::vector<Vec3> complete(CvtRun& run, bool constrained);
+
+  Backend* backend_;
+  const FeatureCurves& curves_;
+  const Context& context_;
+  DiagramOfSeeds diagram_;
+  // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.
+  std::vector<Vec3> normals_;
+};
+
+}  // namespace bisector
