@@ -84,13 +84,14 @@ std::vector<Vec3> random_seeds(const TriangleMesh& mesh, std::size_t count) {
 std::vector<Vec3> optimised_seeds(const TriangleMesh& mesh, std::size_t count) {
   const Surface surface(mesh);
   CpuBackend cpu(surface, NeighbourSource::nearest);
-  CvtState state;
-  state.seeds = random_seeds(mesh, count);
+  const FeatureCurves none;
+  const Context context;
+  CvtRun run(cpu, none, context);
+  run.seeds = PlacedSeeds(random_seeds(mesh, count));
   OptimiseOptions options;
   options.iterations = 20;
-  OptimiseTotals totals;
-  optimise(cpu, state, options, totals, {});
-  return state.seeds;
+  optimise(run, options);
+  return run.seeds.positions();
 }
 
 // n + 1 layers in each direction through the bounding box: each vertex of their diagram belongs to many cells.

@@ -274,18 +274,56 @@ void optimise(CvtRun& run, const OptimiseOptions& options) {
                               (after.pairs - before.pairs) - (after.clip - before.clip);
 }
 
-std::vector<Vec3> complete(CvtRun& run, bool constrained) {
+CvtGradient complete(CvtRun& run, bool constrained) {
   const Diagram& diagram = run.diagram();
   if (constrained) {
     std::vector<Vec3> feet = run.seeds.positions();
     run.normals_.resize(feet.size());
     project_to_cells(run.surface(), diagram.moments.triangles, run.seeds.places(), feet, run.normals_);
   }
-  const std::vector<Vec3> gradient =
+  CvtGradient gradient;
+  gradient.vectors =
       gradient_of(diagram.moments.cells, run.seeds, run.curves(), constrained ? &run.normals_ : nullptr);
+  if (constrained) gradient.normals = run.normals_;
   run.energy = run.covers(diagram) ? diagram.moments.energy : std::numeric_limits<double>::infinity();
-  run.gradient_norm = length_of(gradient);
+  run.gradient_norm = length_of(gradient.vectors);
   return gradient;
+}
+
+struct StateRun {
+  StateRun(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals, const Context& context)
+      : state(state), totals(totals), run(backend, options.curves ? *options.curves : none, context) {
+    run.totals = totals;
+    run.seeds = PlacedSeeds(state.seeds, state.places);
+    run.normals_ = state.normals;
+  }
+  void finish() {
+    state.seeds = run.seeds.positions();
+    state.places = run.seeds.places();
+    state.moments = run.diagram().moments;
+    state.normals = run.normals_;
+    state.energy = run.energy;
+    state.gradient_norm = run.gradient_norm;
+    static_cast<RunTotals&>(totals) = run.totals;
+  }
+  FeatureCurves none;
+  CvtState& state;
+  OptimiseTotals& totals;
+  CvtRun run;
+};
+
+void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
+              const Context& context) {
+  StateRun holder(backend, state, options, totals, context);
+  optimise(holder.run, options);
+  holder.finish();
+}
+
+void complete(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals) {
+  const Context context;
+  StateRun holder(backend, state, options, totals, context);
+  complete(holder.run, options.constrained);
+  holder.finish();
 }
 
 }  // namespace bisector

@@ -14,6 +14,7 @@ struct OptimiseOptions {
   bool constrained = false;    // CCVT: seeds stay on the surface, gradients in its tangent planes
   std::string phase;           // for progress
   double done = 0, share = 1;  // of the whole run: fraction before this optimisation, and its own
+  const FeatureCurves* curves = nullptr;  // for a CvtState
 };
 
 // Moves run.seeds downhill along their places. Afterwards run.energy and run.gradient_norm are theirs. Seeds on the surface or
@@ -21,8 +22,27 @@ struct OptimiseOptions {
 // diagram does not cover the domain.
 void optimise(CvtRun& run, const OptimiseOptions& options);
 
-// The gradient dF/dx_i = 2 m_i (x_i - c_i) at the seeds as they are, of each seed the part along what it is held on; sets
-// run.energy and run.gradient_norm. `constrained` as in OptimiseOptions.
-std::vector<Vec3> complete(CvtRun& run, bool constrained);
+// dF/dx_i = 2 m_i (x_i - c_i) of each seed, and its part along what the seed is held on.
+struct CvtGradient {
+  std::vector<Vec3> vectors;
+  std::vector<Vec3> normals;  // of the surface at each seed, to which `vectors` are tangential; empty if not constrained
+};
+
+// The gradient at the seeds as they are. Sets run.energy and run.gradient_norm. `constrained` as in OptimiseOptions.
+CvtGradient complete(CvtRun& run, bool constrained);
+
+// What tetmesh/ still holds in place of a run.
+struct OptimiseTotals : RunTotals {};
+struct CvtState {
+  std::vector<Vec3> seeds;
+  std::vector<SeedPlace> places;
+  CellMoments moments;
+  std::vector<Vec3> normals;
+  double energy = 0;
+  double gradient_norm = 0;
+};
+void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
+              const Context& context);
+void complete(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals);
 
 }  // namespace bisector

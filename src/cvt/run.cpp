@@ -16,10 +16,10 @@ void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSe
   }
   if (known_seeds && includes(known.diagram.has, want)) return;
   known.positions.clear();
-  backend_->evaluate(positions, want, known.diagram);
+  known.report = backend_->evaluate(positions, want, known.diagram);
   known.positions = positions;
   ++totals.evaluations;
-  totals.seconds += known.diagram.moments.seconds;
+  totals.seconds += known.report.seconds;
 }
 
 const Diagram& CvtRun::diagram(Want want) {

@@ -17,9 +17,10 @@ struct RunTotals {
   double seconds_lbfgs = 0;  // of the optimiser outside the diagrams
 };
 
-// A diagram and the positions it is of.
+// A diagram, how it came about, and the positions it is of.
 struct DiagramOfSeeds {
   Diagram diagram;
+  EvaluationReport report;
   std::vector<Vec3> positions;  // empty: there is no diagram yet
 };
 
@@ -47,6 +48,8 @@ class CvtRun {
   // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other positions, or
   // lacks something. The reference is good until the next call that computes one.
   const Diagram& diagram(Want want = Want::moments);
+  // How the last diagram of the run's seeds was certified.
+  const Certification& certification() const { return diagram_.report.certification; }
   // The diagram of the seeds as they are, to be kept beside a copy of them.
   DiagramOfSeeds take_diagram(Want want = Want::moments);
   // Sets seeds whose diagram is known.
@@ -60,7 +63,8 @@ class CvtRun {
 
  private:
   friend class Descent;
-  friend std::vector<Vec3> complete(CvtRun& run, bool constrained);
+  friend struct CvtGradient complete(CvtRun& run, bool constrained);
+  friend struct StateRun;
 
   Backend* backend_;
   const FeatureCurves& curves_;

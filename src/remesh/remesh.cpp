@@ -321,7 +321,7 @@ RemeshResult Pipeline::run() {
   result_.evaluations = run_.totals.evaluations;
   result_.energy = run_.energy;
   result_.gradient_norm = run_.gradient_norm;
-  result_.certification = run_.diagram().moments.certification;
+  result_.certification = run_.certification();
   result_.device = run_.backend().description();
   result_.seconds.total = watch.seconds();
   result_.seconds.lbfgs = run_.totals.seconds_lbfgs;

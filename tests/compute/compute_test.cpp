@@ -16,6 +16,7 @@
 #include "remesh/remesh.h"
 #include "support/diagram.h"
 #include "support/models.h"
+#include "support/run.h"
 
 namespace bisector {
 namespace {
@@ -192,20 +193,15 @@ TEST_F(Compute, OtherErrorsAreNotTheDevices) {
 TEST_F(Compute, OptimisationSurvivesAFailure) {
   OptimiseOptions options;
   options.iterations = 12;
-  const auto optimised = [&](Backend& backend) {
-    CvtState state;
-    state.seeds = seeds_;
-    OptimiseTotals totals;
-    optimise(backend, state, options, totals, {});
-    return state;
-  };
   CpuBackend cpu(surface_, NeighbourSource::nearest);
-  const CvtState expected = optimised(cpu);
+  test::FreeRun expected(cpu, seeds_);
+  optimise(expected.run, options);
   for (const int evaluations : {0, 1, 2, 7}) {
     FallbackBackend backend(std::make_unique<FailingBackend>(surface_, evaluations), NeighbourSource::nearest, {});
-    const CvtState state = optimised(backend);
-    EXPECT_TRUE(test::same_bits(state.seeds, expected.seeds)) << evaluations;
-    test::expect_same_moments(state.moments, expected.moments);
+    test::FreeRun found(backend, seeds_);
+    optimise(found.run, options);
+    EXPECT_TRUE(test::same_bits(found.seeds(), expected.seeds())) << evaluations;
+    test::expect_same_moments(found.moments(), expected.moments());
     EXPECT_EQ(backend.description().fallback, "the device was lost");
   }
 }
@@ -230,14 +226,12 @@ class NoisyBackend : public CpuBackend {
 TEST_F(Compute, NoisyEnergiesDoNotEndTheDescent) {
   const auto last_norm = [&](double noise) {
     NoisyBackend backend(surface_, noise);
-    CvtState state;
-    state.seeds = seeds_;
+    test::FreeRun free(backend, seeds_);
     OptimiseOptions options;
     options.iterations = 400;
     options.tolerance = -1;  // a rise by noise must not end it
-    OptimiseTotals totals;
-    optimise(backend, state, options, totals, {});
-    return state.gradient_norm;
+    optimise(free.run, options);
+    return free.run.gradient_norm;
   };
   EXPECT_LT(last_norm(1e-6), 0.1 * last_norm(0));
 }

@@ -15,6 +15,7 @@
 #include "cvt/lbfgs.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
+#include "support/run.h"
 #include "mesh/topology.h"
 #include "support/diagram.h"
 #include "support/models.h"
@@ -92,28 +93,27 @@ TEST(Gradient, OfTheStateIsTangentialIfConstrained) {
   const Surface surface(mesh);
   CpuBackend backend(surface, NeighbourSource::nearest);
   for (bool constrained : {false, true}) {
-    CvtState state;
-    state.seeds = random_seeds(mesh, 80, 4);
+    FreeRun free(backend, random_seeds(mesh, 80, 4));
     OptimiseOptions options;
     options.iterations = 7;
     options.constrained = constrained;
-    OptimiseTotals totals;
-    optimise(backend, state, options, totals, {});
-    CellMoments moments;
-    backend.evaluate(state.seeds, moments);
-    expect_same_moments(state.moments, moments);
-    EXPECT_EQ(state.energy, moments.energy);
+    optimise(free.run, options);
+    const Diagram diagram = diagram_of(backend, free.seeds());
+    expect_same_moments(free.moments(), diagram.moments);
+    EXPECT_EQ(free.run.energy, diagram.moments.energy);
+    const CvtGradient gradient = complete(free.run, constrained);
+    EXPECT_EQ(gradient.normals.size(), constrained ? free.seeds().size() : 0);
     double squared = 0;
-    for (std::size_t i = 0; i < state.seeds.size(); ++i) {
-      Vec3 g = -2.0 * moments.cells[i].first;
+    for (std::size_t i = 0; i < free.seeds().size(); ++i) {
+      Vec3 g = -2.0 * diagram.moments.cells[i].first;
       if (constrained) {
-        EXPECT_NEAR(norm(state.normals[i]), 1, 1e-12);
-        g -= dot(g, state.normals[i]) * state.normals[i];
+        EXPECT_NEAR(norm(gradient.normals[i]), 1, 1e-12);
+        g -= dot(g, gradient.normals[i]) * gradient.normals[i];
       }
-      EXPECT_LE(norm(state.gradient[i] - g), 1e-14);
+      EXPECT_LE(norm(gradient.vectors[i] - g), 1e-14);
       squared += norm2(g);
     }
-    EXPECT_NEAR(state.gradient_norm, std::sqrt(squared), 1e-12);
+    EXPECT_NEAR(free.run.gradient_norm, std::sqrt(squared), 1e-12);
   }
 }
 
@@ -251,9 +251,8 @@ class Loop : public testing::TestWithParam<LoopCase> {};
 TEST_P(Loop, NeverGoesUphillAndReducesTheGradient) {
   const Surface surface = surface_of(GetParam());
   CpuBackend backend(surface, NeighbourSource::nearest);
-  CvtState state;
-  state.seeds = random_seeds(GetParam().mesh, 200, 7);
-  const double before = energy_at(backend, state.seeds);
+  const std::vector<Vec3> start = random_seeds(GetParam().mesh, 200, 7);
+  const double before = energy_at(backend, start);
   OptimiseOptions options;
   options.iterations = 60;
   options.constrained = GetParam().constrained;
@@ -275,20 +274,20 @@ TEST_P(Loop, NeverGoesUphillAndReducesTheGradient) {
     energies.push_back(p.energy);
     gradients.push_back(p.gradient_norm);
   };
-  OptimiseTotals totals;
-  optimise(backend, state, options, totals, context);
+  FreeRun free(backend, start, context);
+  optimise(free.run, options);
   ASSERT_GT(energies.size(), 5u);
-  EXPECT_EQ(totals.iterations, static_cast<int>(energies.size()) - 1);
-  EXPECT_GE(totals.evaluations, totals.iterations);
-  EXPECT_EQ(state.energy, energies.back());
-  EXPECT_EQ(state.gradient_norm, gradients.back());
-  EXPECT_EQ(state.energy, energy_at(backend, state.seeds));
-  EXPECT_LT(state.energy, 0.95 * before);
-  EXPECT_LT(state.gradient_norm, 0.25 * gradients.front());
-  EXPECT_EQ(state.seeds.size(), 200u);
-  for (const Moments& m : state.moments.cells) EXPECT_GT(m.mass, 0);
+  EXPECT_EQ(free.run.totals.iterations, static_cast<int>(energies.size()) - 1);
+  EXPECT_GE(free.run.totals.evaluations, free.run.totals.iterations);
+  EXPECT_EQ(free.run.energy, energies.back());
+  EXPECT_EQ(free.run.gradient_norm, gradients.back());
+  EXPECT_EQ(free.run.energy, energy_at(backend, free.seeds()));
+  EXPECT_LT(free.run.energy, 0.95 * before);
+  EXPECT_LT(free.run.gradient_norm, 0.25 * gradients.front());
+  EXPECT_EQ(free.seeds().size(), 200u);
+  for (const Moments& m : free.moments().cells) EXPECT_GT(m.mass, 0);
   if (!GetParam().constrained) return;
-  for (const Vec3& x : state.seeds) EXPECT_LE(distance_to_surface(surface, x), 1e-12 * surface.box.diagonal());
+  for (const Vec3& x : free.seeds()) EXPECT_LE(distance_to_surface(surface, x), 1e-12 * surface.box.diagonal());
 }
 
 TEST_P(Loop, RepeatsBitForBitForAnyNumberOfThreadsAndBothSources) {
@@ -298,14 +297,10 @@ TEST_P(Loop, RepeatsBitForBitForAnyNumberOfThreadsAndBothSources) {
     for (unsigned threads : {1u, 2u}) {
       const ThreadLimit limit(threads);
       CpuBackend backend(surface, source);
-      CvtState state;
-      state.seeds = random_seeds(GetParam().mesh, 150, 8);
       OptimiseOptions options;
       options.iterations = 30;
       options.constrained = GetParam().constrained;
-      OptimiseTotals totals;
-      optimise(backend, state, options, totals, {});
-      results.push_back(state.seeds);
+      results.push_back(optimised_seeds(backend, random_seeds(GetParam().mesh, 150, 8), options));
     }
   EXPECT_TRUE(same_bits(results[0], results[1])) << "1 and 2 threads, nearest";
   EXPECT_TRUE(same_bits(results[2], results[3])) << "1 and 2 threads, delaunay";
@@ -319,25 +314,24 @@ TEST_P(Loop, ReseedsEmptyCells) {
   const Vec3 spot = random_seeds(GetParam().mesh, 1, 9)[0];
   SplitMix64 random(10);
   for (bool equal : {true, false}) {
-    CvtState state;
+    std::vector<Vec3> start;
     for (int i = 0; i < 100; ++i) {
       const Vec3 noise{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
-      state.seeds.push_back(equal ? spot : spot + 1e-3 * noise);
+      start.push_back(equal ? spot : spot + 1e-3 * noise);
     }
     OptimiseOptions options;
     options.iterations = 60;
     options.constrained = GetParam().constrained;
-    OptimiseTotals totals;
-    optimise(backend, state, options, totals, {});
-    EXPECT_EQ(state.seeds.size(), 100u);
+    FreeRun free(backend, start);
+    optimise(free.run, options);
+    EXPECT_EQ(free.seeds().size(), 100u);
     std::size_t empty = 0;
-    for (const Moments& m : state.moments.cells) empty += !(m.mass > 0);
+    for (const Moments& m : free.moments().cells) empty += !(m.mass > 0);
     EXPECT_EQ(empty, 0u) << (equal ? "equal" : "clustered");
     // A worse start than random seeds, but not another kind of result.
-    CvtState random_start;
-    random_start.seeds = random_seeds(GetParam().mesh, 100, 11);
-    optimise(backend, random_start, options, totals, {});
-    EXPECT_LT(state.energy, 1.5 * random_start.energy) << (equal ? "equal" : "clustered");
+    FreeRun random_start(backend, random_seeds(GetParam().mesh, 100, 11));
+    optimise(random_start.run, options);
+    EXPECT_LT(free.run.energy, 1.5 * random_start.run.energy) << (equal ? "equal" : "clustered");
   }
 }
 
@@ -353,10 +347,8 @@ TEST(Optimise, StopsWhenCancelled) {
   context.cancel = &cancel;
   int iterations = 0;
   context.progress = [&](const Progress&) { cancel = ++iterations == 3; };
-  CvtState state;
-  state.seeds = random_seeds(mesh, 50, 12);
-  OptimiseTotals totals;
-  EXPECT_THROW(optimise(backend, state, {}, totals, context), Cancelled);
+  FreeRun free(backend, random_seeds(mesh, 50, 12), context);
+  EXPECT_THROW(optimise(free.run, {}), Cancelled);
   EXPECT_EQ(iterations, 3);
 }
 
@@ -364,21 +356,21 @@ TEST(Optimise, StopsAtTheToleranceAndTheIterations) {
   const TriangleMesh mesh = icosphere(3);
   const Surface surface(mesh);
   CpuBackend backend(surface, NeighbourSource::nearest);
-  CvtState state;
+  std::vector<Vec3> seeds;
   const auto run = [&](const OptimiseOptions& options) {
-    state.seeds = random_seeds(mesh, 50, 13);
-    OptimiseTotals totals;
     std::vector<double> energies;
     Context context;
     context.progress = [&](const Progress& p) { energies.push_back(p.energy); };
-    optimise(backend, state, options, totals, context);
-    EXPECT_EQ(energies.size(), static_cast<std::size_t>(totals.iterations));
+    FreeRun free(backend, random_seeds(mesh, 50, 13), context);
+    optimise(free.run, options);
+    EXPECT_EQ(energies.size(), static_cast<std::size_t>(free.run.totals.iterations));
+    seeds = free.seeds();
     return energies;
   };
   OptimiseOptions options;
   options.iterations = 0;
   EXPECT_EQ(run(options).size(), 0u);
-  EXPECT_TRUE(same_bits(state.seeds, random_seeds(mesh, 50, 13)));
+  EXPECT_TRUE(same_bits(seeds, random_seeds(mesh, 50, 13)));
   options.iterations = 4;
   EXPECT_EQ(run(options).size(), 4u);
   options.iterations = 2000;
@@ -400,15 +392,42 @@ TEST(Optimise, OneSeedFindsTheCentroid) {
   const TriangleMesh mesh = wavy_patch(8);
   const Surface surface(mesh);
   CpuBackend backend(surface, NeighbourSource::nearest);
-  CvtState state;
-  state.seeds = {{0.1, 0.2, 0.7}};
-  CellMoments moments;
-  backend.evaluate(state.seeds, moments);
-  const Vec3 centroid = state.seeds[0] + (1 / moments.mass) * moments.cells[0].first;
-  OptimiseTotals totals;
-  optimise(backend, state, {}, totals, {});
-  EXPECT_LE(norm(state.seeds[0] - centroid), 1e-12);
-  EXPECT_LE(totals.iterations, 10);
+  FreeRun free(backend, {{0.1, 0.2, 0.7}});
+  const Vec3 centroid = free.seeds()[0] + (1 / free.moments().mass) * free.moments().cells[0].first;
+  optimise(free.run, {});
+  EXPECT_LE(norm(free.seeds()[0] - centroid), 1e-12);
+  EXPECT_LE(free.run.totals.iterations, 10);
+}
+
+// A diagram belongs to the seeds that it was computed for: as long as they stay it is not computed again, and never used for others.
+TEST(CvtRunTest, EvaluatesTheSameSeedsOnce) {
+  const TriangleMesh mesh = torus(24, 16);
+  const Surface surface(mesh);
+  CpuBackend backend(surface, NeighbourSource::nearest);
+  FreeRun free(backend, random_seeds(mesh, 60, 3));
+  CvtRun& run = free.run;
+  run.diagram(Want::polygons);
+  run.diagram();
+  EXPECT_EQ(run.totals.evaluations, 1);
+  run.diagram(Want::polygons | Want::dual);
+  EXPECT_EQ(run.totals.evaluations, 1) << "the dual is read off the polygons";
+  const PlacedSeeds before = run.seeds;
+  run.seeds.edit_places()[0].kind = SeedPlace::Kind::fixed;
+  run.diagram(Want::polygons);
+  EXPECT_EQ(run.totals.evaluations, 1) << "places are no part of a diagram";
+  run.seeds.edit_positions()[0] += Vec3{0.01, 0, 0};
+  expect_same_moments(run.diagram().moments, diagram_of(backend, run.seeds.positions()).moments);
+  EXPECT_EQ(run.totals.evaluations, 2);
+  const DiagramOfSeeds moved = run.take_diagram();
+  run.adopt(run.seeds, moved);
+  run.diagram();
+  EXPECT_EQ(run.totals.evaluations, 2);
+  run.adopt(before, moved);
+  expect_same_moments(run.diagram().moments, diagram_of(backend, before.positions()).moments);
+  EXPECT_EQ(run.totals.evaluations, 3) << "a diagram of other seeds is not taken for theirs";
+  run.seeds.remove(std::vector<Index>{1, 5});
+  EXPECT_EQ(run.diagram().moments.cells.size(), 58u);
+  EXPECT_EQ(run.totals.evaluations, 4);
 }
 
 // --- Constraint ---
@@ -500,21 +519,17 @@ TEST(Multilevel, RefiningAClosedDualGivesTheCountOfTheFormula) {
   for (const auto& [mesh, euler] : std::vector<Named>{{icosphere(4), 2}, {torus(60, 40), 0}}) {
     const Surface surface(mesh);
     CpuBackend backend(surface, NeighbourSource::nearest);
-    CvtState state;
-    state.seeds = initial_seeds(surface, 400, 1);
-    OptimiseTotals totals;
-    optimise(backend, state, {}, totals, {});
-    RestrictedPolygons polygons;
-    backend.evaluate(state.seeds, state.moments, polygons);
-    const std::vector<Triangle> dual = extract_dual(polygons).triangles;
-    ASSERT_EQ(analyse_topology(dual, 400).euler, euler);
+    FreeRun free(backend, initial_seeds(surface, 400, 1));
+    optimise(free.run, {});
+    const Diagram& diagram = free.run.diagram(Want::polygons | Want::dual);
+    ASSERT_EQ(analyse_topology(diagram.dual.triangles, 400).euler, euler);
     const auto all = static_cast<std::size_t>(4 * 400 - 3 * euler);
-    EXPECT_EQ(extract_dual_edges(polygons, state.seeds).size(), all - 400);
+    EXPECT_EQ(extract_dual_edges(diagram.polygons, free.seeds()).size(), all - 400);
     const double spacing = std::sqrt(surface.area / 400);
     for (std::size_t count : {std::size_t{400}, std::size_t{401}, all / 2, all - 1, all, all + 1, all + 90}) {
-      const std::vector<Vec3> finer = refine(polygons, state.moments, state.seeds, count);
+      const std::vector<Vec3> finer = refine(diagram, free.run.seeds, free.curves, {}, count).positions();
       EXPECT_EQ(finer.size(), count);
-      EXPECT_TRUE(std::equal(state.seeds.begin(), state.seeds.end(), finer.begin()));
+      EXPECT_TRUE(std::equal(free.seeds().begin(), free.seeds().end(), finer.begin()));
       // Between neighbours: on the surface, or as far from it as the middle of two seeds on either side of a bulge.
       for (std::size_t i = 400; i < finer.size(); ++i) EXPECT_LE(distance_to_surface(surface, finer[i]), 0.2 * spacing);
     }
@@ -526,13 +541,10 @@ TEST(Multilevel, SetCountComesAsNearAsOneSeedPerCellAllows) {
     const Surface surface(mesh);
     CpuBackend backend(surface, NeighbourSource::nearest);
     const std::vector<Vec3> seeds = random_seeds(mesh, 300, 15);
-    CellMoments moments;
-    RestrictedPolygons polygons;
-    backend.evaluate(seeds, moments, polygons);
+    const Diagram diagram = diagram_of(backend, seeds);
     for (std::size_t count : {150u, 290u, 299u, 300u, 301u, 310u, 450u, 600u}) {
-      std::vector<Vec3> changed = seeds;
-      std::vector<SeedPlace> free;
-      set_count(polygons, moments, count, changed, free);
+      PlacedSeeds changed(seeds);
+      set_count(diagram, count, changed);
       if (count <= 310) {
         EXPECT_EQ(changed.size(), count);
       } else {
@@ -541,12 +553,11 @@ TEST(Multilevel, SetCountComesAsNearAsOneSeedPerCellAllows) {
         EXPECT_GT(changed.size(), 420u);
       }
       std::set<std::array<double, 3>> distinct;
-      for (const Vec3& x : changed) distinct.insert({x.x, x.y, x.z});
+      for (const Vec3& x : changed.positions()) distinct.insert({x.x, x.y, x.z});
       EXPECT_EQ(distinct.size(), changed.size()) << count;
     }
-    std::vector<Vec3> doubled = seeds;
-    std::vector<SeedPlace> free;
-    set_count(polygons, moments, 5000, doubled, free);
+    PlacedSeeds doubled(seeds);
+    set_count(diagram, 5000, doubled);
     EXPECT_GT(doubled.size(), 300u);
     EXPECT_LE(doubled.size(), 600u);
   }
@@ -558,17 +569,10 @@ TEST(Multilevel, SetCountGetsFarByRepetition) {
   const Surface surface(mesh);
   CpuBackend backend(surface, NeighbourSource::nearest);
   for (std::size_t count : {4u, 50u, 2000u}) {
-    std::vector<Vec3> seeds = random_seeds(mesh, 300, 15);
-    std::vector<SeedPlace> free;
-    int rounds = 0;
-    for (; seeds.size() != count && rounds < 20; ++rounds) {
-      CellMoments moments;
-      RestrictedPolygons polygons;
-      backend.evaluate(seeds, moments, polygons);
-      set_count(polygons, moments, count, seeds, free);
-    }
-    EXPECT_EQ(seeds.size(), count);
-    EXPECT_LT(rounds, 8);
+    FreeRun free(backend, random_seeds(mesh, 300, 15));
+    meet_count(free.run, count);
+    EXPECT_EQ(free.run.seeds.size(), count);
+    EXPECT_LE(free.run.totals.evaluations, 8);
   }
 }
 

@@ -70,9 +70,7 @@ TEST(Curves, GradientIsTheSlopeOfTheEnergyAlongPlaces) {
     SCOPED_TRACE(model.name);
     const PlacedProblem problem(model.mesh, 150);
     CpuBackend backend(problem.surface, NeighbourSource::nearest);
-    const CvtState state = problem.completed_on(backend);
-    EXPECT_EQ(state.seeds, problem.placed.seeds);
-    expect_slopes(backend, problem, state, {1e-4, 1e-4, 1});
+    expect_slopes(backend, problem, problem.completed_on(backend), {1e-4, 1e-4, 1});
   }
 }
 
@@ -84,22 +82,18 @@ TEST(Curves, OptimisingKeepsSeedsOnTheirPlaces) {
     const CurveMeasure measure(surface, curves);
     CpuBackend backend(surface, NeighbourSource::nearest);
     PlacedSeeds placed = seeds_on_features(curves, measure, measure.scale(200));
-    for (const Vec3& x : random_seeds(model.mesh, 150, 7)) placed.seeds.push_back(x);
-    placed.places.resize(placed.seeds.size());
+    placed.add(random_seeds(model.mesh, 150, 7));
     for (bool constrained : {false, true}) {
-      CvtState state;
-      state.seeds = placed.seeds;
-      state.places = placed.places;
+      const Context context;
+      CvtRun run(backend, curves, context);
+      run.seeds = placed;
       OptimiseOptions options;
       options.iterations = 20;
       options.constrained = constrained;
-      options.curves = &curves;
-      OptimiseTotals totals;
-      CellMoments before;
-      backend.evaluate(placed.seeds, before);
-      optimise(backend, state, options, totals, {});
-      EXPECT_LT(state.energy, before.energy);
-      ASSERT_EQ(state.places.size(), state.seeds.size());
+      const double before = run.diagram().moments.energy;
+      optimise(run, options);
+      EXPECT_LT(run.energy, before);
+      ASSERT_EQ(run.seeds.size(), placed.size());
       bool moved = false;
       for (std::size_t i = 0; i < state.seeds.size(); ++i) {
         const SeedPlace &place = state.places[i], &start = placed.places[i];
@@ -154,11 +148,11 @@ TEST(CurveMeasure, PositionsInvertMeasuresAndFollowTheDensity) {
       EXPECT_NEAR(length, 1 / (1 + 3 * p.x), 0.2 * length);
     }
   const PlacedSeeds placed = seeds_on_features(curves, measure, 0.1);
-  EXPECT_EQ(std::count_if(placed.places.begin(), placed.places.end(), [](const SeedPlace& p) { return p.corner != kNone; }), 8);
-  for (std::size_t i = 0; i < placed.seeds.size(); ++i) {
-    const SeedPlace& p = placed.places[i];
+  EXPECT_EQ(std::count_if(placed.places().begin(), placed.places().end(), [](const SeedPlace& p) { return p.corner != kNone; }), 8);
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const SeedPlace& p = placed.place(i);
     const Vec3 at = p.corner != kNone ? curves.corner(p.corner) : curves.point(p.curve, p.position);
-    EXPECT_EQ(placed.seeds[i], at);
+    EXPECT_EQ(placed.position(i), at);
   }
 }
 
@@ -209,25 +203,20 @@ TEST_P(Recovery, EveryCurveIsAChainOfDualEdges) {
   for (std::size_t count : {60u, 400u}) {
     SCOPED_TRACE(std::string(model.name) + " " + std::to_string(count));
     PlacedSeeds placed = seeds_on_features(curves, measure, measure.scale(count));
-    for (const Vec3& x : random_seeds(model.mesh, count, 11)) placed.seeds.push_back(x);
-    placed.places.resize(placed.seeds.size());
-    CvtState state;
-    state.seeds = placed.seeds;
-    state.places = placed.places;
+    placed.add(random_seeds(model.mesh, count, 11));
+    const Context context;
+    CvtRun run(backend, curves, context);
+    run.seeds = placed;
     OptimiseOptions options;
     options.iterations = 30;
-    options.curves = &curves;
-    OptimiseTotals totals;
-    RestrictedPolygons polygons;
-    optimise(backend, state, options, totals, {});
-    clear_features(backend, state, polygons, trace, measure, options, totals, {});
+    optimise(run, options);
+    clear_features(run, trace, measure, options);
     options.constrained = true;
-    const FeatureReport report =
-        recover_features(backend, state, polygons, trace, measure, measure.scale(count), options, totals, {});
+    const FeatureReport report = recover_features(run, trace, measure, measure.scale(count), options);
     EXPECT_TRUE(report.broken.empty());
 
     // The chains are edges of the dual, and as long as the curves but for what chords cut off; each corner is among them.
-    const Dual dual = extract_dual(polygons);
+    const Dual& dual = run.diagram(Want::polygons | Want::dual).dual;
     std::set<std::array<Index, 2>> dual_edges;
     for (const Triangle& t : dual.triangles)
       for (int m = 0; m < 3; ++m) dual_edges.insert({std::min(t[m], t[(m + 1) % 3]), std::max(t[m], t[(m + 1) % 3])});
@@ -235,20 +224,19 @@ TEST_P(Recovery, EveryCurveIsAChainOfDualEdges) {
     std::set<Index> on_chains;
     for (const auto& [a, b] : report.edges) {
       EXPECT_TRUE(dual_edges.contains({a, b}));
-      EXPECT_NE(state.places[a].kind, SeedPlace::Kind::surface);
-      EXPECT_NE(state.places[b].kind, SeedPlace::Kind::surface);
-      length += norm(state.seeds[a] - state.seeds[b]);
+      EXPECT_FALSE(run.seeds.on_surface(a));
+      EXPECT_FALSE(run.seeds.on_surface(b));
+      length += norm(run.seeds.position(a) - run.seeds.position(b));
       on_chains.insert(a);
       on_chains.insert(b);
     }
     for (Index c = 0; c < curves.size(); ++c) whole += curves.length(c);
     EXPECT_LE(length, whole * (1 + 1e-12));
     EXPECT_GE(length, 0.97 * whole);
-    for (Index i = 0; i < state.seeds.size(); ++i)
-      if (state.places[i].kind != SeedPlace::Kind::surface) {
+    for (Index i = 0; i < run.seeds.size(); ++i)
+      if (!run.seeds.on_surface(i)) {
         EXPECT_TRUE(on_chains.contains(i)) << i;
       }
-    EXPECT_EQ(state.places.size(), state.seeds.size());
   }
 }
 
@@ -261,8 +249,9 @@ TEST(RecoveryReport, AMissingCurveIsReported) {
   const FeatureCurves curves(sharp_graph(mesh), mesh.vertices);
   const FeatureTrace trace(surface, curves);
   const std::vector<Vec3> seeds = random_seeds(mesh, 100, 2);
-  const Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
-  const FeatureReport report = check_features(trace, curves, std::vector<SeedPlace>(seeds.size()), diagram.polygons);
+  Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+  diagram.dual = extract_dual(diagram.polygons);
+  const FeatureReport report = check_features(trace, curves, std::vector<SeedPlace>(seeds.size()), diagram);
   EXPECT_EQ(report.broken.size(), 12u);
 }
 
@@ -274,18 +263,13 @@ TEST(RecoveryLevels, RefiningDoublesCurvesAndKeepsTheCount) {
   const CurveMeasure measure(surface, curves);
   CpuBackend backend(surface, NeighbourSource::nearest);
   PlacedSeeds coarse = seeds_on_features(curves, measure, 0.3);
-  const std::size_t on_curves = coarse.seeds.size();
-  for (const Vec3& x : random_seeds(mesh, 150, 11)) coarse.seeds.push_back(x);
-  coarse.places.resize(coarse.seeds.size());
-  CellMoments moments;
-  RestrictedPolygons polygons;
-  backend.evaluate(coarse.seeds, moments, polygons);
-  const PlacedSeeds features = seeds_on_features(curves, measure, 0.15, coarse.places);
-  EXPECT_NEAR(static_cast<double>(features.seeds.size()), 2.0 * static_cast<double>(on_curves), 2.0);
-  const PlacedSeeds finer = refine(polygons, moments, coarse, curves, features, 600);
-  EXPECT_EQ(finer.seeds.size(), 600u);
-  EXPECT_EQ(finer.places.size(), 600u);
-  EXPECT_TRUE(std::equal(features.seeds.begin(), features.seeds.end(), finer.seeds.begin()));
+  const std::size_t on_curves = coarse.size();
+  coarse.add(random_seeds(mesh, 150, 11));
+  const PlacedSeeds features = seeds_on_features(curves, measure, 0.15, coarse.places());
+  EXPECT_NEAR(static_cast<double>(features.size()), 2.0 * static_cast<double>(on_curves), 2.0);
+  const PlacedSeeds finer = refine(diagram_of(backend, coarse.positions()), coarse, curves, features, 600);
+  EXPECT_EQ(finer.size(), 600u);
+  EXPECT_TRUE(std::equal(features.positions().begin(), features.positions().end(), finer.positions().begin()));
 }
 
 }  // namespace

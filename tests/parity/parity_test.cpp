@@ -20,6 +20,7 @@
 #include "remesh/topology_control.h"
 #include "host/passes/vulkan_backend.h"
 #include "support/models.h"
+#include "support/run.h"
 #include "support/setups.h"
 
 namespace bisector::test {
@@ -55,13 +56,9 @@ std::vector<Vec3> packed_seeds(const TriangleMesh& mesh, std::size_t count) {
 
 std::vector<Vec3> optimised_seeds(const Surface& surface, std::vector<Vec3> seeds) {
   CpuBackend backend(surface, NeighbourSource::nearest);
-  CvtState state;
-  state.seeds = std::move(seeds);
   OptimiseOptions options;
   options.iterations = 15;
-  OptimiseTotals totals;
-  optimise(backend, state, options, totals, {});
-  return state.seeds;
+  return optimised_seeds(backend, std::move(seeds), options);
 }
 
 // Vertices, evenly spread over their order if there are too many.
@@ -342,21 +339,24 @@ TEST_P(Parities, WhatIsKeptBetweenDiagramsDoesNotShow) {
 
 // --- Whole runs ---
 
-CvtState optimised_on(Backend& backend, std::vector<Vec3> seeds) {
-  CvtState state;
-  state.seeds = std::move(seeds);
-  OptimiseTotals totals;
+struct Optimised {
+  std::vector<Vec3> seeds;
+  double energy;
+};
+
+Optimised optimised_on(Backend& backend, std::vector<Vec3> seeds) {
+  FreeRun free(backend, std::move(seeds));
   OptimiseOptions options;
   options.iterations = 30;
-  optimise(backend, state, options, totals, {});
+  optimise(free.run, options);
   options.constrained = true;
   options.iterations = 5;
-  optimise(backend, state, options, totals, {});
-  return state;
+  optimise(free.run, options);
+  return {free.seeds(), free.run.energy};
 }
 
 MeshTopology dual_topology(Backend& backend, const std::vector<Vec3>& seeds) {
-  const TriangleMesh mesh = dual_mesh(seeds, diagram_of(backend, seeds).polygons);
+  const TriangleMesh mesh = dual_mesh(seeds, extract_dual(diagram_of(backend, seeds).polygons));
   return analyse_topology(mesh.triangles, mesh.vertices.size());
 }
 
@@ -367,7 +367,7 @@ TEST_P(Parities, AnOptimisationIsTheCpus) {
   const std::vector<Vec3> start = random_seeds(mesh, 800, 22);
   CpuBackend cpu(surface, NeighbourSource::nearest);
   const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
-  const CvtState reference = optimised_on(cpu, start), found = optimised_on(*backend, start);
+  const Optimised reference = optimised_on(cpu, start), found = optimised_on(*backend, start);
   EXPECT_NEAR(found.energy, reference.energy, 1e-4 * reference.energy);
   const MeshTopology want = analyse_topology(mesh.triangles, mesh.vertices.size());
   EXPECT_TRUE(same_topology(dual_topology(cpu, reference.seeds), want));

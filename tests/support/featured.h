@@ -112,6 +112,13 @@ inline std::vector<FeaturedModel> featured_models() {
           {"patch", wavy_patch(12)}, {"pages", pages()},           {"slab", prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}})}};
 }
 
+// What is known of the seeds of a PlacedProblem.
+struct CompletedProblem {
+  CvtGradient gradient;
+  CellMoments moments;
+  double energy = 0, gradient_norm = 0;
+};
+
 // A surface with a density and seeds about half of which are held on its features, out of balance in every direction.
 struct PlacedProblem {
   PlacedProblem(const TriangleMesh& mesh, std::size_t count)
@@ -119,26 +126,25 @@ struct PlacedProblem {
     const CurveMeasure measure(surface, curves);
     placed = seeds_on_features(curves, measure, measure.scale(count));
     SplitMix64 random(3);
-    for (std::size_t i = 0; i < placed.seeds.size(); ++i) {
-      SeedPlace& place = placed.places[i];
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      SeedPlace place = placed.place(i);
       if (place.kind != SeedPlace::Kind::curve) continue;
       place.position = curves.wrap(place.curve, place.position + random.range(-0.01, 0.01));
-      placed.seeds[i] = curves.point(place.curve, place.position);
+      placed.put(i, curves.point(place.curve, place.position), place);
     }
-    for (const Vec3& x : random_seeds(mesh, count, 7)) placed.seeds.push_back(x);
-    placed.places.resize(placed.seeds.size());
+    placed.add(random_seeds(mesh, count, 7));
   }
 
-  CvtState completed_on(Backend& backend) const {
-    CvtState state;
-    state.seeds = placed.seeds;
-    state.places = placed.places;
-    OptimiseOptions options;
-    options.constrained = true;
-    options.curves = &curves;
-    OptimiseTotals totals;
-    complete(backend, state, options, totals);
-    return state;
+  CompletedProblem completed_on(Backend& backend) const {
+    const Context context;
+    CvtRun run(backend, curves, context);
+    run.seeds = placed;
+    CompletedProblem result;
+    result.gradient = complete(run, true);
+    result.moments = run.diagram().moments;
+    result.energy = run.energy;
+    result.gradient_norm = run.gradient_norm;
+    return result;
   }
 
   Surface surface;
@@ -161,25 +167,25 @@ struct Differences {
 
 // Along curves, and along two directions of the tangent plane of seeds on the surface, the gradient is the slope of the
 // energy; across it is 0.
-inline void expect_slopes(Backend& backend, const PlacedProblem& problem, const CvtState& state, const Differences& how) {
+inline void expect_slopes(Backend& backend, const PlacedProblem& problem, const CompletedProblem& found, const Differences& how) {
   const auto rise = [&](std::size_t i, const Vec3& ahead, const Vec3& behind) {
     std::array<double, 2> energy;
     for (int side : {0, 1}) {
-      std::vector<Vec3> moved = state.seeds;
+      std::vector<Vec3> moved = problem.placed.positions();
       moved[i] = side ? ahead : behind;
-      CellMoments moments;
-      backend.evaluate(moved, moments);
-      energy[side] = moments.energy;
+      Diagram diagram;
+      backend.evaluate(moved, Want::moments, diagram);
+      energy[side] = diagram.moments.energy;
     }
     return energy[1] - energy[0];
   };
   std::array<std::size_t, 3> seen{};
-  for (std::size_t i = 0; i < state.seeds.size(); ++i) {
+  for (std::size_t i = 0; i < problem.placed.size(); ++i) {
     SCOPED_TRACE("seed " + std::to_string(i));
-    const SeedPlace& place = state.places[i];
+    const SeedPlace& place = problem.placed.place(i);
     const auto kind = static_cast<std::size_t>(place.kind);
-    const Vec3 &x = state.seeds[i], &g = state.gradient[i];
-    const Moments& cell = state.moments.cells[i];
+    const Vec3 &x = problem.placed.position(i), &g = found.gradient.vectors[i];
+    const Moments& cell = found.moments.cells[i];
     const double length = std::sqrt(cell.second / cell.mass), scale = 2 * cell.mass * length, h = how.step * length;
     if (place.kind == SeedPlace::Kind::fixed) {
       EXPECT_EQ(g, Vec3{});
@@ -199,7 +205,7 @@ inline void expect_slopes(Backend& backend, const PlacedProblem& problem, const 
       EXPECT_NEAR(norm(g), std::abs(dot(g, tangent)), 1e-14 * scale);
     } else {
       if (seen[kind]++ % how.every) continue;
-      const Vec3& n = state.normals[i];
+      const Vec3& n = found.gradient.normals[i];
       const Vec3 across = cross(n, std::abs(n.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0});
       for (const Vec3& d : {(1 / norm(across)) * across, (1 / norm(across)) * cross(n, across)})
         EXPECT_NEAR(dot(g, d), rise(i, x + h * d, x - h * d) / (2 * h), how.tolerance * scale);
