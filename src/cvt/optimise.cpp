@@ -291,8 +291,8 @@ CvtGradient complete(CvtRun& run, bool constrained) {
 }
 
 struct StateRun {
-  StateRun(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals, const Context& context)
-      : state(state), totals(totals), run(backend, options.curves ? *options.curves : none, context) {
+  StateRun(Backend& backend, CvtState& given, const OptimiseOptions& options, OptimiseTotals& sums, const Context& context)
+      : state(given), totals(sums), run(backend, options.curves ? *options.curves : none, context) {
     run.totals = totals;
     run.seeds = PlacedSeeds(state.seeds, state.places);
     run.normals_ = state.normals;

@@ -95,15 +95,15 @@ TEST(Curves, OptimisingKeepsSeedsOnTheirPlaces) {
       EXPECT_LT(run.energy, before);
       ASSERT_EQ(run.seeds.size(), placed.size());
       bool moved = false;
-      for (std::size_t i = 0; i < state.seeds.size(); ++i) {
-        const SeedPlace &place = state.places[i], &start = placed.places[i];
+      for (std::size_t i = 0; i < run.seeds.size(); ++i) {
+        const SeedPlace &place = run.seeds.place(i), &start = placed.place(i);
         EXPECT_EQ(place.kind, start.kind);
         EXPECT_EQ(place.curve, start.curve);
         if (place.kind == SeedPlace::Kind::fixed) {
-          EXPECT_EQ(state.seeds[i], placed.seeds[i]);
+          EXPECT_EQ(run.seeds.position(i), placed.position(i));
         }
         if (place.kind != SeedPlace::Kind::curve) continue;
-        EXPECT_EQ(state.seeds[i], curves.point(place.curve, place.position));
+        EXPECT_EQ(run.seeds.position(i), curves.point(place.curve, place.position));
         moved = moved || place.position != start.position;
       }
       EXPECT_TRUE(moved || model.mesh.vertices.size() < 10);

@@ -109,12 +109,6 @@ std::vector<Vec3> moved(std::vector<Vec3> seeds) {
   return seeds;
 }
 
-Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
-  Diagram d;
-  backend.evaluate(seeds, d.moments, d.polygons);
-  return d;
-}
-
 Diagram cpu_diagram(const Surface& surface, const std::vector<Vec3>& seeds) {
   return test::diagram_of(surface, seeds, NeighbourSource::nearest);
 }

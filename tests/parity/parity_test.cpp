@@ -19,6 +19,7 @@
 #include "remesh/remesh.h"
 #include "remesh/topology_control.h"
 #include "host/passes/vulkan_backend.h"
+#include "voronoi/dual.h"
 #include "support/models.h"
 #include "support/run.h"
 #include "support/setups.h"
@@ -58,7 +59,7 @@ std::vector<Vec3> optimised_seeds(const Surface& surface, std::vector<Vec3> seed
   CpuBackend backend(surface, NeighbourSource::nearest);
   OptimiseOptions options;
   options.iterations = 15;
-  return optimised_seeds(backend, std::move(seeds), options);
+  return test::optimised_seeds(backend, std::move(seeds), options);
 }
 
 // Vertices, evenly spread over their order if there are too many.

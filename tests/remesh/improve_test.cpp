@@ -215,38 +215,35 @@ TEST(ImprovePatch, HoldingLimitsTheWay) {
 struct Problem {
   Problem(const TriangleMesh& mesh, std::size_t count, int iterations, FeatureGraph graph = {})
       : surface(mesh), backend(surface, NeighbourSource::nearest), curves(graph, surface.mesh.vertices),
-        trace(surface, curves), input(analyse_topology(mesh.triangles, mesh.vertices.size())) {
+        trace(surface, curves), input(analyse_topology(mesh.triangles, mesh.vertices.size())),
+        run(backend, curves, context) {
+    OptimiseOptions step;
     step.iterations = iterations;
     step.constrained = true;
-    step.curves = &curves;
     const CurveMeasure measure(surface, curves);
-    PlacedSeeds placed;
-    if (curves.size() > 0) placed = seeds_on_features(curves, measure, measure.scale(count));
-    state.seeds = initial_seeds(surface, count - placed.seeds.size(), 1);
-    state.seeds.insert(state.seeds.begin(), placed.seeds.begin(), placed.seeds.end());
-    if (curves.size() > 0) {
-      state.places = placed.places;
-      state.places.resize(count);
-    }
-    optimise(backend, state, step, totals, {});
-    if (curves.size() > 0)
-      recover_features(backend, state, polygons, trace, measure, measure.scale(count), step, totals, {});
-    backend.evaluate(state.seeds, state.moments, polygons);
-    before = state;
+    if (curves.size() > 0) run.seeds = seeds_on_features(curves, measure, measure.scale(count));
+    run.seeds.add(initial_seeds(surface, count - run.seeds.size(), 1));
+    optimise(run, step);
+    if (curves.size() > 0) recover_features(run, trace, measure, measure.scale(count), step);
+    before = run.seeds;
     quality_before = quality();
   }
 
-  QualityReport quality() const { return measure_quality(dual_mesh(state.seeds, polygons)); }
-  ImproveReport improve_to(std::size_t count, double min_angle = 40, const Context& context = {}) {
-    return improve(backend, state, polygons, trace, {min_angle, 91, count}, step, totals, context);
-  }
-  // That state and polygons belong together and nothing is worse than before.
+  const Diagram& diagram() { return run.diagram(Want::polygons | Want::dual); }
+  TriangleMesh dual() { return dual_mesh(run.seeds.positions(), diagram().dual); }
+  QualityReport quality() { return measure_quality(dual()); }
+  std::vector<Index> broken_curves() { return check_features(trace, curves, run.seeds.places(), diagram()).broken; }
+  ImproveReport improve_to(std::size_t count, double min_angle = 40) { return improve(run, trace, {min_angle, 91, count}); }
+  // That seeds and diagram belong together and nothing is worse than before.
   void expect_sound(std::size_t count) {
-    EXPECT_EQ(state.seeds.size(), count);
-    const Diagram d = diagram_of(surface, state.seeds, NeighbourSource::nearest);
-    EXPECT_EQ(triples_of(polygons), triples_of(d.polygons));
-    expect_same_moments(state.moments, d.moments);
-    EXPECT_EQ(state.gradient.size(), count);
+    EXPECT_EQ(run.seeds.size(), count);
+    const int evaluations = run.totals.evaluations;
+    const Diagram& found = run.diagram(Want::polygons);
+    EXPECT_EQ(run.totals.evaluations, evaluations) << "the final diagram is at hand";
+    const Diagram d = diagram_of(surface, run.seeds.positions(), NeighbourSource::nearest);
+    EXPECT_EQ(triples_of(found.polygons), triples_of(d.polygons));
+    expect_same_moments(found.moments, d.moments);
+    EXPECT_EQ(run.energy, d.moments.energy);
     const QualityReport after = quality(), &was = quality_before;
     EXPECT_TRUE(same_topology(after.topology, input));
     EXPECT_GE(after.theta_min, std::min(was.theta_min, 40.0) - 1e-9);
@@ -254,7 +251,7 @@ struct Problem {
     EXPECT_GE(after.q_ave, was.q_ave);
     EXPECT_GE(after.theta_min_ave, was.theta_min_ave);
     const double tolerance = 1e-12 * bounding_box(surface.mesh.vertices).diagonal();
-    for (const Vec3& x : state.seeds) {
+    for (const Vec3& x : run.seeds.positions()) {
       double nearest = std::numeric_limits<double>::infinity();
       for (const Facet& f : surface.facets)
         nearest = std::min(nearest, norm2(nearest_on_triangle(x, f.corners[0], f.corners[1], f.corners[2]) - x));
@@ -267,31 +264,30 @@ struct Problem {
   FeatureCurves curves;
   FeatureTrace trace;
   MeshTopology input;
-  OptimiseOptions step;
-  OptimiseTotals totals;
-  CvtState state, before;
-  RestrictedPolygons polygons;
+  Context context;
+  CvtRun run;
+  PlacedSeeds before;
   QualityReport quality_before;
 };
 
 // Few steps leave poor triangles, as a bad local minimum would.
 TEST(Improve, MendsSmoothSurfaces) {
   for (const TriangleMesh& mesh : {icosphere(4), torus(80, 48)}) {
-    Problem run(mesh, 600, 8);
-    ASSERT_LT(run.quality_before.theta_min, 40);
-    const ImproveReport report = run.improve_to(600);
-    run.expect_sound(600);
+    Problem problem(mesh, 600, 8);
+    ASSERT_LT(problem.quality_before.theta_min, 40);
+    const ImproveReport report = problem.improve_to(600);
+    problem.expect_sound(600);
     EXPECT_EQ(report.missed, 0u);
-    EXPECT_GE(run.quality().theta_min, 40);
-    EXPECT_LE(run.quality().theta_max, 91);
-    EXPECT_GE(run.quality().valence6, run.quality_before.valence6);
+    EXPECT_GE(problem.quality().theta_min, 40);
+    EXPECT_LE(problem.quality().theta_max, 91);
+    EXPECT_GE(problem.quality().valence6, problem.quality_before.valence6);
   }
 }
 
 TEST(Improve, CountsTheTrianglesThatItMissed) {
-  Problem run(icosphere(4), 300, 10);
-  const ImproveReport report = run.improve_to(300, 55);
-  const TriangleMesh mesh = dual_mesh(run.state.seeds, run.polygons);
+  Problem problem(icosphere(4), 300, 10);
+  const ImproveReport report = problem.improve_to(300, 55);
+  const TriangleMesh mesh = problem.dual();
   std::size_t missed = 0;
   for (const auto& [a, b, c] : mesh.triangles)
     missed += shape_excess(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], shape_goal(55, 91)).most() > 0;
@@ -301,23 +297,22 @@ TEST(Improve, CountsTheTrianglesThatItMissed) {
 
 TEST(Improve, MeetsTheCount) {
   for (const int off : {-3, 4}) {
-    Problem run(icosphere(4), static_cast<std::size_t>(400 + off), 25);
-    const ImproveReport report = run.improve_to(400);
-    run.expect_sound(400);
+    Problem problem(icosphere(4), static_cast<std::size_t>(400 + off), 25);
+    const ImproveReport report = problem.improve_to(400);
+    problem.expect_sound(400);
     EXPECT_EQ(static_cast<int>(report.inserted) - static_cast<int>(report.removed), -off);
   }
 }
 
 // Of equal seeds the first owns everything, the others are no vertices.
 TEST(Improve, ReplacesSeedsThatOwnNothing) {
-  Problem run(icosphere(4), 300, 25);
-  run.state.seeds[7] = run.state.seeds[8] = run.state.seeds[20];
-  run.backend.evaluate(run.state.seeds, run.state.moments, run.polygons);
-  run.quality_before = run.quality();
-  ASSERT_EQ(dual_mesh(run.state.seeds, run.polygons).vertices.size(), 298u);
-  run.improve_to(300);
-  run.expect_sound(300);
-  EXPECT_EQ(dual_mesh(run.state.seeds, run.polygons).vertices.size(), 300u);
+  Problem problem(icosphere(4), 300, 25);
+  for (const Index i : {7u, 8u}) problem.run.seeds.edit_positions()[i] = problem.run.seeds.position(20);
+  problem.quality_before = problem.quality();
+  ASSERT_EQ(problem.dual().vertices.size(), 298u);
+  problem.improve_to(300);
+  problem.expect_sound(300);
+  EXPECT_EQ(problem.dual().vertices.size(), 300u);
 }
 
 // Every edge of the cube is a curve, every corner of it a corner.
@@ -330,81 +325,83 @@ FeatureGraph cube_features(const TriangleMesh& mesh) {
 
 TEST(Improve, KeepsFeatures) {
   const TriangleMesh mesh = box(8);
-  Problem run(mesh, 700, 15, cube_features(mesh));
-  ASSERT_TRUE(check_features(run.trace, run.curves, run.state.places, run.polygons).broken.empty());
-  run.improve_to(700);
-  run.expect_sound(700);
-  EXPECT_TRUE(check_features(run.trace, run.curves, run.state.places, run.polygons).broken.empty());
-  ASSERT_EQ(run.state.places.size(), run.state.seeds.size());
+  Problem problem(mesh, 700, 15, cube_features(mesh));
+  ASSERT_TRUE(problem.broken_curves().empty());
+  problem.improve_to(700);
+  problem.expect_sound(700);
+  EXPECT_TRUE(problem.broken_curves().empty());
   std::vector<int> at_corner(8, 0);
-  for (std::size_t i = 0; i < run.state.seeds.size(); ++i) {
-    const SeedPlace& place = run.state.places[i];
-    const Vec3& x = run.state.seeds[i];
+  for (std::size_t i = 0; i < problem.run.seeds.size(); ++i) {
+    const SeedPlace& place = problem.run.seeds.place(i);
+    const Vec3& x = problem.run.seeds.position(i);
     if (place.corner != kNone) {
       ++at_corner[place.corner];
-      EXPECT_EQ(x, run.curves.corner(place.corner));
+      EXPECT_EQ(x, problem.curves.corner(place.corner));
     } else if (place.kind == Kind::curve) {
-      EXPECT_EQ(x, run.curves.point(place.curve, place.position));
+      EXPECT_EQ(x, problem.curves.point(place.curve, place.position));
     }
   }
   EXPECT_EQ(at_corner, std::vector<int>(8, 1));
   // A seed that recovery fixed on a curve may go, but not move.
-  for (std::size_t i = 0; i < run.state.seeds.size(); ++i) {
-    if (run.state.places[i].kind != Kind::fixed) continue;
-    const auto was = std::find(run.before.seeds.begin(), run.before.seeds.end(), run.state.seeds[i]);
-    ASSERT_NE(was, run.before.seeds.end());
-    EXPECT_EQ(run.before.places[static_cast<std::size_t>(was - run.before.seeds.begin())].kind, Kind::fixed);
+  for (std::size_t i = 0; i < problem.run.seeds.size(); ++i) {
+    if (problem.run.seeds.kind(i) != Kind::fixed) continue;
+    const std::vector<Vec3>& before = problem.before.positions();
+    const auto was = std::find(before.begin(), before.end(), problem.run.seeds.position(i));
+    ASSERT_NE(was, before.end());
+    EXPECT_EQ(problem.before.kind(static_cast<std::size_t>(was - before.begin())), Kind::fixed);
   }
 }
 
 // Where a border is no feature, its seeds would creep inwards.
 TEST(Improve, LeavesSeedsAtABorderWhereTheyAre) {
-  Problem run(wavy_patch(40), 400, 25);
-  const auto border = [](const Problem& r) {
+  Problem problem(wavy_patch(40), 400, 25);
+  const auto border = [](Problem& r) {
     std::map<std::array<Index, 2>, int> edges;
-    for (const Triangle& t : triples_of(r.polygons))
+    for (const Triangle& t : triples_of(r.run.diagram(Want::polygons).polygons))
       for (int m = 0; m < 3; ++m) ++edges[{std::min(t[m], t[(m + 1) % 3]), std::max(t[m], t[(m + 1) % 3])}];
     std::vector<std::array<double, 3>> ends;
     for (const auto& [e, count] : edges)
       if (count == 1)
-        for (const Index v : e) ends.push_back({r.state.seeds[v].x, r.state.seeds[v].y, r.state.seeds[v].z});
+        for (const Index v : e) {
+          const Vec3& x = r.run.seeds.position(v);
+          ends.push_back({x.x, x.y, x.z});
+        }
     std::sort(ends.begin(), ends.end());
     return ends;
   };
-  const auto before = border(run);
+  const auto before = border(problem);
   EXPECT_FALSE(before.empty());
-  run.improve_to(400);
-  run.expect_sound(400);
-  EXPECT_EQ(border(run), before);
+  problem.improve_to(400);
+  problem.expect_sound(400);
+  EXPECT_EQ(border(problem), before);
 }
 
 TEST(Improve, RepeatsWithAnyNumberOfThreads) {
   std::vector<Vec3> reference;
   for (const unsigned threads : {1u, 2u, 3u}) {
     const ThreadLimit limit(threads);
-    Problem run(torus(80, 48), 500, 15);
-    run.improve_to(500);
-    if (reference.empty()) reference = run.state.seeds;
-    EXPECT_TRUE(same_bits(run.state.seeds, reference));
+    Problem problem(torus(80, 48), 500, 15);
+    problem.improve_to(500);
+    if (reference.empty()) reference = problem.run.seeds.positions();
+    EXPECT_TRUE(same_bits(problem.run.seeds.positions(), reference));
   }
 }
 
 TEST(Improve, CanBeCancelled) {
-  Problem run(icosphere(3), 100, 5);
+  Problem problem(icosphere(3), 100, 5);
   std::atomic<bool> cancel = true;
-  Context context;
-  context.cancel = &cancel;
-  EXPECT_THROW(run.improve_to(100, 40, context), Cancelled);
+  problem.context.cancel = &cancel;
+  EXPECT_THROW(problem.improve_to(100), Cancelled);
 }
 
 // Duals that are not manifold, seeds that are too few: nothing to win, nothing to lose.
 TEST(Improve, LeavesHardInputsNoWorse) {
   for (const TriangleMesh& mesh : {pages(), soup(40, 2), box(1), two_spheres()})
     for (const std::size_t count : {6u, 60u}) {
-      Problem run(mesh, count, 10);
-      const QualityReport was = run.quality_before;
-      run.improve_to(count);
-      const QualityReport after = run.quality();
+      Problem problem(mesh, count, 10);
+      const QualityReport was = problem.quality_before;
+      problem.improve_to(count);
+      const QualityReport after = problem.quality();
       EXPECT_EQ(after.topology.euler, was.topology.euler);
       EXPECT_EQ(after.topology.manifold, was.topology.manifold);
       EXPECT_GE(after.theta_min, std::min(was.theta_min, 40.0) - 1e-9);

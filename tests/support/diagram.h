@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "backend/backend.h"
 #include "core/parallel.h"
 #include "voronoi/dual.h"
 #include "voronoi/restricted.h"
@@ -26,6 +27,12 @@ inline Diagram diagram_of(RestrictedVoronoi& voronoi, const std::vector<Vec3>& s
 inline Diagram diagram_of(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source) {
   RestrictedVoronoi voronoi(surface);
   return diagram_of(voronoi, seeds, source);
+}
+
+inline Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
+  Diagram d;
+  backend.evaluate(seeds, Want::polygons, d);
+  return d;
 }
 
 inline bool same_bits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }

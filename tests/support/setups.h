@@ -80,12 +80,6 @@ inline ComputeOptions options_of(const Setup& setup) {
 #define SKIP_WITHOUT_DEVICE(processor) \
   if (!device_for(processor)) GTEST_SKIP() << "no Vulkan device for this"
 
-inline Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
-  Diagram d;
-  backend.evaluate(seeds, d.moments, d.polygons);
-  return d;
-}
-
 // What the reported vertices give, which the moments do not show. Vertices are rounded at the size of the coordinates.
 inline void expect_same_areas(const Surface& surface, const Diagram& reference, const Diagram& found, double tolerance) {
   const double rounding = 1e-15 * (norm(surface.box.lo) + norm(surface.box.hi));

@@ -22,6 +22,7 @@
 #include "voronoi/ball_property.h"
 #include "support/diagram.h"
 #include "support/models.h"
+#include "support/run.h"
 
 namespace bisector::test {
 namespace {
@@ -544,55 +545,31 @@ TEST(TopologyControlTest, CheckReportsAndChangesNothing) {
   }
 }
 
-TEST(TopologyControlTest, EditsKeepPlacesParallel) {
-  CvtState state;
-  for (Index i = 0; i < 6; ++i) {
-    state.seeds.push_back({double(i), 0, 0});
-    state.places.push_back({i % 2 ? SeedPlace::Kind::fixed : SeedPlace::Kind::surface, kNone, i, 0});
-  }
-  edit_seeds({0, 4}, {{9, 9, 9}}, state);
-  ASSERT_EQ(state.seeds.size(), 5u);
-  ASSERT_EQ(state.places.size(), 5u);
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(state.places[i].corner, static_cast<Index>(state.seeds[i].x));
-  EXPECT_EQ(state.places[4].kind, SeedPlace::Kind::surface);
-  EXPECT_EQ(state.places[4].corner, kNone);
-  state.places.clear();
-  edit_seeds({1}, {{8, 8, 8}, {7, 7, 7}}, state);
-  EXPECT_EQ(state.seeds.size(), 6u);
-  EXPECT_TRUE(state.places.empty());
-}
-
 TEST(TopologyControlTest, SeedsThatAreNotFreeStay) {
   const TriangleMesh lens = scaled(icosphere(4), {1, 1, 0.06});
   const Surface surface(lens);
   CpuBackend backend(surface, NeighbourSource::nearest);
-  CvtState state;
-  state.seeds = random_seeds(lens, 500, 4);
-  OptimiseTotals totals;
+  FreeRun free(backend, random_seeds(lens, 500, 4));
+  CvtRun& run = free.run;
   OptimiseOptions options;
   options.constrained = true;
   options.iterations = 30;
-  optimise(backend, state, options, totals, {});
+  optimise(run, options);
   std::map<Index, Vec3> fixed;
-  for (Index i = 0; i < state.seeds.size(); ++i) {
-    state.places.push_back({i % 3 ? SeedPlace::Kind::surface : SeedPlace::Kind::fixed, kNone, i, 0});
-    if (i % 3 == 0) fixed[i] = state.seeds[i];
+  for (Index i = 0; i < run.seeds.size(); ++i) {
+    run.seeds.edit_places()[i] = {i % 3 ? SeedPlace::Kind::surface : SeedPlace::Kind::fixed, kNone, i, 0};
+    if (i % 3 == 0) fixed[i] = run.seeds.position(i);
   }
-  RestrictedPolygons polygons;
-  const TopologyOutcome outcome = enforce_topology(backend, state, polygons, topology_of(lens), options, totals, {});
+  const TopologyOutcome outcome = enforce_topology(run, topology_of(lens), options);
   EXPECT_TRUE(outcome.ball.holds);
   EXPECT_GT(outcome.inserted, 0u);
-  // The state is complete.
-  CellMoments moments;
-  backend.evaluate(state.seeds, moments);
-  EXPECT_EQ(state.energy, moments.energy);
-  EXPECT_EQ(state.gradient.size(), state.seeds.size());
-  ASSERT_EQ(state.places.size(), state.seeds.size());
+  // The energy is that of the seeds.
+  EXPECT_EQ(run.energy, diagram_of(surface, run.seeds.positions(), NeighbourSource::nearest).moments.energy);
   std::size_t found = 0;
-  for (std::size_t i = 0; i < state.seeds.size(); ++i)
-    if (state.places[i].kind == SeedPlace::Kind::fixed) {
+  for (std::size_t i = 0; i < run.seeds.size(); ++i)
+    if (run.seeds.kind(i) == SeedPlace::Kind::fixed) {
       ++found;
-      EXPECT_LT(norm(state.seeds[i] - fixed.at(state.places[i].corner)), 1e-12);
+      EXPECT_LT(norm(run.seeds.position(i) - fixed.at(run.seeds.place(i).corner)), 1e-12);
     }
   EXPECT_EQ(found, fixed.size());
 }
