@@ -5,6 +5,7 @@
 #include <numeric>
 #include <set>
 
+#include "core/geometry.h"
 #include "mesh/sampling.h"
 #include "mesh/topology.h"
 #include "voronoi/dual.h"

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry.h"
+
 namespace bisector {
 
 FeatureCurves::FeatureCurves(const FeatureGraph& graph, const std::vector<Vec3>& vertices) : graph_(graph) {
@@ -47,9 +49,7 @@ Vec3 FeatureCurves::point(Index curve, double position) const {
 
 Vec3 FeatureCurves::tangent(Index curve, double position) const {
   const std::size_t k = segment_at(curve, position);
-  const Vec3 along = points_[curve][k + 1] - points_[curve][k];
-  const double length = norm(along);
-  return length > 0 ? (1 / length) * along : Vec3{};
+  return unit(points_[curve][k + 1] - points_[curve][k]);
 }
 
 double FeatureCurves::nearest(Index curve, const Vec3& p, double from, double reach) const {

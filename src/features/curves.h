@@ -1,26 +1,14 @@
 // Feature curves as places for seeds: points by arc length, tangents, nearest points (thesis 4.4.3, equation 4.8).
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <vector>
 
 #include "core/geometry.h"
-#include "features/features.h"
+#include "bisector/features.h"
 
 namespace bisector {
-
-// Where a seed may be.
-struct SeedPlace {
-  enum class Kind : unsigned char {
-    surface,   // anywhere on the surface
-    curve,     // on one feature curve
-    fixed,     // where it is
-    interior,  // anywhere: the inside of a solid
-  };
-  Kind kind = Kind::surface;
-  Index curve = kNone;   // the feature curve it lies on, if one alone
-  Index corner = kNone;  // index in FeatureGraph::corners of the corner it lies at, if any
-  double position = 0;   // arc length along `curve`, if there is one
-};
 
 // Seeds and their places, parallel.
 struct PlacedSeeds {

@@ -1,4 +1,4 @@
-#include "features/features.h"
+#include "bisector/features.h"
 
 #include <fmt/format.h>
 
@@ -6,19 +6,21 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/degenerate.h"
+#include "core/disjoint_sets.h"
+#include "core/geometry.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
 #include "mesh/topology.h"
 
 namespace bisector {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kDegree = kRadiansPerDegree;
 constexpr std::size_t kNoEdge = static_cast<std::size_t>(-1);
 
 // --- how the surface folds at its edges ---
@@ -26,13 +28,6 @@ constexpr std::size_t kNoEdge = static_cast<std::size_t>(-1);
 constexpr double kSeedAngle = 40 * kDegree;  // more can be a crease by itself
 constexpr double kSliverHeight = 1e-4;  // of the diagonal; roundings of a file may have turned thinner triangles
 constexpr double kSliverAspect = 0.02;  // height over longest edge
-
-double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 d = b - a;
-  const double length2 = norm2(d);
-  const double t = length2 > 0 ? std::clamp(dot(p - a, d) / length2, 0.0, 1.0) : 0.0;
-  return norm(p - (a + t * d));
-}
 
 // Angle between two directions that need not have unit length.
 double angle_between(const Vec3& a, const Vec3& b) {
@@ -131,7 +126,7 @@ class Folds {
   }
   double distance_to(const Vec3& p, std::size_t half_edge) const {
     const auto [a, b] = table.edges[edge_of_[half_edge]];
-    return distance_to_segment(p, point(a), point(b));
+    return norm(p - nearest_on_segment(p, point(a), point(b)));
   }
 
   // The largest turn of the normal about `axis` from a triangle to its neighbours, other than across `from`. What could
@@ -174,20 +169,6 @@ class Folds {
   std::vector<std::size_t> edge_of_;  // of each half-edge
   std::vector<Vec3> normals_;  // unit; zero: look through the triangle
 };
-
-// The edges of each vertex, ascending.
-Csr<std::size_t> edges_at_vertices(const std::vector<std::array<Index, 2>>& edges, std::size_t vertices) {
-  Csr<std::size_t> rows;
-  rows.offsets.assign(vertices + 1, 0);
-  for (const auto& e : edges)
-    for (const Index v : e) ++rows.offsets[v + 1];
-  std::partial_sum(rows.offsets.begin(), rows.offsets.end(), rows.offsets.begin());
-  rows.values.resize(2 * edges.size());
-  std::vector<std::size_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    for (const Index v : edges[e]) rows.values[next[v]++] = e;
-  return rows;
-}
 
 Index other_end(const std::array<Index, 2>& edge, Index v) { return edge[0] == v ? edge[1] : edge[0]; }
 
@@ -440,23 +421,15 @@ class GraphBuilder {
     const std::size_t* begin = at_vertex_.begin(v);
     const std::size_t* end = at_vertex_.end(v);
     const auto place = [&](std::size_t e) { return static_cast<std::size_t>(std::lower_bound(begin, end, e) - begin); };
-    std::vector<std::size_t> parent(at_vertex_.size(v));
-    std::iota(parent.begin(), parent.end(), std::size_t{0});
-    const auto root = [&](std::size_t i) {
-      while (parent[i] != i) i = parent[i] = parent[parent[i]];
-      return i;
-    };
-    std::size_t fans = parent.size();
+    std::size_t fans = at_vertex_.size(v);
+    DisjointSets linked(fans);
     for (const std::size_t* e = begin; e != end; ++e)
       for (const std::size_t* h = folds_.table.half_edges.begin(*e); h != folds_.table.half_edges.end(*e); ++h)
         for (std::size_t k = 3 * (*h / 3); k < 3 * (*h / 3) + 3; ++k) {
           const std::size_t other = folds_.edge_of(k);
           const Edge& ends = folds_.table.edges[other];
           if (other == *e || (ends[0] != v && ends[1] != v)) continue;
-          const std::size_t i = root(place(*e)), j = root(place(other));
-          if (i == j) continue;
-          parent[std::max(i, j)] = std::min(i, j);
-          --fans;
+          if (linked.join(place(*e), place(other))) --fans;
         }
     return fans > 1;
   }
@@ -625,7 +598,7 @@ FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& opt
   }
   const Folds folds(mesh.vertices, triangles);
   const EdgeTable& table = folds.table;
-  const Csr<std::size_t> at_vertex = edges_at_vertices(table.edges, mesh.vertices.size());
+  const Csr<std::size_t> at_vertex = items_at_vertices<std::size_t>(table.edges, mesh.vertices.size());
 
   std::vector<std::uint8_t> kinds(table.edges.size(), GraphBuilder::kPlain);
   const auto mark = [&](std::size_t e, FeatureKind kind) {

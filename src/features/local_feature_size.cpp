@@ -8,9 +8,10 @@
 #include <cmath>
 #include <utility>
 
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "mesh/degenerate.h"
 #include "spatial/hilbert.h"
 
 namespace bisector {

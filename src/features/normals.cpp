@@ -8,8 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
 #include "mesh/sampling.h"
 #include "mesh/topology.h"
 
@@ -20,7 +21,6 @@ namespace {
 constexpr std::size_t kSamples = 400;
 constexpr std::size_t kMostTriangles = 1000;  // looked at around one point
 constexpr double kFewest = 6;                 // triangles of equal area around a point that a fit can tell from noise
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kNoisy = 12;       // degrees
 constexpr double kAsRough = 0.7;    // of the roughness at twice the length
 
@@ -117,7 +117,7 @@ double normal_roughness(const TriangleMesh& mesh, double length) {
           const auto [t, turned] = reached[i];
           const auto [a, b, c] = mesh.triangles[t];
           const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
-          const Vec3 centre = (1.0 / 3) * (p + q + r), n = cross(q - p, r - p);
+          const Vec3 centre = (1.0 / 3) * (p + q + r), n = twice_area_normal(p, q, r);
           const double l = norm(n);
           if (i > 0 && norm(centre - origin) > length) continue;
           if (std::isnormal(l))
@@ -137,7 +137,7 @@ double normal_roughness(const TriangleMesh& mesh, double length) {
       16);
   const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
   std::nth_element(deviations.begin(), middle, deviations.end());
-  return *middle / kDegree;
+  return *middle / kRadiansPerDegree;
 }
 
 bool has_noisy_normals(const TriangleMesh& mesh, std::size_t vertices) {

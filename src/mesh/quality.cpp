@@ -1,4 +1,4 @@
-#include "mesh/quality.h"
+#include "bisector/quality.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,13 +6,12 @@
 #include <numbers>
 #include <utility>
 
-#include "mesh/degenerate.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 
 namespace bisector {
 
 namespace {
-
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 // Figures of one triangle that has an area.
 struct Shape {
@@ -25,7 +24,7 @@ Shape measure_shape(const std::array<Vec3, 3>& p, double area) {
   double half_perimeter = 0, longest = 0;
   for (int k = 0; k < 3; ++k) {
     const Vec3 u = p[(k + 1) % 3] - p[k], v = p[(k + 2) % 3] - p[k];
-    shape.theta[k] = std::atan2(2 * area, dot(u, v)) * kDegrees;
+    shape.theta[k] = std::atan2(2 * area, dot(u, v)) * kDegreesPerRadian;
     half_perimeter += 0.5 * norm(u);
     longest = std::max(longest, norm(u));
   }

@@ -2,21 +2,18 @@
 
 #include <algorithm>
 #include <limits>
-#include <numbers>
 #include <vector>
 
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "core/orientation.h"
 #include "core/parallel.h"
-#include "mesh/orientation.h"
 
 namespace bisector {
 
 namespace {
 
 constexpr int kEdges[6][4] = {{0, 1, 2, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 2, 0}, {2, 3, 0, 1}};
-
-double six_volumes(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  return dot(b - a, cross(c - a, d - a));
-}
 
 struct Shape {
   int sign;
@@ -25,7 +22,7 @@ struct Shape {
 };
 
 Shape measure_shape(const std::array<Vec3, 4>& p) {
-  Shape shape{orientation(p[0], p[1], p[2], p[3]), six_volumes(p[0], p[1], p[2], p[3]) / 6, 0, 0, 180, {}};
+  Shape shape{orientation(p[0], p[1], p[2], p[3]), rounded_six_volume(p[0], p[1], p[2], p[3]) / 6, 0, 0, 180, {}};
   if (shape.sign <= 0) return shape;
   shape.dihedral = dihedral_angles(p[0], p[1], p[2], p[3]);
   const auto [smallest, largest] = std::minmax_element(shape.dihedral.begin(), shape.dihedral.end());
@@ -56,13 +53,13 @@ void measure_edges(const TetMesh& mesh, TetQualityReport& report) {
 
 std::array<double, 6> dihedral_angles(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const std::array<Vec3, 4> p{a, b, c, d};
-  const double volume = std::abs(six_volumes(a, b, c, d));
+  const double volume = std::abs(rounded_six_volume(a, b, c, d));
   std::array<double, 6> angles{};
   for (std::size_t e = 0; e < 6; ++e) {
     const Vec3 u = p[kEdges[e][1]] - p[kEdges[e][0]];
     // The normals of both sides: their cross product is the edge times the volume.
     const Vec3 m = cross(u, p[kEdges[e][2]] - p[kEdges[e][0]]), n = cross(u, p[kEdges[e][3]] - p[kEdges[e][0]]);
-    angles[e] = std::atan2(norm(u) * volume, dot(m, n)) * (180 / std::numbers::pi);
+    angles[e] = std::atan2(norm(u) * volume, dot(m, n)) * kDegreesPerRadian;
   }
   return angles;
 }

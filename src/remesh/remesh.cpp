@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
 #include "compute/compute.h"
 #include "core/parallel.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
-#include "mesh/quality.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/prepare.h"
 #include "remesh/sheets.h"
