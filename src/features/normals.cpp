@@ -18,11 +18,13 @@ namespace bisector {
 
 namespace {
 
-constexpr std::size_t kSamples = 400;
-constexpr std::size_t kMostTriangles = 1000;  // looked at around one point
-constexpr double kFewest = 6;                 // triangles of equal area around a point that a fit can tell from noise
-constexpr double kNoisy = 12;       // degrees
-constexpr double kAsRough = 0.7;    // of the roughness at twice the length
+constexpr std::size_t kSamples = 400;         // points at which the roughness is measured
+constexpr std::size_t kMostTriangles = 1000;  // looked at around one point, which bounds the time on fine meshes
+// A linear fit has three unknowns for each coordinate of the normal: so many triangles of equal area must be there to tell noise
+// from what the surface bends.
+constexpr double kFewestTriangles = 6;
+constexpr double kNoisy = 12;     // degrees of roughness beyond which normals may be noise
+constexpr double kAsRough = 0.7;  // part of the roughness at twice the length that counts as equally rough
 
 // What the fit needs of a triangle.
 struct Patch {
@@ -58,10 +60,10 @@ double deviation(const std::vector<Patch>& patches, const Vec3& origin, double l
     squares += p.weight * p.weight;
   }
   const double count = squares > 0 ? sum * sum / squares : 0;
-  if (count < kFewest) return 0;
+  if (count < kFewestTriangles) return 0;
   const Vec3 axis = std::abs(mean.x) < std::abs(mean.y) ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
   Vec3 u = cross(mean, axis);
-  if (!(norm(u) > 0)) return std::numbers::pi / 2;  // normals cancel
+  if (!(norm(u) > 0)) return std::numbers::pi / 2;  // the normals cancel each other out
   u *= 1 / norm(u);
   Vec3 v = cross(mean, u);
   v *= 1 / norm(v);

@@ -8,6 +8,7 @@
 #include "core/disjoint_sets.h"
 #include "core/parallel.h"
 #include "mesh/tet_adjacency.h"
+#include "mesh/topology.h"
 
 namespace bisector {
 
