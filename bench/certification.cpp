@@ -16,9 +16,11 @@
 #include <utility>
 #include <vector>
 
-#include "bisector/error.h"
 #include "backend/cpu_backend.h"
-#include "io/mesh_io.h"
+#include "bisector/error.h"
+#include "bisector/io.h"
+#include "core/geometry.h"
+#include "io/files.h"
 #include "common.h"
 
 namespace {

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/io.h"
+#include "compute/compute.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "compute/compute.h"
-#include "io/mesh_io.h"
-#include "io/tet_io.h"
+#include "io/files.h"
 #include "tetmesh/check_surface.h"
 #include "tetmesh/tetgen.h"
 #include "common.h"

@@ -13,10 +13,12 @@
 #include <string>
 #include <vector>
 
-#include "bisector/error.h"
-#include "core/parallel.h"
-#include "io/mesh_io.h"
 #include "backend/backend.h"
+#include "bisector/error.h"
+#include "bisector/io.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+#include "io/files.h"
 #include "voronoi/restricted.h"
 #include "common.h"
 #include "delaunay_time.h"

@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "bisector/features.h"
 #include "core/geometry.h"
-#include "features/features.h"
 
 namespace bisector::bench {
 

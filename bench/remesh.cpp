@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
 #include "core/parallel.h"
-#include "mesh/distance.h"
-#include "io/mesh_io.h"
-#include "mesh/quality.h"
+#include "io/files.h"
 #include "remesh/remesh.h"
 #include "common.h"
 #include "delaunay_time.h"

@@ -14,10 +14,12 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "mesh/distance.h"
-#include "io/mesh_io.h"
+#include "io/files.h"
 #include "segment/proxy.h"
 #include "segment/quadric_fit.h"
 #include "segment/segment.h"

@@ -11,9 +11,8 @@
 
 #include "bisector/error.h"
 #include "core/parallel.h"
-#include "mesh/distance.h"
-#include "io/mesh_io.h"
-#include "mesh/quality.h"
+#include "bisector/quality.h"
+#include "bisector/io.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 #include "remesh/remesh.h"

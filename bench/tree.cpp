@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "bisector/io.h"
 #include "core/parallel.h"
-#include "io/mesh_io.h"
 #include "tree/tree.h"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "io/mesh_io.h"
+#include "bisector/io.h"
 #include "voronoi/restricted.h"
 
 namespace bisector::cli {

@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "bisector/quality.h"
 #include "core/geometry.h"
-#include "mesh/distance.h"
-#include "mesh/quality.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 #include "remesh/remesh.h"

@@ -39,7 +39,7 @@ Vec3 perpendicular(const Vec3& n);
 inline Vec3 twice_area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(b - a, c - a); }
 
 // Six times the signed volume of the tetrahedron (a, b, c, d), rounded: positive as orientation() says.
-inline double six_rounded_volumes(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+inline double rounded_six_volume(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   return dot(b - a, cross(c - a, d - a));
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "core/geometry.h"
 #include "mesh/sampling.h"
 #include "mesh/topology.h"
 #include "voronoi/dual.h"

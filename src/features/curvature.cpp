@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "core/degenerate.h"
+#include "core/geometry.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -63,7 +65,7 @@ Walk prepare(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& 
     walk.areas[t] = triangle_area(a, b, c);
     flat[t] = !(walk.areas[t] > kFlat * std::max({norm2(b - a), norm2(c - b), norm2(a - c)}));
     if (flat[t]) return;
-    const Vec3 normal = cross(b - a, c - a);
+    const Vec3 normal = twice_area_normal(a, b, c);
     walk.normals[t] = (1 / norm(normal)) * normal;
   });
 
@@ -159,10 +161,7 @@ struct Curvature {
 
 // The measure's tensor has the curvature across a direction as its value along it.
 Curvature decompose(const Vec3& normal, const std::array<double, 6>& t) {
-  const Vec3 axis = std::abs(normal.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-  Vec3 u = cross(normal, axis);
-  u *= 1 / norm(u);
-  const Vec3 w = cross(normal, u);
+  const Vec3 u = perpendicular(normal), w = cross(normal, u);
   const auto product = [&](const Vec3& a, const Vec3& b) {
     return a.x * (t[0] * b.x + t[1] * b.y + t[2] * b.z) + a.y * (t[1] * b.x + t[3] * b.y + t[4] * b.z) +
            a.z * (t[2] * b.x + t[4] * b.y + t[5] * b.z);
@@ -252,16 +251,7 @@ PrincipalCurvatures principal_curvatures(const TriangleMesh& mesh, const std::ve
   std::sort(barred.begin(), barred.end());
   const Walk walk = prepare(mesh, barred, scale);
 
-  Csr<Index> around;
-  around.offsets.assign(n + 1, 0);
-  for (const Triangle& t : mesh.triangles)
-    for (const Index v : t) ++around.offsets[v + 1];
-  for (std::size_t v = 0; v < n; ++v) around.offsets[v + 1] += around.offsets[v];
-  around.values.resize(3 * mesh.triangles.size());
-  std::vector<std::size_t> slot(around.offsets.begin(), around.offsets.end() - 1);
-  for (Index t = 0; t < mesh.triangles.size(); ++t)
-    for (const Index v : mesh.triangles[t]) around.values[slot[v]++] = t;
-
+  const Csr<Index> around = items_at_vertices<Index>(mesh.triangles, n);
   ThreadLocal<Visited> visits;
   parallel_each(n, [&](std::size_t v) {
     double area = 0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry.h"
+
 namespace bisector {
 
 FeatureCurves::FeatureCurves(const FeatureGraph& graph, const std::vector<Vec3>& vertices) : graph_(graph) {
@@ -47,9 +49,7 @@ Vec3 FeatureCurves::point(Index curve, double position) const {
 
 Vec3 FeatureCurves::tangent(Index curve, double position) const {
   const std::size_t k = segment_at(curve, position);
-  const Vec3 along = points_[curve][k + 1] - points_[curve][k];
-  const double length = norm(along);
-  return length > 0 ? (1 / length) * along : Vec3{};
+  return unit(points_[curve][k + 1] - points_[curve][k]);
 }
 
 double FeatureCurves::nearest(Index curve, const Vec3& p, double from, double reach) const {
@@ -58,8 +58,9 @@ double FeatureCurves::nearest(Index curve, const Vec3& p, double from, double re
   const double whole = length(curve);
   const std::size_t count = segments(curve), first = segment_at(curve, from);
   double best = norm2(point(curve, from) - p), position = from;
-  // Of segment k, the part at most `reach` away from `from`, `shift` being a lap of a closed curve.
-  const auto look = [&](std::size_t k, double shift) {
+  // Looks for a nearer point on the part of segment k that is at most `reach` away from `from`; `shift` is the length of the
+  // curve, or its negative, where the way there leads across the start of a closed curve.
+  const auto try_segment = [&](std::size_t k, double shift) {
     const double length_k = starts[k + 1] - starts[k];
     if (!(length_k > 0)) return;
     const Vec3 along = points[k + 1] - points[k];
@@ -74,20 +75,20 @@ double FeatureCurves::nearest(Index curve, const Vec3& p, double from, double re
     }
   };
   const bool loop = closed(curve);
-  look(first, 0);
+  try_segment(first, 0);
   for (std::size_t step = 1; step < count; ++step) {
     if (!loop && first + step >= count) break;
     const std::size_t k = (first + step) % count;
     const double shift = first + step >= count ? whole : 0;
     if (starts[k] + shift > from + reach) break;
-    look(k, shift);
+    try_segment(k, shift);
   }
   for (std::size_t step = 1; step < count; ++step) {
     if (!loop && step > first) break;
     const std::size_t k = step > first ? first + count - step : first - step;
     const double shift = step > first ? -whole : 0;
     if (starts[k + 1] + shift < from - reach) break;
-    look(k, shift);
+    try_segment(k, shift);
   }
   return position;
 }

@@ -1,13 +1,16 @@
 // Feature curves as places for seeds: points by arc length, tangents, nearest points (thesis 4.4.3, equation 4.8).
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <vector>
 
 #include "core/geometry.h"
-#include "features/features.h"
+#include "bisector/features.h"
 
 namespace bisector {
 
+<<<<<<< HEAD
 // Where a seed may be.
 struct SeedPlace {
   enum class Kind : unsigned char {
@@ -20,8 +23,12 @@ struct SeedPlace {
   Index curve = kNone;   // the feature curve it lies on, if one alone
   Index corner = kNone;  // index in FeatureGraph::corners of the corner it lies at, if any
   double position = 0;   // arc length along `curve`, if there is one
-};
-
+=======
+// Seeds and their places, parallel.
+struct PlacedSeeds {
+  std::vector<Vec3> seeds;
+  std::vector<SeedPlace> places;
+>>>>>>> base
 class FeatureCurves {
  public:
   FeatureCurves() = default;

@@ -4,8 +4,8 @@
 #include <array>
 #include <vector>
 
+#include "bisector/features.h"
 #include "core/geometry.h"
-#include "features/features.h"
 
 namespace bisector {
 

@@ -1,4 +1,4 @@
-#include "features/features.h"
+#include "bisector/features.h"
 
 #include <fmt/format.h>
 
@@ -6,33 +6,32 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/degenerate.h"
+#include "core/disjoint_sets.h"
+#include "core/geometry.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
 #include "mesh/topology.h"
 
 namespace bisector {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::size_t kNoEdge = static_cast<std::size_t>(-1);
 
 // --- how the surface folds at its edges ---
 
-constexpr double kSeedAngle = 40 * kDegree;  // more can be a crease by itself
-constexpr double kSliverHeight = 1e-4;  // of the diagonal; roundings of a file may have turned thinner triangles
-constexpr double kSliverAspect = 0.02;  // height over longest edge
-
-double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 d = b - a;
-  const double length2 = norm2(d);
-  const double t = length2 > 0 ? std::clamp(dot(p - a, d) / length2, 0.0, 1.0) : 0.0;
-  return norm(p - (a + t * d));
-}
+// An edge of a larger dihedral deviation may be a crease without the support of others, in radians.
+constexpr double kSeedAngle = 40 * kRadiansPerDegree;
+// A triangle with both a height below the first, in diagonals of the bounding box, and a height over longest edge below the
+// second has no normal of its own: the rounding of a file's coordinates may have turned it.
+constexpr double kSliverHeight = 1e-4;
+constexpr double kSliverAspect = 0.02;
+// Triangles without normal that are looked through, one after the other, before the search for a normal is given up.
+constexpr std::size_t kMostSteps = 64;
 
 // Angle between two directions that need not have unit length.
 double angle_between(const Vec3& a, const Vec3& b) {
@@ -131,11 +130,11 @@ class Folds {
   }
   double distance_to(const Vec3& p, std::size_t half_edge) const {
     const auto [a, b] = table.edges[edge_of_[half_edge]];
-    return distance_to_segment(p, point(a), point(b));
+    return norm(p - nearest_on_segment(p, point(a), point(b)));
   }
 
-  // The largest turn of the normal about `axis` from a triangle to its neighbours, other than across `from`. What could
-  // be another crease is not counted: small polyhedra have nothing else.
+  // The largest turn of the normal about `axis` from a triangle to its neighbours, other than across `from`. Edges that may
+  // be creases themselves are not counted: small polyhedra have no others.
   double bend_beside(std::size_t triangle, std::size_t from, const Vec3& axis) const {
     double largest = 0;
     for (std::size_t h = 3 * triangle; h < 3 * triangle + 3; ++h) {
@@ -158,7 +157,7 @@ class Folds {
     const std::size_t from = good0 ? h[0] : h[1];
     const Side side = cross_edge(from);
     if (side.triangle == kNoEdge || side.triangle == from / 3) return;
-    // Of the edges around triangles without normal the shorter ones follow the fold, not the longer ones as well.
+    // A sliver lies in the fold: both its long edges see the same two normals, and only the shorter one is taken.
     if (side.edge != e && std::pair(length(e), e) > std::pair(length(side.edge), side.edge)) return;
     const Vec3 n = normals_[from / 3], m = side.flipped ? -normals_[side.triangle] : normals_[side.triangle];
     angle[e] = angle_between(n, m);
@@ -169,25 +168,9 @@ class Folds {
                          bend_beside(side.triangle, side.edge, (1 / l) * along));
   }
 
-  static constexpr std::size_t kMostSteps = 64;
-
   std::vector<std::size_t> edge_of_;  // of each half-edge
   std::vector<Vec3> normals_;  // unit; zero: look through the triangle
 };
-
-// The edges of each vertex, ascending.
-Csr<std::size_t> edges_at_vertices(const std::vector<std::array<Index, 2>>& edges, std::size_t vertices) {
-  Csr<std::size_t> rows;
-  rows.offsets.assign(vertices + 1, 0);
-  for (const auto& e : edges)
-    for (const Index v : e) ++rows.offsets[v + 1];
-  std::partial_sum(rows.offsets.begin(), rows.offsets.end(), rows.offsets.begin());
-  rows.values.resize(2 * edges.size());
-  std::vector<std::size_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    for (const Index v : edges[e]) rows.values[next[v]++] = e;
-  return rows;
-}
 
 Index other_end(const std::array<Index, 2>& edge, Index v) { return edge[0] == v ? edge[1] : edge[0]; }
 
@@ -195,22 +178,32 @@ using Edge = std::array<Index, 2>;
 
 // --- creases of mode automatic ---
 
-constexpr double kSeedBend = 0.5;  // of the surface beside an edge, of the edge's angle
-constexpr double kTailAngle = 10 * kDegree;
-constexpr double kTailBend = 0.8;
-constexpr double kTailFall = 0.3;  // angle of an edge, of that of the edge before
-constexpr double kEven = 0.8;      // the same where a crease goes on whatever is beside it
-constexpr double kTailTurn = 40 * kDegree;
-constexpr double kPlainFold = 30 * kDegree;  // a chain's mean angle has to exceed this ...
-constexpr double kDisorderWeight = 5;        // ... by this times its disorder
-constexpr std::size_t kEnough = 12;          // inner vertices that tell whether a chain is folded evenly
-constexpr double kLeastDisorder = 0.4;       // of a chain that is folded evenly, of that around it
-constexpr double kShortest = 5;              // least length of what is joined to nothing, in edges around it ...
-constexpr double kRoom = 0.02;                   // area beside what is joined to nothing, of its extent squared ...
-constexpr std::size_t kFewEdges = 60;            // ... if it has fewer edges than this
-constexpr std::size_t kManyTriangles = 500;      // beside it, are room enough
-constexpr double kFlat = 0.1 * kDegree;          // its disorder, if it is of the faces of a plate or a bar, however thin
-constexpr std::size_t kManyEdges = 12;       // ... unless it has as many edges as this
+// A seed's surface bends beside the edge by less than this part of the edge's angle.
+constexpr double kSeedBend = 0.5;
+
+// A chain of creases is continued by an edge
+constexpr double kTailAngle = 10 * kRadiansPerDegree;  // whose angle, in radians, is at least this
+constexpr double kTailFall = 0.3;                      // and at least this part of the angle of the edge before,
+constexpr double kTailTurn = 40 * kRadiansPerDegree;   // which turns from that edge by less than this, in radians,
+constexpr double kTailBend = 0.8;  // and beside which the surface bends by at most this part of the edge's angle;
+constexpr double kEven = 0.8;      // that is not asked of an edge of more than this part of the angle of the edge before.
+
+// Connected creases are kept if their mean angle exceeds the first (radians) by the second times their disorder.
+constexpr double kPlainFold = 30 * kRadiansPerDegree;
+constexpr double kDisorderWeight = 5;
+// So many inner vertices tell whether a chain is folded evenly; its disorder is then at least this part of that around it.
+constexpr std::size_t kEnoughVertices = 12;
+constexpr double kLeastDisorder = 0.4;
+
+// Creases that touch no other feature must be as long as so many mean edges around them, unless they have many edges, ...
+constexpr double kLeastLength = 5;
+constexpr std::size_t kManyEdges = 12;
+// ... and those of few edges need area beside them, in squares of their extent, unless so many triangles are there or the
+// surface around them is flat (radians): the faces of a plate or a bar may be thin.
+constexpr std::size_t kFewEdges = 60;
+constexpr double kLeastArea = 0.02;
+constexpr std::size_t kManyTriangles = 500;
+constexpr double kFlat = 0.1 * kRadiansPerDegree;
 
 class CreaseFinder {
  public:
@@ -275,9 +268,9 @@ class CreaseFinder {
     }
   }
 
-  // Whether most of the chain has room on both sides: a part of the surface that is not cut off by the chain itself, as slivers
-  // are that noise has folded.
-  bool has_room(const std::vector<std::size_t>& component, const std::vector<Index>& vertices, double length) const {
+  // Whether most of the crease parts areas that matter. Noise folds single triangles over, and the creases around these cut
+  // off next to nothing.
+  bool parts_large_areas(const std::vector<std::size_t>& component, const std::vector<Index>& vertices, double length) const {
     const auto farthest = [&](Index from) {
       return *std::max_element(vertices.begin(), vertices.end(), [&](Index a, Index b) {
         return norm2(folds_.point(a) - folds_.point(from)) < norm2(folds_.point(b) - folds_.point(from));
@@ -288,18 +281,19 @@ class CreaseFinder {
     double narrow = 0;
     for (const std::size_t e : component)
       for (const std::size_t* h = folds_.table.half_edges.begin(e); h != folds_.table.half_edges.end(e); ++h)
-        if (!reaches(*h / 3, 1 / extent)) {
+        if (!reaches_large_area(*h / 3, 1 / extent)) {
           narrow += folds_.length(e);
           break;
         }
     return narrow < 0.5 * length;
   }
 
-  // Whether the triangles that are reached from one without crossing creases have the area, with lengths multiplied by `scale`.
-  bool reaches(std::size_t triangle, double scale) const {
+  // Whether the triangles that are reached from one without crossing creases make a large area, with lengths multiplied by
+  // `scale`.
+  bool reaches_large_area(std::size_t triangle, double scale) const {
     std::vector<std::size_t> part{triangle};
     double area = 0;
-    for (std::size_t i = 0; i < part.size() && area < kRoom; ++i) {
+    for (std::size_t i = 0; i < part.size() && area < kLeastArea; ++i) {
       area += folds_.area(part[i], scale);
       for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t e = folds_.edge_of(3 * part[i] + k);
@@ -309,11 +303,46 @@ class CreaseFinder {
       }
       if (part.size() > kManyTriangles) return true;
     }
-    return area >= kRoom;
+    return area >= kLeastArea;
   }
 
-  // Creases of a part are folded evenly along their way, or between faces that are hardly folded; ridges of a scan are
-  // neither, and the disorder is the smaller of the two.
+  // What surrounds connected creases.
+  struct Surroundings {
+    bool attached = false;        // a vertex is on a feature of another kind
+    std::vector<double> angles;   // of the other edges at the vertices, radians
+    double edge_length_sum = 0;   // of all edges at the vertices, once for each
+    std::size_t edge_count = 0;
+    double change_sum = 0;        // of the angle, over the vertices where just two edges of the creases meet, radians
+    std::size_t inner_count = 0;  // of those vertices
+  };
+  Surroundings look_around(const std::vector<Index>& vertices) const {
+    Surroundings s;
+    for (const Index v : vertices) {
+      std::vector<std::size_t> own;
+      for (const std::size_t* e = at_vertex_.begin(v); e != at_vertex_.end(v); ++e) {
+        if (crease_[*e]) own.push_back(*e);
+        else if (folds_.beside[*e][0] != kNone) s.angles.push_back(folds_.angle[*e]);
+        s.edge_length_sum += folds_.length(*e);
+        ++s.edge_count;
+      }
+      s.attached |= anchored_[v] != 0;
+      if (own.size() != 2) continue;
+      s.change_sum += std::abs(folds_.angle[own[0]] - folds_.angle[own[1]]);
+      ++s.inner_count;
+    }
+    return s;
+  }
+
+  // The lower median; 0 of nothing.
+  static double median(std::vector<double> values) {
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+
+  // Creases of machined parts have about the same angle all along, or lie between faces that are hardly folded. Ridges of a
+  // scan have neither, so that the smaller of both measures of disorder tells them apart.
   bool is_sound(const std::vector<std::size_t>& component) const {
     std::vector<Index> vertices;
     double length = 0, fold = 0;
@@ -325,36 +354,16 @@ class CreaseFinder {
     std::sort(vertices.begin(), vertices.end());
     vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
 
-    std::vector<double> around;
-    double around_length = 0, change = 0;
-    std::size_t around_count = 0, inner = 0;
-    bool attached = false;
-    for (const Index v : vertices) {
-      std::vector<std::size_t> own;
-      for (const std::size_t* e = at_vertex_.begin(v); e != at_vertex_.end(v); ++e) {
-        if (crease_[*e]) own.push_back(*e);
-        else if (folds_.beside[*e][0] != kNone) around.push_back(folds_.angle[*e]);
-        around_length += folds_.length(*e);
-        ++around_count;
-      }
-      attached |= anchored_[v] != 0;
-      if (own.size() != 2) continue;
-      change += std::abs(folds_.angle[own[0]] - folds_.angle[own[1]]);
-      ++inner;
-    }
-    if (!attached && component.size() < kManyEdges &&
-        length * static_cast<double>(around_count) < kShortest * around_length)
+    const Surroundings around = look_around(vertices);
+    if (!around.attached && component.size() < kManyEdges &&
+        length * static_cast<double>(around.edge_count) < kLeastLength * around.edge_length_sum)
       return false;
-    double disorder = 0;
-    if (!around.empty()) {
-      const auto middle = around.begin() + static_cast<std::ptrdiff_t>((around.size() - 1) / 2);
-      std::nth_element(around.begin(), middle, around.end());
-      disorder = *middle;
-    }
-    if (!attached && component.size() < kFewEdges && disorder > kFlat && !has_room(component, vertices, length))
+    double disorder = median(around.angles);
+    if (!around.attached && component.size() < kFewEdges && disorder > kFlat &&
+        !parts_large_areas(component, vertices, length))
       return false;
-    if (inner >= kEnough)
-      disorder = std::clamp(change / static_cast<double>(inner), kLeastDisorder * disorder, disorder);
+    if (around.inner_count >= kEnoughVertices)
+      disorder = std::clamp(around.change_sum / static_cast<double>(around.inner_count), kLeastDisorder * disorder, disorder);
     return fold > length * (kPlainFold + kDisorderWeight * disorder);
   }
 
@@ -366,12 +375,16 @@ class CreaseFinder {
 
 // --- corners ---
 
-constexpr double kTiny = 0.2;                    // of the longest of the feature edges near by
-constexpr int kNearBy = 3;                       // feature edges to either side
-constexpr double kOwnTurn = 0.7;                 // of the two edges at a corner, of the least turn
-constexpr double kTipDeficit = 54 * kDegree;     // of the angles around a tip, from a full turn
-constexpr double kTipContrast = 0.25;            // the same at the vertices around it, of its own
-constexpr double kTipFold = 15 * kDegree;        // of the surface around it, along its rays
+// Edges are tiny if they are shorter than this part of the longest of so many feature edges to either side.
+constexpr double kTiny = 0.2;
+constexpr int kNearBy = 3;
+// The two edges at a corner themselves turn by at least this part of the corner angle.
+constexpr double kOwnTurn = 0.7;
+// The angles around a cone's tip are short of a full turn by more than the first (radians), those around its neighbours by less
+// than the given part of that, and the surface folds by less than the last (radians) at the edges opposite the tip.
+constexpr double kTipDeficit = 54 * kRadiansPerDegree;
+constexpr double kTipContrast = 0.25;
+constexpr double kTipFold = 15 * kRadiansPerDegree;
 
 class GraphBuilder {
  public:
@@ -440,23 +453,15 @@ class GraphBuilder {
     const std::size_t* begin = at_vertex_.begin(v);
     const std::size_t* end = at_vertex_.end(v);
     const auto place = [&](std::size_t e) { return static_cast<std::size_t>(std::lower_bound(begin, end, e) - begin); };
-    std::vector<std::size_t> parent(at_vertex_.size(v));
-    std::iota(parent.begin(), parent.end(), std::size_t{0});
-    const auto root = [&](std::size_t i) {
-      while (parent[i] != i) i = parent[i] = parent[parent[i]];
-      return i;
-    };
-    std::size_t fans = parent.size();
+    std::size_t fans = at_vertex_.size(v);
+    DisjointSets linked(fans);
     for (const std::size_t* e = begin; e != end; ++e)
       for (const std::size_t* h = folds_.table.half_edges.begin(*e); h != folds_.table.half_edges.end(*e); ++h)
         for (std::size_t k = 3 * (*h / 3); k < 3 * (*h / 3) + 3; ++k) {
           const std::size_t other = folds_.edge_of(k);
           const Edge& ends = folds_.table.edges[other];
           if (other == *e || (ends[0] != v && ends[1] != v)) continue;
-          const std::size_t i = root(place(*e)), j = root(place(other));
-          if (i == j) continue;
-          parent[std::max(i, j)] = std::min(i, j);
-          --fans;
+          if (linked.join(place(*e), place(other))) --fans;
         }
     return fans > 1;
   }
@@ -503,7 +508,7 @@ class GraphBuilder {
     return p;
   }
 
-  // Across what is tiny; 0 where the two edges alone hardly turn.
+  // The turn of a curve at v, measured across tiny edges; 0 where the two edges at v hardly turn.
   double turn_at(Index v, const Pair& pair) const {
     const auto turn = [&](double reach) {
       const Vec3 p = folds_.point(v);
@@ -512,7 +517,7 @@ class GraphBuilder {
     return turn(0) > kOwnTurn * corner_angle_ ? turn(tiny_at(v, pair)) : 0;
   }
 
-  // Of the sharp turns that tiny edges part, the sharpest is a corner.
+  // Where only tiny edges lie between sharp turns, the sharpest of them is a corner.
   void keep_sharpest_turns() {
     std::vector<Index> sharp;
     for (std::size_t v = 0; v < turn_.size(); ++v)
@@ -533,7 +538,8 @@ class GraphBuilder {
       if (wins[i]) corner_[sharp[i]] = 1;
   }
 
-  // Tips of cones: angles are missing around them and hardly at their neighbours, and the surface runs straight on.
+  // Marks the tips of cones: the angles around a tip are far short of a full turn, those around its neighbours are not, and
+  // the surface goes on smoothly from the triangles at the tip.
   void find_tips(const std::vector<Triangle>& triangles) {
     std::vector<double> deficit(at_vertex_.rows(), 2 * std::numbers::pi);
     for (const Triangle& t : triangles)
@@ -611,22 +617,10 @@ void mark_given(const std::vector<Edge>& edges, const EdgeTable& table, std::vec
   }
 }
 
-}  // namespace
-
-FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& options) {
-  check(mesh, options);
-  std::vector<Triangle> triangles;
-  std::vector<std::int32_t> labels;
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const Triangle& t = mesh.triangles[i];
-    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-    triangles.push_back(t);
-    if (!mesh.labels.empty()) labels.push_back(mesh.labels[i]);
-  }
-  const Folds folds(mesh.vertices, triangles);
+// A FeatureKind for each edge, or GraphBuilder::kPlain. `labels` are those of the triangles of `folds`, or none.
+std::vector<std::uint8_t> classify_edges(const TriangleMesh& mesh, const FeatureOptions& options, const Folds& folds,
+                                         const std::vector<std::int32_t>& labels, const Csr<std::size_t>& at_vertex) {
   const EdgeTable& table = folds.table;
-  const Csr<std::size_t> at_vertex = edges_at_vertices(table.edges, mesh.vertices.size());
-
   std::vector<std::uint8_t> kinds(table.edges.size(), GraphBuilder::kPlain);
   const auto mark = [&](std::size_t e, FeatureKind kind) {
     kinds[e] = std::min(kinds[e], static_cast<std::uint8_t>(kind));
@@ -644,7 +638,7 @@ FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& opt
   }
   if (options.mode == FeatureMode::degrees) {
     for (std::size_t e = 0; e < kinds.size(); ++e)
-      if (folds.angle[e] > options.angle * kDegree) mark(e, FeatureKind::crease);
+      if (folds.angle[e] > options.angle * kRadiansPerDegree) mark(e, FeatureKind::crease);
   } else if (options.mode == FeatureMode::automatic) {
     std::vector<char> anchored(mesh.vertices.size(), 0);
     for (std::size_t e = 0; e < kinds.size(); ++e)
@@ -654,7 +648,25 @@ FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& opt
     for (std::size_t e = 0; e < kinds.size(); ++e)
       if (crease[e]) mark(e, FeatureKind::crease);
   }
-  return GraphBuilder(folds, at_vertex, kinds, labels, options.corner_angle * kDegree)
+  return kinds;
+}
+
+}  // namespace
+
+FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& options) {
+  check(mesh, options);
+  std::vector<Triangle> triangles;  // of three corners
+  std::vector<std::int32_t> labels;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const Triangle& t = mesh.triangles[i];
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    triangles.push_back(t);
+    if (!mesh.labels.empty()) labels.push_back(mesh.labels[i]);
+  }
+  const Folds folds(mesh.vertices, triangles);
+  const Csr<std::size_t> at_vertex = items_at_vertices<std::size_t>(folds.table.edges, mesh.vertices.size());
+  const std::vector<std::uint8_t> kinds = classify_edges(mesh, options, folds, labels, at_vertex);
+  return GraphBuilder(folds, at_vertex, kinds, labels, options.corner_angle * kRadiansPerDegree)
       .build(triangles, options.mode != FeatureMode::none);
 }
 

@@ -8,9 +8,10 @@
 #include <cmath>
 #include <utility>
 
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "mesh/degenerate.h"
 #include "spatial/hilbert.h"
 
 namespace bisector {
@@ -25,6 +26,8 @@ constexpr double kSeparation = 0.5;  // cosine of the smallest angle between the
 constexpr double kTangent = 0.5;     // cosine of the largest angle between normal and radius where a sphere touches
 constexpr double kFar = 4;           // diagonals of the box; beyond it a Voronoi vertex counts as infinitely far
 constexpr double kFlat = 1e-10;      // area by squared longest edge below which a triangle has no normal
+// Steps of the sequence in the plane: powers of the reciprocal of the plastic number, which solves x^3 = x + 1.
+constexpr double kStepX = 0.7548776662466927, kStepY = 0.5698402909980532;
 
 struct Samples {
   std::vector<Vec3> points, normals;
@@ -50,7 +53,7 @@ Samples sample(const std::vector<Vec3>& vertices, const std::vector<Triangle>& t
     }
 
   Samples samples;
-  // Of equilateral triangles with half of the points.
+  // The edge length of equilateral triangles whose vertices are the half of the points that is spread by area.
   samples.spacing = std::sqrt(4 / std::sqrt(3.0) * total / static_cast<double>(count));
   double share = 0;
   std::size_t next = 0;
@@ -68,8 +71,8 @@ Samples sample(const std::vector<Vec3>& vertices, const std::vector<Triangle>& t
       const bool fold = x + y > 1;
       samples.points.push_back(a + (fold ? 1 - x : x) * u + (fold ? 1 - y : y) * v);
       samples.normals.push_back(normal);
-      x += 0.7548776662466927;
-      y += 0.5698402909980532;
+      x += kStepX;
+      y += kStepY;
       x -= std::floor(x);
       y -= std::floor(y);
     }

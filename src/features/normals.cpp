@@ -8,8 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
 #include "mesh/sampling.h"
 #include "mesh/topology.h"
 
@@ -17,12 +18,13 @@ namespace bisector {
 
 namespace {
 
-constexpr std::size_t kSamples = 400;
-constexpr std::size_t kMostTriangles = 1000;  // looked at around one point
-constexpr double kFewest = 6;                 // triangles of equal area around a point that a fit can tell from noise
-constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kNoisy = 12;       // degrees
-constexpr double kAsRough = 0.7;    // of the roughness at twice the length
+constexpr std::size_t kSamples = 400;         // points at which the roughness is measured
+constexpr std::size_t kMostTriangles = 1000;  // looked at around one point, which bounds the time on fine meshes
+// A linear fit has three unknowns for each coordinate of the normal: so many triangles of equal area must be there to tell noise
+// from what the surface bends.
+constexpr double kFewestTriangles = 6;
+constexpr double kNoisy = 12;     // degrees of roughness beyond which normals may be noise
+constexpr double kAsRough = 0.7;  // part of the roughness at twice the length that counts as equally rough
 
 // What the fit needs of a triangle.
 struct Patch {
@@ -58,10 +60,10 @@ double deviation(const std::vector<Patch>& patches, const Vec3& origin, double l
     squares += p.weight * p.weight;
   }
   const double count = squares > 0 ? sum * sum / squares : 0;
-  if (count < kFewest) return 0;
+  if (count < kFewestTriangles) return 0;
   const Vec3 axis = std::abs(mean.x) < std::abs(mean.y) ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
   Vec3 u = cross(mean, axis);
-  if (!(norm(u) > 0)) return std::numbers::pi / 2;  // normals cancel
+  if (!(norm(u) > 0)) return std::numbers::pi / 2;  // the normals cancel each other out
   u *= 1 / norm(u);
   Vec3 v = cross(mean, u);
   v *= 1 / norm(v);
@@ -117,7 +119,7 @@ double normal_roughness(const TriangleMesh& mesh, double length) {
           const auto [t, turned] = reached[i];
           const auto [a, b, c] = mesh.triangles[t];
           const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
-          const Vec3 centre = (1.0 / 3) * (p + q + r), n = cross(q - p, r - p);
+          const Vec3 centre = (1.0 / 3) * (p + q + r), n = twice_area_normal(p, q, r);
           const double l = norm(n);
           if (i > 0 && norm(centre - origin) > length) continue;
           if (std::isnormal(l))
@@ -137,7 +139,7 @@ double normal_roughness(const TriangleMesh& mesh, double length) {
       16);
   const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
   std::nth_element(deviations.begin(), middle, deviations.end());
-  return *middle / kDegree;
+  return *middle / kRadiansPerDegree;
 }
 
 bool has_noisy_normals(const TriangleMesh& mesh, std::size_t vertices) {

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "core/grouping.h"
 #include "io/tet_formats.h"
 
 namespace bisector::io {
@@ -375,16 +376,7 @@ Entities group_by_mark(std::size_t n, const std::vector<std::int32_t>& marks) {
 // Chains of edges between vertices where not exactly two meet; closed ones start at their lowest vertex.
 std::vector<std::vector<Index>> chain_edges(const std::vector<std::array<Index, 2>>& edges, std::size_t vertex_count,
                                             std::vector<Index>& ends) {
-  Csr<std::size_t> around;
-  around.offsets.assign(vertex_count + 1, 0);
-  for (const auto& e : edges)
-    for (const Index v : e) ++around.offsets[v + 1];
-  std::partial_sum(around.offsets.begin(), around.offsets.end(), around.offsets.begin());
-  around.values.resize(2 * edges.size());
-  std::vector<std::size_t> slot(around.offsets.begin(), around.offsets.end() - 1);
-  for (std::size_t i = 0; i < edges.size(); ++i)
-    for (const Index v : edges[i]) around.values[slot[v]++] = i;
-
+  const Csr<std::size_t> around = items_at_vertices<std::size_t>(edges, vertex_count);
   std::vector<std::vector<Index>> chains;
   std::vector<char> used(edges.size(), 0);
   const auto follow = [&](Index from, std::size_t edge) {

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "bisector/io.h"
 #include "core/geometry.h"
-#include "io/mesh_io.h"
 
 namespace bisector::io {
 

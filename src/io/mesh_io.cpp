@@ -1,4 +1,4 @@
-#include "io/mesh_io.h"
+#include "bisector/io.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -19,7 +19,8 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "mesh/degenerate.h"
+#include "core/degenerate.h"
+#include "io/files.h"
 #include "io/mesh_formats.h"
 #include "io/text.h"
 #include "mesh/polygon.h"

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "bisector/io.h"
 #include "io/bytes.h"
 #include "io/mesh_formats.h"
 #include "io/text.h"

@@ -166,7 +166,7 @@ std::string format_stl(const std::string& path, const TriangleMesh& mesh) {
           fail(path, fmt::format("vertex {}: a coordinate is beyond STL's range; write OFF, OBJ or PLY", t[i]));
         rounded[i][k] = static_cast<float>(x);
       }
-    const Vec3 normal = cross(rounded[1] - rounded[0], rounded[2] - rounded[0]);
+    const Vec3 normal = twice_area_normal(rounded[0], rounded[1], rounded[2]);
     const double length = norm(normal);
     append_floats(std::isnormal(length) ? (1 / length) * normal : Vec3{});
     for (const Vec3& p : rounded) append_floats(p);

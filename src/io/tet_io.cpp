@@ -1,12 +1,13 @@
-#include "io/tet_io.h"
+#include "bisector/io.h"
 
 #include <algorithm>
 #include <utility>
 
+#include "core/orientation.h"
 #include "core/parallel.h"
-#include "mesh/orientation.h"
-#include "mesh/tet_adjacency.h"
+#include "io/files.h"
 #include "io/tet_formats.h"
+#include "mesh/tet_adjacency.h"
 #include "mesh/topology.h"
 
 namespace bisector {

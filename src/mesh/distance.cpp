@@ -1,4 +1,4 @@
-#include "mesh/distance.h"
+#include "bisector/quality.h"
 
 #include <algorithm>
 #include <optional>
@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "mesh/degenerate.h"
 #include "spatial/nearest.h"
 
 namespace bisector {

@@ -1,4 +1,4 @@
-#include "mesh/quality.h"
+#include "bisector/quality.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,26 +6,26 @@
 #include <numbers>
 #include <utility>
 
-#include "mesh/degenerate.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
+#include "mesh/topology.h"
 
 namespace bisector {
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-
-// Figures of one triangle that has an area.
-struct Shape {
-  double q;
-  std::array<double, 3> theta;  // at each corner, degrees
+struct TriangleShape {
+  double q = 0;
+  std::array<double, 3> theta{0, 0, 180};  // at each corner, degrees; these are those of triangles without area
 };
 
-Shape measure_shape(const std::array<Vec3, 3>& p, double area) {
-  Shape shape{0, {}};
+TriangleShape measure_shape(const std::array<Vec3, 3>& p, double area) {
+  TriangleShape shape;
+  if (!(area > 0)) return shape;
   double half_perimeter = 0, longest = 0;
   for (int k = 0; k < 3; ++k) {
     const Vec3 u = p[(k + 1) % 3] - p[k], v = p[(k + 2) % 3] - p[k];
-    shape.theta[k] = std::atan2(2 * area, dot(u, v)) * kDegrees;
+    shape.theta[k] = std::atan2(2 * area, dot(u, v)) * kDegreesPerRadian;
     half_perimeter += 0.5 * norm(u);
     longest = std::max(longest, norm(u));
   }
@@ -62,7 +62,7 @@ void measure_triangles(const TriangleMesh& mesh, QualityReport& report) {
   for (const Triangle& t : mesh.triangles) {
     const std::array<Vec3, 3> p{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
     const double area = triangle_area(p[0], p[1], p[2]);
-    const Shape shape = area > 0 ? measure_shape(p, area) : Shape{0, {0, 0, 180}};
+    const TriangleShape shape = measure_shape(p, area);
     const auto [smallest, largest] = std::minmax_element(shape.theta.begin(), shape.theta.end());
     report.q_min = std::min(report.q_min, shape.q);
     report.theta_min = std::min(report.theta_min, *smallest);

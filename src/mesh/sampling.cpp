@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/degenerate.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "mesh/degenerate.h"
 
 namespace bisector {
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "bisector/quality.h"
+#include "core/degenerate.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
-#include "mesh/quality.h"
 
 namespace bisector {
 
@@ -23,7 +23,7 @@ using Pair = std::array<std::size_t, 2>;
 
 // The triangles that have an area, over vertices of which no two lie at the same point; face_of_triangle tells which
 // they are.
-TriangleMesh weld(const TriangleMesh& mesh) {
+TriangleMesh merge_equal_points(const TriangleMesh& mesh) {
   std::vector<Index> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), Index{0});
   const auto key = [&](Index v) {
@@ -115,12 +115,12 @@ void visit_intersections(const TriangleMesh& welded, const Visit& visit) {
 
 std::size_t count_self_intersections(const TriangleMesh& mesh) {
   std::size_t count = 0;
-  visit_intersections(weld(mesh), [&](const Pair&) { ++count; });
+  visit_intersections(merge_equal_points(mesh), [&](const Pair&) { ++count; });
   return count;
 }
 
 std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh) {
-  const TriangleMesh welded = weld(mesh);
+  const TriangleMesh welded = merge_equal_points(mesh);
   std::vector<std::array<Index, 2>> pairs;
   visit_intersections(welded, [&](const Pair& pair) {
     const auto [low, high] = std::minmax(pair[0], pair[1]);

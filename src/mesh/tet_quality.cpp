@@ -2,36 +2,38 @@
 
 #include <algorithm>
 #include <limits>
-#include <numbers>
 #include <vector>
 
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "core/orientation.h"
 #include "core/parallel.h"
-#include "mesh/orientation.h"
 
 namespace bisector {
 
 namespace {
 
+// Both ends of each edge of a tetrahedron, and the two other corners.
 constexpr int kEdges[6][4] = {{0, 1, 2, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 2, 0}, {2, 3, 0, 1}};
 
-double six_volumes(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  return dot(b - a, cross(c - a, d - a));
-}
-
-struct Shape {
-  int sign;
-  double volume, ratio, smallest, largest;
-  std::array<double, 6> dihedral;
+struct TetShape {
+  int sign = 0;  // of the volume, exact
+  double volume = 0;
+  double radius_ratio = 0;
+  std::array<double, 6> dihedral{};    // degrees
+  double smallest = 0, largest = 180;  // dihedral angles; these are those of tetrahedra without a positive volume
 };
 
-Shape measure_shape(const std::array<Vec3, 4>& p) {
-  Shape shape{orientation(p[0], p[1], p[2], p[3]), six_volumes(p[0], p[1], p[2], p[3]) / 6, 0, 0, 180, {}};
+TetShape measure_shape(const std::array<Vec3, 4>& p) {
+  TetShape shape;
+  shape.sign = orientation(p[0], p[1], p[2], p[3]);
+  shape.volume = rounded_six_volume(p[0], p[1], p[2], p[3]) / 6;
   if (shape.sign <= 0) return shape;
   shape.dihedral = dihedral_angles(p[0], p[1], p[2], p[3]);
   const auto [smallest, largest] = std::minmax_element(shape.dihedral.begin(), shape.dihedral.end());
   shape.smallest = *smallest;
   shape.largest = *largest;
-  shape.ratio = radius_ratio(p[0], p[1], p[2], p[3]);
+  shape.radius_ratio = radius_ratio(p[0], p[1], p[2], p[3]);
   return shape;
 }
 
@@ -56,13 +58,13 @@ void measure_edges(const TetMesh& mesh, TetQualityReport& report) {
 
 std::array<double, 6> dihedral_angles(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const std::array<Vec3, 4> p{a, b, c, d};
-  const double volume = std::abs(six_volumes(a, b, c, d));
+  const double volume = std::abs(rounded_six_volume(a, b, c, d));
   std::array<double, 6> angles{};
   for (std::size_t e = 0; e < 6; ++e) {
     const Vec3 u = p[kEdges[e][1]] - p[kEdges[e][0]];
     // The normals of both sides: their cross product is the edge times the volume.
     const Vec3 m = cross(u, p[kEdges[e][2]] - p[kEdges[e][0]]), n = cross(u, p[kEdges[e][3]] - p[kEdges[e][0]]);
-    angles[e] = std::atan2(norm(u) * volume, dot(m, n)) * (180 / std::numbers::pi);
+    angles[e] = std::atan2(norm(u) * volume, dot(m, n)) * kDegreesPerRadian;
   }
   return angles;
 }
@@ -81,17 +83,17 @@ TetQualityReport measure_tet_quality(const TetMesh& mesh) {
   TetQualityReport report;
   const std::size_t n = mesh.tets.size();
   if (n == 0) return report;
-  std::vector<Shape> shapes(n);
+  std::vector<TetShape> shapes(n);
   parallel_each(n, [&](std::size_t i) {
     const Tetrahedron& t = mesh.tets[i];
     shapes[i] = measure_shape({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]]});
   });
   report.dihedral_min = 180;
   report.radius_ratio_min = report.volume_min = std::numeric_limits<double>::infinity();
-  for (const Shape& shape : shapes) {
+  for (const TetShape& shape : shapes) {
     report.dihedral_min = std::min(report.dihedral_min, shape.smallest);
     report.dihedral_max = std::max(report.dihedral_max, shape.largest);
-    report.radius_ratio_min = std::min(report.radius_ratio_min, shape.ratio);
+    report.radius_ratio_min = std::min(report.radius_ratio_min, shape.radius_ratio);
     report.volume_min = std::min(report.volume_min, shape.volume);
     if (shape.sign < 0) ++report.inverted;
     if (shape.sign == 0) ++report.zero_volume;
@@ -103,7 +105,7 @@ TetQualityReport measure_tet_quality(const TetMesh& mesh) {
   const double measured = static_cast<double>(n - report.inverted - report.zero_volume);
   if (measured > 0) {
     report.dihedral_min_mean = fixed_sum(n, [&](std::size_t i) { return shapes[i].smallest; }) / measured;
-    report.radius_ratio_mean = fixed_sum(n, [&](std::size_t i) { return shapes[i].ratio; }) / measured;
+    report.radius_ratio_mean = fixed_sum(n, [&](std::size_t i) { return shapes[i].radius_ratio; }) / measured;
   }
   measure_edges(mesh, report);
   return report;

@@ -1,12 +1,14 @@
 #include "mesh/tet_topology.h"
 
 #include <algorithm>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
+#include "bisector/quality.h"
+#include "core/disjoint_sets.h"
 #include "core/parallel.h"
 #include "mesh/tet_adjacency.h"
+#include "mesh/topology.h"
 
 namespace bisector {
 
@@ -57,11 +59,6 @@ std::vector<Triangle> boundary_of(const std::vector<Tetrahedron>& tets, const st
   return facets;
 }
 
-std::size_t find_root(std::vector<std::size_t>& parent, std::size_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
 void check_vertices(const TetMesh& mesh, TetTopology& topology) {
   std::vector<char> used(mesh.vertices.size(), 0);
   for (const Tetrahedron& t : mesh.tets)
@@ -85,17 +82,13 @@ TetTopology analyse_tet_topology(const TetMesh& mesh) {
   TetTopology topology;
   if (mesh.tets.empty()) return topology;
   const std::vector<Side> sides = sorted_sides(mesh.tets);
-  std::vector<std::size_t> parent(mesh.tets.size());
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  DisjointSets<> parts(mesh.tets.size());
   for_each_facet(sides, [&](std::size_t first, std::size_t last) {
     if (last - first > 2) ++topology.overused_facets;
     if (last - first == 2 && sides[first].even == sides[first + 1].even) ++topology.misoriented_facets;
-    for (std::size_t s = first + 1; s < last; ++s) {
-      const std::size_t a = find_root(parent, sides[first].at / 4), b = find_root(parent, sides[s].at / 4);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
+    for (std::size_t s = first + 1; s < last; ++s) parts.join(sides[first].at / 4, sides[s].at / 4);
   });
-  for (std::size_t t = 0; t < parent.size(); ++t) topology.components += parent[t] == t;
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) topology.components += parts.is_root(t);
   check_vertices(mesh, topology);
   topology.boundary = analyse_topology(boundary_of(mesh.tets, sides), mesh.vertices.size());
   topology.conforming =

@@ -1,30 +1,16 @@
 #include "mesh/topology.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
+
+#include "bisector/quality.h"
+#include "bisector/repair.h"
+#include "core/disjoint_sets.h"
+#include "core/grouping.h"
 
 namespace bisector {
 
 namespace {
-
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), std::size_t{0}); }
-
-  std::size_t root(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::size_t i, std::size_t j) {
-    i = root(i);
-    j = root(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<std::size_t> parent_;
-};
 
 Index origin(const std::vector<Triangle>& triangles, std::size_t half_edge) {
   return triangles[half_edge / 3][half_edge % 3];
@@ -38,7 +24,7 @@ std::size_t corner_at(const std::vector<Triangle>& triangles, std::size_t half_e
 }
 
 // Number of vertices whose corners make more than one fan; `fans` links the corners (3 t + k) of each.
-std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count, DisjointSets& fans) {
+std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count, DisjointSets<>& fans) {
   constexpr std::size_t kUnseen = static_cast<std::size_t>(-1);
   std::vector<std::size_t> fan(vertex_count, kUnseen);
   std::vector<char> split(vertex_count, 0);
@@ -60,28 +46,27 @@ EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_
     return std::minmax({origin(triangles, h), origin(triangles, next_half_edge(h))});
   };
 
-  std::vector<std::size_t> first(vertex_count + 1, 0);
-  for (std::size_t h = 0; h < n; ++h) ++first[ends(h).first + 1];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  std::vector<Record> records(n);
-  std::vector<std::size_t> slot(first.begin(), first.end() - 1);
-  for (std::size_t h = 0; h < n; ++h) {
-    const auto [low, high] = ends(h);
-    records[slot[low]++] = {high, h};
-  }
+  Csr<Record> records = group_into_rows<Record>(vertex_count, [&](const auto& put) {
+    for (std::size_t h = 0; h < n; ++h) {
+      const auto [low, high] = ends(h);
+      put(low, Record{high, h});
+    }
+  });
 
   EdgeTable table;
   table.edges.reserve(n / 2);
   table.half_edges.offsets.reserve(n / 2 + 1);
   table.half_edges.values.reserve(n);
   for (std::size_t v = 0; v < vertex_count; ++v) {
-    std::sort(records.begin() + first[v], records.begin() + first[v + 1]);
-    for (std::size_t i = first[v]; i < first[v + 1]; ++i) {
-      if (i == first[v] || records[i].first != records[i - 1].first) {
+    Record* const begin = records.values.data() + records.offsets[v];
+    Record* const end = records.values.data() + records.offsets[v + 1];
+    std::sort(begin, end);
+    for (const Record* record = begin; record != end; ++record) {
+      if (record == begin || record->first != record[-1].first) {
         if (!table.edges.empty()) table.half_edges.offsets.push_back(table.half_edges.values.size());
-        table.edges.push_back({static_cast<Index>(v), records[i].first});
+        table.edges.push_back({static_cast<Index>(v), record->first});
       }
-      table.half_edges.values.push_back(records[i].second);
+      table.half_edges.values.push_back(record->second);
     }
   }
   if (!table.edges.empty()) table.half_edges.offsets.push_back(table.half_edges.values.size());
@@ -93,7 +78,7 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
   const EdgeTable table = edge_table(triangles, vertex_count);
   MeshTopology topology;
   topology.oriented = true;
-  DisjointSets fans(3 * triangles.size()), parts(vertex_count);
+  DisjointSets<> fans(3 * triangles.size()), parts(vertex_count);
   for (std::size_t e = 0; e < table.edges.size(); ++e) {
     const auto [a, b] = table.edges[e];
     const std::size_t* sides = table.half_edges.begin(e);
@@ -123,7 +108,7 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
 }
 
 std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
-  DisjointSets sets(vertex_count);
+  DisjointSets<> sets(vertex_count);
   std::vector<Index> label(vertex_count, kNone);
   for (const Triangle& t : triangles)
     for (int k = 0; k < 3; ++k) {

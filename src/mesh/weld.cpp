@@ -1,4 +1,4 @@
-#include "mesh/weld.h"
+#include "bisector/repair.h"
 
 #include <fmt/format.h>
 
@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/geometry.h"
+#include "core/grouping.h"
 #include "mesh/topology.h"
 #include "spatial/hilbert.h"
 #include "spatial/seed_tree.h"
@@ -96,7 +98,7 @@ class Borders {
         tolerance_(tolerance),
         table(edge_table(work.triangles, work.points.size())),
         edge_of_(3 * work.triangles.size()),
-        triangles_at_(triangles_at_vertices()),
+        triangles_at_(items_at_vertices<std::size_t>(work.triangles, work.points.size())),
         stamp_(work.triangles.size(), 0) {
     std::vector<char> on_border(work.points.size(), 0);
     for (std::size_t e = 0; e < table.edges.size(); ++e) {
@@ -155,18 +157,6 @@ class Borders {
   }
 
  private:
-  Csr<std::size_t> triangles_at_vertices() const {
-    Csr<std::size_t> rows;
-    rows.offsets.assign(work_.points.size() + 1, 0);
-    for (const Triangle& t : work_.triangles)
-      for (const Index v : t) ++rows.offsets[v + 1];
-    std::partial_sum(rows.offsets.begin(), rows.offsets.end(), rows.offsets.begin());
-    rows.values.resize(3 * work_.triangles.size());
-    std::vector<std::size_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
-    for (std::size_t t = 0; t < work_.triangles.size(); ++t)
-      for (const Index v : work_.triangles[t]) rows.values[next[v]++] = t;
-    return rows;
-  }
   double distance(Index v, std::size_t triangle) const {
     const auto [a, b, c] = work_.triangles[triangle];
     const Vec3& p = work_.points[v];
@@ -286,7 +276,7 @@ class EdgeSplitter {
 
   bool turns_over(Index a, Index b, Index apex, const std::vector<Index>& vertices) const {
     const Vec3& c = work_.points[apex];
-    const auto normal = [&](Index i, Index j) { return cross(work_.points[j] - work_.points[i], c - work_.points[i]); };
+    const auto normal = [&](Index i, Index j) { return twice_area_normal(work_.points[i], work_.points[j], c); };
     const Vec3 whole = normal(a, b);
     Index last = a;
     for (std::size_t k = 0; k <= vertices.size(); ++k) {

@@ -1,15 +1,17 @@
-#include "preview/preview.h"
+#include "bisector/preview.h"
 
 #include <png.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <numbers>
 
 #include "bisector/error.h"
+#include "bisector/io.h"
+#include "core/geometry.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
-#include "io/mesh_io.h"
+#include "io/files.h"
 
 namespace bisector {
 namespace {
@@ -63,8 +65,7 @@ struct Camera {
 };
 
 Camera aim(const std::vector<Vec3>& vertices, const Csr<Index>& polygons, const PreviewOptions& options) {
-  constexpr double kDegree = std::numbers::pi / 180;
-  const double azimuth = options.azimuth * kDegree, elevation = options.elevation * kDegree;
+  const double azimuth = options.azimuth * kRadiansPerDegree, elevation = options.elevation * kRadiansPerDegree;
   Camera camera;
   camera.right = {std::cos(azimuth), 0, -std::sin(azimuth)};
   camera.back = {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
@@ -110,15 +111,10 @@ std::vector<Vec3> corner_normals(const std::vector<Vec3>& vertices, const Csr<In
       area[f] += cross(vertices[corner[k - 1]] - vertices[corner[0]], vertices[corner[k]] - vertices[corner[0]]);
     flat[f] = unit(area[f]);
   });
-  Csr<Index> faces;  // of each vertex
-  faces.offsets.assign(vertices.size() + 1, 0);
-  for (const Index v : polygons.values) ++faces.offsets[v + 1];
-  for (std::size_t v = 0; v < vertices.size(); ++v) faces.offsets[v + 1] += faces.offsets[v];
-  faces.values.resize(polygons.values.size());
-  std::vector<std::size_t> next(faces.offsets.begin(), faces.offsets.end() - 1);
-  for (std::size_t f = 0; f < polygons.rows(); ++f)
-    for (std::size_t k = polygons.offsets[f]; k < polygons.offsets[f + 1]; ++k)
-      faces.values[next[polygons.values[k]]++] = static_cast<Index>(f);
+  const Csr<Index> faces = group_into_rows<Index>(vertices.size(), [&](const auto& put) {  // of each vertex
+    for (std::size_t f = 0; f < polygons.rows(); ++f)
+      for (const Index* v = polygons.begin(f); v != polygons.end(f); ++v) put(*v, static_cast<Index>(f));
+  });
 
   std::vector<Vec3> normals(polygons.values.size());
   parallel_each(polygons.rows(), [&](std::size_t f) {
@@ -304,17 +300,10 @@ Csr<Index> sort_into_bands(const Scene& scene, std::size_t bands) {
     };
     return std::pair(band(std::min({a, b, c}) - kMargin - 1), band(std::max({a, b, c}) + kMargin + 1));
   };
-  Csr<Index> sorted;
-  sorted.offsets.assign(bands + 1, 0);
-  for (const Piece& piece : scene.pieces)
-    for (auto [band, last] = range(piece); band <= last; ++band) ++sorted.offsets[band + 1];
-  for (std::size_t band = 0; band < bands; ++band) sorted.offsets[band + 1] += sorted.offsets[band];
-  sorted.values.resize(sorted.offsets.back());
-  std::vector<std::size_t> next(sorted.offsets.begin(), sorted.offsets.end() - 1);
-  for (std::size_t k = 0; k < scene.pieces.size(); ++k)
-    for (auto [band, last] = range(scene.pieces[k]); band <= last; ++band)
-      sorted.values[next[band]++] = static_cast<Index>(k);
-  return sorted;
+  return group_into_rows<Index>(bands, [&](const auto& put) {
+    for (std::size_t k = 0; k < scene.pieces.size(); ++k)
+      for (auto [band, last] = range(scene.pieces[k]); band <= last; ++band) put(band, static_cast<Index>(k));
+  });
 }
 
 std::vector<Piece> split_into_pieces(const Csr<Index>& polygons) {

@@ -1,9 +1,9 @@
-#include "preview/tet_preview.h"
+#include "bisector/preview.h"
 
 #include <array>
 #include <vector>
 
-#include "preview/preview.h"
+#include "core/geometry.h"
 #include "mesh/tet_adjacency.h"
 
 namespace bisector {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
 

@@ -8,13 +8,14 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "cvt/constrain.h"
-#include "mesh/degenerate.h"
-#include "spatial/nearest.h"
-#include "mesh/quality.h"
 #include "mesh/topology.h"
+#include "spatial/nearest.h"
 
 namespace bisector {
 namespace {

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
+#include "bisector/repair.h"
 #include "features/normals.h"
 #include "mesh/topology.h"
 

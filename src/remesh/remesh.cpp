@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
 #include "compute/compute.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
-#include "mesh/quality.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/prepare.h"
 #include "remesh/sheets.h"

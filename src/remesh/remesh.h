@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "bisector/context.h"
-#include "core/geometry.h"
+#include "bisector/features.h"
+#include "bisector/quality.h"
+#include "bisector/repair.h"
 #include "compute/compute.h"
-#include "features/feature_distance.h"
-#include "features/features.h"
+#include "core/geometry.h"
 #include "mesh/topology.h"
-#include "mesh/weld.h"
 #include "remesh/fit.h"
 #include "remesh/improve.h"
 #include "remesh/sizing.h"

@@ -10,9 +10,10 @@
 #include <unordered_map>
 
 #include "bisector/error.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "features/curvature.h"
-#include "mesh/degenerate.h"
 #include "features/local_feature_size.h"
 #include "features/size_field.h"
 #include "mesh/topology.h"

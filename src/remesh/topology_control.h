@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bisector/quality.h"
 #include "cvt/optimise.h"
 #include "mesh/topology.h"
 #include "voronoi/ball_property.h"

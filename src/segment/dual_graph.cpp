@@ -4,6 +4,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/geometry.h"
 #include "mesh/topology.h"
 
 namespace bisector {

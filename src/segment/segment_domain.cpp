@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "bisector/error.h"
+#include "bisector/repair.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
 

@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "mesh/degenerate.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 
 namespace bisector {
 

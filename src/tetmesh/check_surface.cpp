@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "mesh/degenerate.h"
-#include "mesh/orientation.h"
-#include "mesh/quality.h"
+#include "bisector/quality.h"
+#include "bisector/repair.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
+#include "core/orientation.h"
 #include "mesh/topology.h"
-#include "mesh/weld.h"
 
 namespace bisector {
 

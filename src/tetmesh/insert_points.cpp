@@ -5,10 +5,11 @@
 #include <string>
 
 #include "bisector/error.h"
-#include "mesh/orientation.h"
+#include "core/geometry.h"
+#include "core/orientation.h"
 #include "mesh/tet_adjacency.h"
-#include "tetmesh/tet_edit.h"
 #include "spatial/hilbert.h"
+#include "tetmesh/tet_edit.h"
 
 namespace bisector {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "bisector/error.h"
-#include "mesh/orientation.h"
+#include "core/orientation.h"
 #include "mesh/tet_adjacency.h"
 #include "tetmesh/tet_shape.h"
 

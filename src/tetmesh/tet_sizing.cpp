@@ -13,8 +13,9 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
 #include "features/size_field.h"
 #include "tetmesh/locate.h"
 

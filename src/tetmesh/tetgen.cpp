@@ -21,12 +21,12 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/orientation.h"
 #include "core/parallel.h"
-#include "mesh/orientation.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/tet_topology.h"
-#include "tetmesh/carve.h"
 #include "tetgen/protocol.h"
+#include "tetmesh/carve.h"
 
 extern char** environ;
 

@@ -11,20 +11,21 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
 #include "compute/compute.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "cvt/constrain.h"
 #include "cvt/optimise.h"
-#include "spatial/nearest.h"
-#include "mesh/quality.h"
 #include "mesh/tet_topology.h"
 #include "remesh/prepare.h"
+#include "spatial/hilbert.h"
+#include "spatial/nearest.h"
 #include "tetmesh/check_surface.h"
 #include "tetmesh/locate.h"
 #include "tetmesh/sample_solid.h"
 #include "tetmesh/tet_levels.h"
 #include "tetmesh/tetgen.h"
-#include "spatial/hilbert.h"
 #include "voronoi/tiling.h"
 
 namespace bisector {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "bisector/context.h"
-#include "core/geometry.h"
 #include "backend/backend.h"
-#include "features/features.h"
+#include "bisector/context.h"
+#include "bisector/features.h"
+#include "core/geometry.h"
 #include "remesh/remesh.h"
 #include "tetmesh/conform.h"
 #include "tetmesh/improve.h"

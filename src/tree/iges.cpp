@@ -10,7 +10,8 @@
 #include <utility>
 
 #include "bisector/error.h"
-#include "io/mesh_io.h"
+#include "bisector/io.h"
+#include "io/files.h"
 
 namespace bisector {
 namespace {

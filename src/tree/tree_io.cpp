@@ -7,11 +7,13 @@
 #include <cmath>
 
 #include "bisector/error.h"
+#include "bisector/io.h"
+#include "bisector/preview.h"
+#include "core/geometry.h"
 #include "core/random.h"
-#include "io/mesh_io.h"
 #include "io/bytes.h"
+#include "io/files.h"
 #include "io/mesh_formats.h"
-#include "preview/preview.h"
 
 namespace bisector {
 namespace {

@@ -38,7 +38,7 @@ TEST(Geometry, NearestPointsOfASegment) {
 
 TEST(Geometry, CounterClockwiseTrianglesFaceUpwards) {
   EXPECT_EQ(twice_area_normal({0, 0, 0}, {2, 0, 0}, {0, 3, 0}), (Vec3{0, 0, 6}));
-  EXPECT_EQ(six_rounded_volumes({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}), 1);
+  EXPECT_EQ(rounded_six_volume({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}), 1);
 }
 
 TEST(Grouping, RowsKeepTheOrderOfTheirValues) {

@@ -9,9 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "bisector/error.h"
-#include "cvt/constrain.h"
 #include "backend/cpu_backend.h"
+#include "bisector/error.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "cvt/constrain.h"
 #include "cvt/lbfgs.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "features/curvature.h"
 #include "mesh/topology.h"

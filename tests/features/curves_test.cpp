@@ -7,14 +7,15 @@
 #include <set>
 
 #include "backend/cpu_backend.h"
-#include "features/curves.h"
+#include "core/geometry.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
+#include "features/curves.h"
 #include "remesh/feature_recovery.h"
-#include "voronoi/dual.h"
 #include "support/diagram.h"
 #include "support/featured.h"
 #include "support/models.h"
+#include "voronoi/dual.h"
 
 namespace bisector::test {
 namespace {

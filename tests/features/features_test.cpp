@@ -11,9 +11,10 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/features.h"
+#include "bisector/io.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "features/features.h"
-#include "io/mesh_io.h"
 #include "features/normals.h"
 #include "support/models.h"
 

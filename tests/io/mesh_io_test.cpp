@@ -20,8 +20,11 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "mesh/degenerate.h"
-#include "io/mesh_io.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
+#include "io/files.h"
 #include "mesh/topology.h"
 #include "support/models.h"
 

@@ -18,7 +18,9 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "io/tet_io.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "mesh/tet_topology.h"
 #include "support/models.h"
 

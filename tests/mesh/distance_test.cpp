@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
 #include "core/parallel.h"
-#include "mesh/distance.h"
 #include "support/models.h"
 
 namespace bisector::test {

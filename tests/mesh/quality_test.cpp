@@ -4,8 +4,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "io/mesh_io.h"
-#include "mesh/quality.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "bisector/repair.h"
+#include "core/geometry.h"
 #include "mesh/topology.h"
 #include "support/models.h"
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "core/degenerate.h"
 #include "core/parallel.h"
-#include "mesh/degenerate.h"
 #include "mesh/sampling.h"
 #include "support/models.h"
 

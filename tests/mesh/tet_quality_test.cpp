@@ -7,7 +7,9 @@
 #include <numeric>
 #include <vector>
 
-#include "mesh/orientation.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "core/orientation.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 #include "support/models.h"

@@ -8,10 +8,12 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "mesh/degenerate.h"
-#include "features/features.h"
+#include "bisector/features.h"
+#include "bisector/quality.h"
+#include "bisector/repair.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "mesh/topology.h"
-#include "mesh/weld.h"
 #include "support/models.h"
 
 namespace bisector::test {

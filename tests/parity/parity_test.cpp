@@ -11,14 +11,15 @@
 #include <string>
 #include <vector>
 
-#include "bisector/error.h"
 #include "backend/cpu_backend.h"
+#include "bisector/error.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "cvt/optimise.h"
-#include "io/mesh_io.h"
-#include "mesh/quality.h"
+#include "host/passes/vulkan_backend.h"
 #include "remesh/remesh.h"
 #include "remesh/topology_control.h"
-#include "host/passes/vulkan_backend.h"
 #include "voronoi/dual.h"
 #include "support/models.h"
 #include "support/run.h"

@@ -5,11 +5,12 @@
 #include <map>
 #include <string>
 
+#include "bisector/quality.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "tetmesh/tetmesh.h"
 #include "support/setups.h"
 #include "support/solids.h"
+#include "tetmesh/tetmesh.h"
 
 namespace bisector::test {
 namespace {

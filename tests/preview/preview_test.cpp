@@ -1,4 +1,4 @@
-#include "preview/preview.h"
+#include "bisector/preview.h"
 
 #include <gtest/gtest.h>
 #include <png.h>

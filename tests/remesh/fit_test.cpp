@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "mesh/distance.h"
-#include "spatial/nearest.h"
-#include "mesh/quality.h"
 #include "mesh/sampling.h"
 #include "remesh/fit.h"
+#include "spatial/nearest.h"
 #include "support/models.h"
 
 namespace bisector::test {

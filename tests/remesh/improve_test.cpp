@@ -10,11 +10,12 @@
 #include <map>
 #include <numbers>
 
-#include "bisector/error.h"
-#include "cvt/constrain.h"
 #include "backend/cpu_backend.h"
+#include "bisector/error.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "cvt/constrain.h"
 #include "cvt/multilevel.h"
-#include "mesh/quality.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/feature_seeds.h"
 #include "remesh/improve_patch.h"

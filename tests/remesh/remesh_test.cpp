@@ -10,8 +10,9 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "cvt/constrain.h"
-#include "mesh/quality.h"
 #include "support/diagram.h"
 #include "support/models.h"
 

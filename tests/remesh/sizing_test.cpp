@@ -7,14 +7,15 @@
 #include <utility>
 #include <vector>
 
-#include "bisector/error.h"
-#include "core/parallel.h"
 #include "backend/cpu_backend.h"
-#include "mesh/degenerate.h"
-#include "mesh/quality.h"
+#include "bisector/error.h"
+#include "bisector/quality.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+#include "features/size_field.h"
 #include "mesh/topology.h"
 #include "remesh/remesh.h"
-#include "features/size_field.h"
 #include "remesh/sizing.h"
 #include "support/models.h"
 

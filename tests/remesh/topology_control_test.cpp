@@ -13,16 +13,18 @@
 #include <vector>
 
 #include "backend/cpu_backend.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "cvt/multilevel.h"
-#include "io/mesh_io.h"
 #include "mesh/topology.h"
 #include "remesh/remesh.h"
 #include "remesh/sheets.h"
 #include "remesh/topology_control.h"
-#include "voronoi/ball_property.h"
 #include "support/diagram.h"
 #include "support/models.h"
 #include "support/run.h"
+#include "voronoi/ball_property.h"
 
 namespace bisector::test {
 namespace {

@@ -13,6 +13,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "bisector/repair.h"
+#include "core/geometry.h"
 #include "mesh/topology.h"
 #include "support/models.h"
 

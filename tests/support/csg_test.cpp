@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "mesh/topology.h"
 #include "support/csg.h"
 

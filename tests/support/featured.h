@@ -12,8 +12,9 @@
 #include <vector>
 
 #include "backend/backend.h"
-#include "features/curves.h"
+#include "core/geometry.h"
 #include "cvt/optimise.h"
+#include "features/curves.h"
 #include "mesh/topology.h"
 #include "remesh/feature_seeds.h"
 #include "support/models.h"

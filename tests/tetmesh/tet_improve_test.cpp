@@ -12,15 +12,16 @@
 #include <set>
 
 #include "bisector/error.h"
-#include "mesh/orientation.h"
+#include "core/geometry.h"
+#include "core/orientation.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/tet_quality.h"
+#include "support/models.h"
 #include "tetmesh/insert_points.h"
 #include "tetmesh/tet_edit.h"
 #include "tetmesh/tet_insert.h"
 #include "tetmesh/tet_shape.h"
 #include "tetmesh/tet_swap.h"
-#include "support/models.h"
 
 namespace bisector::test {
 namespace {

@@ -16,14 +16,16 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "io/mesh_io.h"
-#include "mesh/orientation.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "core/orientation.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
+#include "support/models.h"
 #include "tetmesh/carve.h"
 #include "tetmesh/check_surface.h"
 #include "tetmesh/conform.h"
-#include "support/models.h"
 
 namespace bisector::test {
 namespace {

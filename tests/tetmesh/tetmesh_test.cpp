@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "cvt/constrain.h"
-#include "mesh/distance.h"
-#include "mesh/quality.h"
 #include "features/size_field.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"

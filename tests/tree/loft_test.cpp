@@ -7,7 +7,8 @@
 #include <limits>
 
 #include "bisector/error.h"
-#include "mesh/quality.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "mesh/topology.h"
 #include "support/models.h"
 

@@ -13,14 +13,16 @@
 #include <numeric>
 
 #include "bisector/error.h"
+#include "bisector/io.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "io/mesh_io.h"
 #include "mesh/topology.h"
-#include "tree/coverage.h"
-#include "tree/tree_io.h"
 #include "support/models.h"
 #include "support/tree_model.h"
+#include "tree/coverage.h"
+#include "tree/tree_io.h"
 
 namespace bisector {
 namespace {

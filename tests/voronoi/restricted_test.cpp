@@ -12,8 +12,9 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "mesh/degenerate.h"
-#include "io/mesh_io.h"
+#include "bisector/io.h"
+#include "core/degenerate.h"
+#include "core/geometry.h"
 #include "support/diagram.h"
 #include "support/models.h"
 #include "support/oracle.h"

@@ -1,9 +1,11 @@
-#include "mesh/orientation.h"
+#include "core/orientation.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Mpzf.h>
 
 #include <cmath>
+
+#include "core/geometry.h"
 
 namespace bisector {
 

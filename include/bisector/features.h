@@ -5,7 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/geometry.h"
+#include "bisector/export.h"
+#include "bisector/mesh.h"
 
 namespace bisector {
 
@@ -44,8 +45,8 @@ struct FeatureOptions {
   std::vector<std::array<Index, 2>> given;  // edges to take whatever the mode; either vertex first
 };
 
-// Finds the features of a mesh. Any soup is allowed, but duplicated vertices make borders: weld first (weld.h). Whether
-// two triangles are oriented alike does not matter. Exactly collinear triangles, and slivers that are thinner than 1e-4
+// Finds the features of a mesh. Any soup is allowed, but duplicated vertices make borders: weld first (repair.h).
+// Whether two triangles are oriented alike does not matter. Exactly collinear triangles, and slivers that are thinner than 1e-4
 // of the bounding box's diagonal and 0.02 of their length, have no normal of their own: an edge beside one is compared
 // with what lies beyond it.
 //
@@ -66,6 +67,20 @@ struct FeatureOptions {
 //
 // Throws Error if an option is out of range, a given edge is not an edge of the mesh, or labels are not one per
 // triangle.
-FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& options = {});
+BISECTOR_API FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& options = {});
+
+// Where a seed may be.
+struct SeedPlace {
+  enum class Kind : unsigned char {
+    surface,   // anywhere on the surface
+    curve,     // on one feature curve
+    fixed,     // where it is
+    interior,  // anywhere: the inside of a solid
+  };
+  Kind kind = Kind::surface;
+  Index curve = kNone;   // the feature curve it lies on, if one alone
+  Index corner = kNone;  // index in FeatureGraph::corners of the corner it lies at, if any
+  double position = 0;   // arc length along `curve`, if there is one
+};
 
 }  // namespace bisector

@@ -1,10 +1,11 @@
-// Closing cracks: merging what is one point, and splitting edges at vertices that lie on them (thesis 4.6, "Incomplete
-// input data": through a crack, dual triangles go missing).
+// Mending triangle meshes: welding cracks, making orientations agree.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
-#include "core/geometry.h"
+#include "bisector/export.h"
+#include "bisector/mesh.h"
 
 namespace bisector {
 
@@ -29,6 +30,11 @@ struct WeldResult {
 //
 // Vertices and triangles keep their order; labels, face_of_triangle and feature_edges follow. Throws Error if the
 // tolerance is negative or not finite.
-WeldResult weld(const TriangleMesh& mesh, double tolerance);
+BISECTOR_API WeldResult weld(const TriangleMesh& mesh, double tolerance);
+
+// Turns triangles over so that neighbours across edges of two triangles run in opposite directions there, wherever that
+// can be had; each part that hangs together in this way keeps the orientation of most of its triangles. Every index must
+// be below `vertex_count`.
+BISECTOR_API void orient(std::vector<Triangle>& triangles, std::size_t vertex_count);
 
 }  // namespace bisector

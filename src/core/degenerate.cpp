@@ -1,10 +1,12 @@
-#include "mesh/degenerate.h"
+#include "core/degenerate.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "core/geometry.h"
 
 namespace bisector {
 

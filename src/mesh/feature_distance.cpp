@@ -1,4 +1,4 @@
-#include "features/feature_distance.h"
+#include "bisector/quality.h"
 
 #include <CGAL/AABB_segment_primitive.h>
 #include <CGAL/AABB_traits.h>
@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "core/geometry.h"
 
 namespace bisector {
 namespace {

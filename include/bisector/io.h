@@ -1,0 +1,109 @@
+// Mesh files. Surfaces: OFF, OBJ, PLY (ASCII and binary) and STL (ASCII and binary). Tetrahedra: Medit .mesh, Gmsh .msh,
+// VTK .vtk and .vtu.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "bisector/context.h"
+#include "bisector/export.h"
+#include "bisector/mesh.h"
+
+namespace bisector {
+
+// --- surfaces ---
+
+// Reads a mesh by its file name's extension. Polygons are split into triangles (face_of_triangle tells from which
+// face), identical STL corners are merged. Vertices that no face uses and zero-area triangles are kept, so that indices
+// stay those of the file; each kind is counted in one warning, and so are polygons that were split and what follows the
+// last face. Face labels are the property `label` of a PLY file, of any integer type (from 2^31 on they wrap around),
+// and the groups of an OBJ file where it has more than one: each pair of `g` and `usemtl` gets the next number from 0
+// as its first face appears; where all are named as write_mesh does, the numbers in the names. Feature edges are
+// `vertex1 vertex2` of the PLY element `edge` and the lines `l` of an OBJ file, ascending, each once and with the lower
+// vertex first; those that are not edges of a triangle are left out with a warning. Throws Error, naming the file and
+// the line, vertex or face (counted from 0), for: a missing, empty or truncated file, an unknown format, NaN or
+// infinite coordinates, coordinates beyond 1e100, an index out of range, a face of fewer than three corners, no face at
+// all. Memory is bounded by the file's size, not by its counts.
+BISECTOR_API TriangleMesh read_mesh(const std::string& path, const Context& context = {});
+
+// How an OBJ file's groups are called: PREFIX_K, K being the label, or PREFIX_K_NAME where the labels 0, 1, ... have
+// names.
+struct GroupNames {
+  std::string prefix = "label";  // label, region or branch; others are not read back as labels
+  std::vector<std::string> names = {};
+};
+
+// Writes a mesh by extension, with as many of 17 significant digits as it takes to read back the same bits (STL is
+// binary and float, as the format demands; PLY binary and double). Labels become the face property `int label` in PLY
+// and groups `label_K` in OBJ, or `PREFIX_K` or `PREFIX_K_NAME` as `groups` says; feature edges the
+// element `edge` in PLY and lines `l` in OBJ; OFF and STL hold neither. The file appears under its name only when
+// complete. Throws Error, also for coordinates that are not finite or beyond the format's range, indices out of range,
+// labels that are not one per triangle and labels without a name among those given.
+BISECTOR_API void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups = {});
+
+// A coloured polygon mesh as binary PLY (double coordinates; one colour and one integer label per face).
+struct PolygonMesh {
+  std::vector<Vec3> vertices;
+  Csr<Index> polygons;
+  std::vector<Index> labels;                       // one per polygon, or empty; property "label"
+  std::vector<std::array<unsigned char, 3>> colours;  // one per polygon, or empty: red, green, blue
+  std::vector<std::array<Index, 2>> feature_edges = {};  // element "edge", or empty
+};
+BISECTOR_API void write_polygons(const std::string& path, const PolygonMesh& mesh);
+
+// Reads the vertices of a .ply file, with or without faces, and of any other file "x y z" lines; '#' starts a comment,
+// further columns are ignored. Throws Error as read_mesh does.
+BISECTOR_API std::vector<Vec3> read_points(const std::string& path);
+
+// Reads a number for each vertex from a scalar property of a PLY file's element `vertex`. Throws Error, listing the
+// properties that are there, if `name` is not among them, and for other formats and values that are not finite.
+BISECTOR_API std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name);
+
+// Reads "a b" lines, vertex indices counted from 0 as in the mesh's file; '#' starts a comment, further columns are
+// ignored. Ascending, each edge once and with the lower vertex first. Throws Error, naming the line, for what is not an
+// edge of the mesh.
+BISECTOR_API std::vector<std::array<Index, 2>> read_feature_edges(const std::string& path, const TriangleMesh& mesh);
+
+// Writes what read_feature_edges reads. Throws Error.
+BISECTOR_API void write_feature_edges(const std::string& path, const std::vector<std::array<Index, 2>>& edges);
+
+// --- tetrahedral meshes ---
+
+// Whether a file name's extension is one of those below. Such files may hold triangles only.
+BISECTOR_API bool is_tet_format(const std::string& path);
+
+// Reads a mesh by its file name's extension: Medit .mesh (ASCII); Gmsh .msh of version 2.2 or 4.1, ASCII and binary;
+// legacy .vtk with an unstructured grid, ASCII and binary; .vtu with one piece, ASCII, base64, raw, zlib-compressed or
+// not. Tetrahedra become `tets`, turned positive by the exact sign (those of no volume stay and are counted in a
+// warning), triangles `boundary`, turned outward where they have a tetrahedron on one side only, edges `feature_edges`,
+// ascending, each once and with the lower vertex first. A file without tetrahedra gives an empty `tets`;
+// surface_of_marks makes it a surface.
+//
+// Regions and labels are the refs of Medit; the first physical group of Gmsh, or, where there are none, the elementary
+// entity; in VTK the cell data `region` or `label` of tetrahedra, `label` of triangles (or what other programs write:
+// medit:ref, gmsh:physical, gmsh:geometrical, CellEntityIds). Where all are 0 there are none. Vertices keep the file's
+// order, in Gmsh that of their tags, and stay though nothing uses them.
+//
+// Throws Error, naming the file and the line, byte, vertex or cell, for: a missing, empty, damaged or truncated file,
+// other formats and versions, NaN or infinite coordinates and those beyond 1e100, an index out of range, a repeated
+// corner, and elements that are curved or neither tetrahedra, triangles, edges nor points. Memory is bounded by the
+// file's size.
+BISECTOR_API TetMesh read_tet_mesh(const std::string& path, const Context& context = {});
+
+// Writes Medit .mesh (ASCII), Gmsh .msh (4.1, ASCII) or .vtu (base64) by extension; read_tet_mesh brings back the same
+// bits. In Gmsh each region is a volume, each label a surface, and feature edges are curves between their branches,
+// with the physical groups region_K, label_K and features (volume and boundary where there are no numbers). The file
+// appears under its name only when complete. Throws Error, also for a mesh whose indices, coordinates or numbers of
+// marks are unsound.
+BISECTOR_API void write_tet_mesh(const std::string& path, const TetMesh& mesh);
+
+// A number for each vertex: the scalar point data `name` of a .vtk or .vtu file, or, for a .mesh file, the first scalar
+// of the Medit solution beside it (NAME.sol for NAME.mesh; `name` does not matter). Throws Error as read_tet_mesh, and
+// for values that are not finite or not one per vertex.
+BISECTOR_API std::vector<double> read_tet_attribute(const std::string& path, const std::string& name);
+
+// The marked triangles as a surface with all vertices, labels and those feature edges that are edges of it.
+BISECTOR_API TriangleMesh surface_of_marks(const TetMesh& mesh);
+
+}  // namespace bisector
