@@ -42,7 +42,7 @@ Index nearest_triangle(const SegmentDomain& domain, const std::vector<Index>& tr
 
 Proxy plane_of(const SegmentDomain& domain, Index triangle) {
   const Vec3& n = domain.normals[triangle];
-  return Proxy::of(Quadric::plane(n, dot(n, domain.barycentres[triangle])));
+  return Proxy::of(plane_quadric(n, dot(n, domain.barycentres[triangle])));
 }
 
 // In two across the longest direction.

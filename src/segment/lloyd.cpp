@@ -81,7 +81,7 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
   const double enough = kExact * moments.area();
   // The samples' mean square is never below the integral for a plane.
   const PlaneFit plane = fit_plane(moments);
-  if (plane.squared_distance < best.energy) consider(Proxy::of(Quadric::plane(plane.normal, plane.offset)));
+  if (plane.squared_distance < best.energy) consider(Proxy::of(plane_quadric(plane.normal, plane.offset)));
   best.invalid = false;
   if (best.energy > enough && surfaces_ != SegmentSurfaces::planes) {
     const ProxyFit fit = fit_proxy(moments, surfaces_);
@@ -194,7 +194,7 @@ bool Lloyd::step(Partition& partition, bool flooding) {
     const SurfaceMoments moments = changed_moments(domain_, partition.regions[r].moments, partition.triangles.begin(r),
                                                    partition.triangles.end(r), begin, end);
     const RegionProxy& old = partition.regions[r];
-    next.regions[r] = refit(begin, end, moments, &old, next.distances, tori || old.proxy.torus);
+    next.regions[r] = refit(begin, end, moments, &old, next.distances, tori || old.proxy.torus.has_value());
   }
   const double after = next.energy();
   if (!(after < before)) return false;

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "bisector/context.h"
+#include "bisector/segment.h"
 #include "core/geometry.h"
-#include "segment/segment.h"
 #include "segment/segment_domain.h"
 
 namespace bisector {

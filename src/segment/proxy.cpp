@@ -18,8 +18,8 @@ constexpr double kAligned = 0.5;     // least alignment of a gradient with the n
 }  // namespace
 
 Proxy Proxy::of(const Primitive& primitive) {
-  if (primitive.type != SurfaceType::torus) return of(primitive.quadric);
-  return {true, {}, 0, primitive.centre, primitive.axis, primitive.radius, primitive.minor_radius};
+  if (const std::optional<Quadric> quadric = quadric_of(primitive)) return of(*quadric);
+  return {std::get<Torus>(primitive), {}, 0};
 }
 
 SurfaceMoments sum_of_moments(const SegmentDomain& domain, const Index* begin, const Index* end) {
@@ -119,7 +119,7 @@ bool is_invalid(const Quadric& quadric, const SurfaceMoments& moments) {
 
 ProxyFit fit_proxy(const SurfaceMoments& moments, SegmentSurfaces surfaces) {
   const PlaneFit plane = fit_plane(moments);
-  ProxyFit best{Proxy::of(Quadric::plane(plane.normal, plane.offset)), plane.squared_distance, true, false};
+  ProxyFit best{Proxy::of(plane_quadric(plane.normal, plane.offset)), plane.squared_distance, true, false};
   // What is flat to a part in 1e7 of the model is a plane.
   if (surfaces == SegmentSurfaces::planes || plane.squared_distance <= 1e-14 * moments.area()) return best;
   QuadricFit fit = fit_quadric(moments);

@@ -1,4 +1,4 @@
-#include "segment/segment.h"
+#include "bisector/segment.h"
 
 #include <fmt/format.h>
 
@@ -16,6 +16,7 @@
 #include "segment/improve_partition.h"
 #include "segment/lloyd.h"
 #include "segment/merge_regions.h"
+#include "segment/primitive.h"
 #include "segment/region_primitives.h"
 #include "segment/segment_domain.h"
 #include "segment/smooth_borders.h"
@@ -101,7 +102,7 @@ Partition start_at_random(Lloyd& lloyd, std::size_t count, std::uint64_t random_
     const Index t = from[static_cast<std::size_t>(random.uniform() * static_cast<double>(n))];
     if (std::exchange(taken[t], 1)) return;
     seeds.push_back({t, static_cast<Index>(seeds.size())});
-    proxies.push_back(Proxy::of(Quadric::plane(domain.normals[t], dot(domain.normals[t], domain.barycentres[t]))));
+    proxies.push_back(Proxy::of(plane_quadric(domain.normals[t], dot(domain.normals[t], domain.barycentres[t]))));
   };
   for (std::size_t c = 0; c < domain.component_count; ++c) draw(parts.begin(c), parts.size(c));
   while (seeds.size() < count) draw(parts.values.data(), parts.values.size());
