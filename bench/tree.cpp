@@ -9,7 +9,7 @@
 
 #include "core/parallel.h"
 #include "io/mesh_io.h"
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 namespace {
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "segment/flood.h"
 #include "segment/primitive_fit.h"
@@ -113,7 +114,7 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
 Partition Lloyd::fit(std::vector<Index> labels, std::size_t count, const Partition* known) {
   Partition partition;
   partition.labels = std::move(labels);
-  partition.triangles = region_triangles(partition.labels, count);
+  partition.triangles = items_of_labels<Index>(partition.labels, count);
   partition.distances = known ? known->distances : std::vector<double>(partition.labels.size());
   partition.regions.resize(count);
   partition.changed.assign(count, 1);
@@ -185,7 +186,7 @@ bool Lloyd::step(Partition& partition, bool flooding) {
     next.distances = partition.distances;
     if (relax_borders(domain_, all, triangles, next.labels, next.distances, counts.evaluations) == 0) return false;
   }
-  next.triangles = region_triangles(next.labels, count);
+  next.triangles = items_of_labels<Index>(next.labels, count);
   const bool tori = counts.iterations % kToriEvery == 0;
   for (std::size_t r = 0; r < count; ++r) {
     const Index *begin = next.triangles.begin(r), *end = next.triangles.end(r);

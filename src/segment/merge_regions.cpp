@@ -7,6 +7,7 @@
 #include <queue>
 #include <utility>
 
+#include "core/grouping.h"
 #include "segment/primitive_fit.h"
 #include "segment/proxy.h"
 
@@ -155,7 +156,7 @@ class SurfaceMerging {
   SurfaceMerging(const SegmentDomain& domain, const std::vector<Index>& labels, SegmentSurfaces surfaces)
       : domain_(domain), surfaces_(surfaces) {
     const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
-    const Csr<Index> rows = region_triangles(labels, count);
+    const Csr<Index> rows = items_of_labels<Index>(labels, count);
     regions_.resize(count);
     for (std::size_t r = 0; r < count; ++r) {
       Region& region = regions_[r];

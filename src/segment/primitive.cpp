@@ -18,7 +18,7 @@ using Axes = std::array<Vec3, 3>;
 constexpr double kRounding = 1e-9;      // of the extent: what differs by less is the same
 constexpr double kZeroCurvature = 1e-15;  // of the greatest eigenvalue: what is less is 0
 
-Vec3 unit(const Vec3& v, const char* what) {
+Vec3 require_direction(const Vec3& v, const char* what) {
   const double length = norm(v);
   if (!(length > 0) || !std::isfinite(length))
     throw Error(std::string(what) + " is no direction: give a finite vector other than 0");
@@ -27,13 +27,6 @@ Vec3 unit(const Vec3& v, const char* what) {
 
 void require_length(double length, const char* what) {
   if (!(length > 0) || !std::isfinite(length)) throw Error(std::string(what) + " is not positive: give a finite length");
-}
-
-Vec3 perpendicular(const Vec3& axis) {
-  const double x = std::abs(axis.x), y = std::abs(axis.y), z = std::abs(axis.z);
-  const Vec3 other = x <= y && x <= z ? Vec3{1, 0, 0} : y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
-  const Vec3 v = cross(axis, other);
-  return (1 / norm(v)) * v;
 }
 
 // Cylindrical coordinates of a point about an axis; `outward` is a unit vector, any one for points of the axis.
@@ -47,12 +40,12 @@ Cylindrical cylindrical(const Vec3& centre, const Vec3& axis, const Vec3& p) {
   const double z = dot(axis, q);
   const Vec3 across = q - z * axis;
   const double rho = norm(across);
-  if (!(rho > 0)) return {perpendicular(axis), rho, z};
+  if (!(rho > 0)) return {frame_across(axis).first, rho, z};
   // Near the axis rounding leaves something along it.
   Vec3 outward = (1 / rho) * across;
   outward -= dot(outward, axis) * axis;
   const double length = norm(outward);
-  return {length > 0.5 ? (1 / length) * outward : perpendicular(axis), rho, z};
+  return {length > 0.5 ? (1 / length) * outward : frame_across(axis).first, rho, z};
 }
 
 // Quadrics with an apex or a line where their gradient is 0; their lengths are ratios.
@@ -632,6 +625,12 @@ const char* name_of(SurfaceType type) {
   return "";
 }
 
+std::pair<Vec3, Vec3> frame_across(const Vec3& axis) {
+  const double x = std::abs(axis.x), y = std::abs(axis.y), z = std::abs(axis.z);
+  const Vec3 u = unit(cross(axis, x <= y && x <= z ? Vec3{1, 0, 0} : y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1}));
+  return {u, cross(axis, u)};
+}
+
 SurfaceType type_of(const Primitive& primitive) {
   return std::visit([](const auto& s) { return surface_type(s); }, primitive);
 }
@@ -650,7 +649,7 @@ Vec3 foot_point(const Primitive& primitive, const Vec3& p) {
 
 Plane make_plane(const Vec3& normal, double offset) {
   const double length = norm(normal);
-  const Vec3 direction = unit(normal, "normal of a plane");
+  const Vec3 direction = require_direction(normal, "normal of a plane");
   return {direction, offset / length};
 }
 
@@ -661,20 +660,20 @@ Sphere make_sphere(const Vec3& centre, double radius) {
 
 Cylinder make_cylinder(const Vec3& point, const Vec3& axis, double radius) {
   require_length(radius, "radius of a cylinder");
-  const Vec3 direction = unit(axis, "axis of a cylinder");
+  const Vec3 direction = require_direction(axis, "axis of a cylinder");
   return {point - dot(point, direction) * direction, direction, radius};
 }
 
 Cone make_cone(const Vec3& apex, const Vec3& axis, double angle) {
   if (!(angle > 0 && angle < std::acos(0.0))) throw Error("angle of a cone is not between 0 and pi/2: give radians");
-  return {apex, unit(axis, "axis of a cone"), angle};
+  return {apex, require_direction(axis, "axis of a cone"), angle};
 }
 
 Torus make_torus(const Vec3& centre, const Vec3& axis, double radius, double minor_radius) {
   require_length(minor_radius, "minor radius of a torus");
   if (!(radius > minor_radius) || !std::isfinite(radius))
     throw Error("radius of a torus is not greater than its minor radius: tori that meet themselves are not supported");
-  return {centre, unit(axis, "axis of a torus"), radius, minor_radius};
+  return {centre, require_direction(axis, "axis of a torus"), radius, minor_radius};
 }
 
 Primitive classify(const Quadric& quadric, const Vec3& near, double extent, double tolerance) {

@@ -1,11 +1,16 @@
 // Making, classifying and moving the surfaces that regions are approximated by (thesis 2.3.3).
 #pragma once
 
+#include <utility>
+
 #include "bisector/segment.h"
 #include "core/geometry.h"
 #include "segment/quadric.h"
 
 namespace bisector {
+
+// Two vectors u and v of length 1, so that (u, v, axis) is right-handed and orthonormal; the axis has length 1.
+std::pair<Vec3, Vec3> frame_across(const Vec3& axis);
 
 // Axes and normals need not have length 1. Throw Error for those without direction, lengths that are not positive, angles
 // outside (0, pi/2), and tori whose minor radius is not the smaller one.

@@ -108,14 +108,6 @@ constexpr int unknowns(SurfaceType type) {
   }
 }
 
-std::pair<Vec3, Vec3> across(const Vec3& axis) {
-  const double x = std::abs(axis.x), y = std::abs(axis.y), z = std::abs(axis.z);
-  const Vec3 other = x <= y && x <= z ? Vec3{1, 0, 0} : y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
-  Vec3 u = cross(axis, other);
-  u *= 1 / norm(u);
-  return {u, cross(axis, u)};
-}
-
 // Brings a shape into its normal form: axis, signs and centre. False if its numbers describe no surface of its type.
 bool normalise(Shape& shape) {
   if (!std::isfinite(norm2(shape.centre) + norm2(shape.axis) + shape.radius + shape.minor_radius + shape.angle)) return false;
@@ -202,7 +194,7 @@ struct NormalEquations {
 NormalEquations normal_equations(const Shape& shape, const Local& local) {
   return for_type(shape.type, [&]<SurfaceType type>() {
     constexpr int n = unknowns(type);
-    const auto [u, v] = across(shape.axis);
+    const auto [u, v] = frame_across(shape.axis);
     double m[n][n] = {}, r[n] = {}, j[n];
     NormalEquations equations;
     for (std::size_t i = 0; i < local.points.size(); ++i) {
@@ -253,7 +245,7 @@ double stepped_radius(double radius, double step) {
 }
 
 Shape stepped(const Shape& shape, const NormalEquations& at, const Vector& step) {
-  const auto [u, v] = across(shape.axis);
+  const auto [u, v] = frame_across(shape.axis);
   Shape next = shape;
   int k = 2;
   Vec3 move = step(0) * u + step(1) * v;
@@ -408,7 +400,7 @@ Directions axis_directions(const Sums& sums) {
 // The point of the plane across the axis that the lines of the normals pass most closely by.
 Vec3 axis_point(const Sums& sums, const Vec3& axis) {
   // Sum of ((p - x) . (axis x n))^2; (p . (axis x n)) = -axis . (p x n).
-  const auto [u, v] = across(axis);
+  const auto [u, v] = frame_across(axis);
   const Eigen::Vector3d a = eigen(axis), eu = eigen(u), ev = eigen(v);
   // x . (axis x n) = (x x axis) . n, with u x axis = -v and v x axis = u.
   Eigen::Matrix2d matrix;
@@ -458,7 +450,7 @@ void add_axes_by_curvature(const Local& local, const Sums& sums, const std::vect
 }
 
 std::optional<Shape> start_cylinder(const Local& local, const Vec3& axis) {
-  const auto [u, v] = across(axis);
+  const auto [u, v] = frame_across(axis);
   RoundFitter<2> circle;
   for (std::size_t i = 0; i < local.points.size(); ++i)
     circle.add({dot(u, local.points[i]), dot(v, local.points[i])}, local.weights[i]);

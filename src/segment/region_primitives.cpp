@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "segment/flood.h"
 #include "segment/primitive_fit.h"
@@ -340,7 +341,7 @@ bool simplify(const SegmentDomain& domain, SegmentSurfaces surfaces, Index r, co
 
 std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::size_t count,
                                          const std::vector<Proxy>& proxies, SegmentSurfaces surfaces) {
-  const Csr<Index> triangles = region_triangles(labels, count);
+  const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
   std::vector<Primitive> primitives(count);
   parallel_each(count, [&](std::size_t r) {
@@ -358,20 +359,20 @@ void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, 
   for (Index t = 0; t < labelling.labels.size(); ++t)
     labelling.distances[t] = distance_to(domain, t, labelling.proxies[labelling.labels[t]]);
   evaluations += labelling.labels.size();
-  Csr<Index> triangles = region_triangles(labelling.labels, primitives.size());
+  Csr<Index> triangles = items_of_labels<Index>(labelling.labels, primitives.size());
   std::vector<std::uint8_t> depths = vertex_depths(domain, labelling.labels);
   for (Index r = 0; r < primitives.size(); ++r) {
     const Index *begin = triangles.begin(r), *end = triangles.end(r);
     const RegionSurface region(domain, begin, end, depths);
     if (!simplify(domain, surfaces, r, region, begin, end, labelling, primitives[r], evaluations)) continue;
-    triangles = region_triangles(labelling.labels, primitives.size());
+    triangles = items_of_labels<Index>(labelling.labels, primitives.size());
     depths = vertex_depths(domain, labelling.labels);
   }
   labels = std::move(labelling.labels);
 }
 
 void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::vector<Primitive>& primitives) {
-  const Csr<Index> triangles = region_triangles(labels, primitives.size());
+  const Csr<Index> triangles = items_of_labels<Index>(labels, primitives.size());
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
   parallel_each(primitives.size(), [&](std::size_t r) {
     const RegionSurface region(domain, triangles.begin(r), triangles.end(r), depths);

@@ -3,15 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/stopwatch.h"
 #include "segment/flood.h"
 #include "segment/improve_partition.h"
 #include "segment/lloyd.h"
@@ -25,20 +26,6 @@ namespace bisector {
 namespace {
 
 constexpr double kFarFoot = 2;  // times the largest distance in a region
-
-class Clock {
- public:
-  // Seconds since the last call.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 void check_options(const SegmentOptions& options) {
   if (options.proxies == 0 && !(options.error > 0 && std::isfinite(options.error)))
@@ -93,7 +80,7 @@ Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double a
 // Around random triangles, at least one of each component, the others all over the mesh.
 Partition start_at_random(Lloyd& lloyd, std::size_t count, std::uint64_t random_seed) {
   const SegmentDomain& domain = lloyd.domain();
-  const Csr<Index> parts = region_triangles(domain.components, domain.component_count);
+  const Csr<Index> parts = items_of_labels<Index>(domain.components, domain.component_count);
   std::vector<FloodSeed> seeds;
   std::vector<Proxy> proxies;
   std::vector<char> taken(domain.triangles.size(), 0);
@@ -127,7 +114,7 @@ Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptio
   const double most_rms = wanted > 0 ? 0 : allowed_rms(lloyd.domain(), options.error);
   const double allowed = most_rms * most_rms * lloyd.domain().area;
   const auto enough = [&](const Partition& p) { return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed; };
-  Clock clock;
+  Stopwatch clock;
   report(context, "start", 0);
   const bool merging = options.start == SegmentStart::merging;
   const std::size_t at_random = options.start == SegmentStart::random ? wanted : 1;
@@ -265,7 +252,7 @@ std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDoma
 
 SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& domain, const SegmentOptions& options,
                              const Context& context) {
-  Clock clock;
+  Stopwatch clock;
   SegmentResult result;
   Lloyd lloyd(domain, options.surfaces, context);
   PartitionEditor editor(lloyd, options.iterations);
@@ -294,7 +281,7 @@ SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& doma
   result.seconds.smooth = clock.lap();
   result.rms = domain.scale * std::sqrt(mean_square(domain, labels, proxies_of(primitives)));
 
-  const Csr<Index> triangles = region_triangles(labels, count);
+  const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   for (std::size_t r = 0; r < count; ++r)
     result.regions.push_back(measure_region(domain, primitives[r], triangles.begin(r), triangles.end(r)));
   if (options.project) result.projected = projected_vertices(mesh, domain, labels, primitives, result.regions);
@@ -313,7 +300,7 @@ SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& doma
 }  // namespace
 
 SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
-  Clock clock;
+  Stopwatch clock;
   check_options(options);
   const SegmentDomain domain = make_segment_domain(mesh);
   check_count(domain, options.proxies);
@@ -330,7 +317,7 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   if (options.proxies == 0 && result.rms > most)
     context.warn(fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
                              "a number of proxies", result.rms, most));
-  result.seconds.total = clock.lap();
+  result.seconds.total = clock.seconds();
   return result;
 }
 

@@ -18,7 +18,7 @@ constexpr double kDamping = 0.1;          // of slopes, in the sum of variances
 constexpr double kConverged = 1e-3;       // relative change of the energy
 constexpr int kRounds = 12;               // of splitting
 
-double energy(const Vec3& p, const Cylinder& c) {
+double energy(const Vec3& p, const BranchCylinder& c) {
   const Vec3 d = p - c.centre;
   const double along = dot(d, c.axis);
   const double off = norm(d - along * c.axis) - c.radius;
@@ -69,7 +69,7 @@ class Clustering {
 
   void fix_tight() {
     for (std::size_t c = 0; c < members_.size(); ++c) {
-      const Cylinder& cylinder = result_.cylinders[c];
+      const BranchCylinder& cylinder = result_.cylinders[c];
       if (result_.fixed[c] || members_[c].empty()) continue;
       const bool large = options_.max_points > 0 && members_[c].size() > options_.max_points;
       result_.fixed[c] = !large && cylinder.rms <= std::max(options_.delta, kOutOfRound * cylinder.radius);

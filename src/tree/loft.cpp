@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "bisector/error.h"
+#include "tree/bspline.h"
 #include "tree/frames.h"
 
 namespace bisector {

@@ -20,13 +20,6 @@ constexpr double kTangent = 6;          // length in radii that tells a directio
 constexpr double kSwapScore = 0.5;      // by which a child goes on straighter and thicker than its parent
 constexpr double kSwapLength = 0.6;     // of what it replaces
 
-double median(std::vector<double>::const_iterator begin, std::vector<double>::const_iterator end) {
-  std::vector<double> values(begin, end);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 class Reattachment {
  public:
   Reattachment(const std::vector<Vec3>& points, double noise, std::vector<Limb>& limbs)
@@ -84,7 +77,8 @@ class Reattachment {
   };
 
   static double base_radius(const Limb& limb) {
-    return median(limb.radii.begin(), limb.radii.begin() + static_cast<std::ptrdiff_t>(std::min(kWindow, limb.radii.size())));
+    const auto count = static_cast<std::ptrdiff_t>(std::min(kWindow, limb.radii.size()));
+    return upper_median({limb.radii.begin(), limb.radii.begin() + count});
   }
 
   // Of the base of a limb; its first node may lie on the axis of its parent.
@@ -213,7 +207,7 @@ class Reattachment {
     if (height < kSwapLength * length) return false;
     const auto window = [&](std::size_t begin, std::size_t end) {
       const auto at = [&](std::size_t i) { return branch.radii.begin() + static_cast<std::ptrdiff_t>(i); };
-      return median(at(begin), at(std::max(end, begin + 1)));
+      return upper_median({at(begin), at(std::max(end, begin + 1))});
     };
     const double before = window(k > kWindow ? k - kWindow : 0, k);
     const double after = window(k, std::min(k + kWindow, branch.radii.size()));

@@ -1,15 +1,15 @@
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 
 #include "bisector/error.h"
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "tree/branches.h"
 #include "tree/clusters.h"
 #include "tree/level_sections.h"
@@ -26,19 +26,6 @@ constexpr double kSliceSpacings = 3;         // thickness of the slices that clu
 constexpr double kLeastSlice = 0.006;        // but at least so much of the unit cube
 constexpr double kSlender = 4;               // clusters so many times thicker than their rms tell the noise
 constexpr double kAxisTolerance = 0.3;       // of fitted curves, in the branch's median radius
-
-class Stopwatch {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - start_).count();
-    start_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 // The points that the tree is made from, in the unit cube.
 struct Scan {
@@ -171,14 +158,11 @@ Clusters make_clusters(const Scan& scan, const Network& network, const TreeOptio
 }
 
 // Standard deviation of points off cylinders that are much thicker than it.
-double measure_noise(const std::vector<Cylinder>& cylinders) {
+double measure_noise(const std::vector<BranchCylinder>& cylinders) {
   std::vector<double> rms;
-  for (const Cylinder& c : cylinders)
+  for (const BranchCylinder& c : cylinders)
     if (c.rms > 0 && c.radius > kSlender * c.rms) rms.push_back(c.rms);
-  if (rms.empty()) return 0;
-  const auto middle = rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2);
-  std::nth_element(rms.begin(), middle, rms.end());
-  return *middle;
+  return rms.empty() ? 0 : upper_median(std::move(rms));
 }
 
 std::vector<Limb> rough_limbs(const Scan& scan, const Network& network, const Clusters& clusters,
@@ -262,9 +246,8 @@ void describe_branches(const std::vector<Limb>& limbs, TreeResult& result) {
 
 void loft(const std::vector<Limb>& limbs, TreeResult& result) {
   parallel_each(limbs.size(), [&](std::size_t b) {
-    std::vector<double> radii = limbs[b].radii;
-    std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2), radii.end());
-    result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, kAxisTolerance * radii[radii.size() / 2]);
+    const double tolerance = kAxisTolerance * upper_median(limbs[b].radii);
+    result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, tolerance);
   }, 1);
 }
 
@@ -273,7 +256,7 @@ void loft(const std::vector<Limb>& limbs, TreeResult& result) {
 TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
   check_options(options);
   TreeResult result;
-  Stopwatch total, watch;
+  Stopwatch watch;
   const auto phase = [&](const char* name, double fraction) {
     context.check();
     context.report({.phase = name, .fraction = fraction});
@@ -318,7 +301,7 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
       result.branch[i] = branch_of[p];
     }
   result.seconds.surfaces = watch.lap();
-  result.seconds.total = total.lap();
+  result.seconds.total = watch.seconds();
   return result;
 }
 

@@ -1,4 +1,4 @@
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -18,7 +18,6 @@
 #include "io/mesh_io.h"
 #include "mesh/topology.h"
 #include "tree/coverage.h"
-#include "tree/tree_io.h"
 #include "support/models.h"
 #include "support/tree_model.h"
 
