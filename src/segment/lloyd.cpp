@@ -15,20 +15,21 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kTorusSamples = 160;
-constexpr std::size_t kLeastForTorus = 12;  // triangles
-constexpr int kToriEvery = 5;               // steps, for regions that are none yet
-constexpr int kFirstFloods = 3, kFloodEvery = 4;  // steps of Lloyd's iteration that flood
+constexpr std::size_t kTorusSamples = 160;  // points of a region that tori are fitted to
+constexpr std::size_t kLeastForTorus = 12;  // triangles of a region that tori are tried on
+constexpr int kToriEvery = 5;               // steps after which tori are tried anew on regions that are none; they are dear to fit
+constexpr int kFirstFloods = 3, kFloodEvery = 4;  // the first steps flood, then one in so many: later only borders move
 constexpr double kEnough = 1e-4;            // a step that lowers the energy by a smaller part is the last
+constexpr double kStepsToCome = 5;          // as large as the last one, that a trial may still hope for
 constexpr double kExact = 1e-14;            // squared distance that is as good as none, in the unit-sized model
+constexpr double kOneSided = 0.99;          // share of the area with normals on one side of a surface, at least
 
 // Whether the triangles' normals are on one side of a surface. Noise is fitted best by two sheets with the data between.
 bool is_one_sided(const SegmentDomain& domain, const Index* begin, const Index* end, const Proxy& proxy) {
-  constexpr double kLeastShare = 0.99;  // of the area, on one side
   double along = 0, against = 0;
   for (const Index* t = begin; t != end; ++t)
     (dot(proxy.gradient(domain.barycentres[*t]), domain.normals[*t]) < 0 ? against : along) += domain.areas[*t];
-  return std::max(along, against) >= kLeastShare * (along + against);
+  return std::max(along, against) >= kOneSided * (along + against);
 }
 
 // Moments of triangles that are not many more or others than those that `known` is of.
@@ -223,7 +224,6 @@ void Lloyd::try_out(Partition& partition, int iterations, double goal) {
     context_.check();
     const double before = partition.energy();
     if (!step(partition, k == 0)) break;
-    constexpr double kStepsToCome = 5;
     const double now = partition.energy();
     if (now - kStepsToCome * (before - now) > goal) break;
   }

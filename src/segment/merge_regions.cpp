@@ -14,10 +14,11 @@
 namespace bisector {
 namespace {
 
-constexpr int kPollEvery = 1024;
-constexpr std::size_t kTorusSamples = 96;
-constexpr std::size_t kLeastForTorus = 12;  // triangles
-constexpr std::size_t kFewForTori = 60;     // regions
+constexpr int kPollEvery = 1024;            // mergings of triangles after which the context is asked whether to go on
+constexpr std::size_t kTorusSamples = 96;   // points of a pair of regions that tori are fitted to
+constexpr std::size_t kLeastForTorus = 12;  // triangles of a pair that tori are tried on
+constexpr std::size_t kFewForTori = 60;     // regions from which on tori are tried: they are dear, and on small regions quadrics do
+constexpr double kPoorFit = 1.5;            // growth of the squared distance from which on a torus is worth trying
 
 // Area, first and second moments, about the origin of the unit-sized model.
 struct PlaneMoments {
@@ -194,7 +195,7 @@ class SurfaceMerging {
     // Only where the pair does not fit otherwise.
     const double apart = first.squared_distance + second.squared_distance;
     const std::size_t count = first.triangles.size() + second.triangles.size();
-    if (least <= 1.5 * apart + 1e-12 * both.area() || count < kLeastForTorus) return least;
+    if (least <= kPoorFit * apart + 1e-12 * both.area() || count < kLeastForTorus) return least;
     std::vector<Index> triangles;
     triangles.reserve(count);
     std::merge(first.triangles.begin(), first.triangles.end(), second.triangles.begin(), second.triangles.end(),

@@ -12,11 +12,11 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kLeastPoints = 12;  // of a cluster after a split, about
-constexpr double kOutOfRound = 0.15;      // rms of a tight cluster in radii, where that is more than delta
-constexpr double kDamping = 0.1;          // of slopes, in the sum of variances
-constexpr double kConverged = 1e-3;       // relative change of the energy
-constexpr int kRounds = 12;               // of splitting
+constexpr std::size_t kLeastPoints = 12;  // in each half of a cluster that is split, about
+constexpr double kOutOfRound = 0.15;      // rms of a tight cluster in radii, where that is more than ClusterOptions::delta
+constexpr double kDamping = 0.1;          // of the regression that gives an axis, in the sum of the points' variances
+constexpr double kConverged = 1e-3;       // relative change of the energy that ends Lloyd's iteration
+constexpr int kRounds = 12;               // of splitting, at most
 
 double energy(const Vec3& p, const BranchCylinder& c) {
   const Vec3 d = p - c.centre;

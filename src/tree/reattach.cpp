@@ -11,14 +11,18 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kWindow = 5;      // nodes of the axis that a radius is the median of
-constexpr double kFar = 3;              // of a base from its parent's surface, in radii: another parent is looked for
-constexpr double kTurn = 3;             // how much longer a gap counts across the direction than along it, times 1
-constexpr double kBetter = 0.6;         // of the gap to the present parent
-constexpr double kThinner = 0.7;        // than its child a parent may be, in its radii
-constexpr double kTangent = 6;          // length in radii that tells a direction
-constexpr double kSwapScore = 0.5;      // by which a child goes on straighter and thicker than its parent
-constexpr double kSwapLength = 0.6;     // of what it replaces
+constexpr std::size_t kWindow = 5;  // nodes of the axis that a radius is the median of
+constexpr double kTangent = 6;      // length in radii that tells a direction
+
+// Another parent is looked for where a base is far from its parent's surface.
+constexpr double kFar = 3;      // distance in radii of the base
+constexpr double kTurn = 3;     // what a gap across the base's direction counts more than one along it, in its length
+constexpr double kBetter = 0.6;  // cost of the gap to another parent over that to the present one, at most
+constexpr double kThinner = 0.7;  // radius of a parent over its child's, at least
+
+// A child becomes the rest of its parent's branch where it goes on straighter and thicker.
+constexpr double kSwapScore = 0.5;   // by which its score is higher, at least
+constexpr double kSwapLength = 0.6;  // its length over that of what it replaces, at least
 
 class Reattachment {
  public:

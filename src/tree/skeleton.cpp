@@ -13,9 +13,11 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kNearClusters = 16;  // that are looked at across gaps
-constexpr double kTurn = 1.5;              // how much longer a link across an axis is than one along it, times 1
-constexpr double kGap = 3;                 // how much longer a gap is than a way along points
+constexpr std::size_t kNearClusters = 16;  // nearest clusters that gaps are measured to
+// What makes links longer, so that paths go straight on: the length added for a link across an axis, and for a gap, as a
+// multiple of its own.
+constexpr double kTurn = 1.5;
+constexpr double kGap = 3;
 
 double length_of(const ClusterLink& link, const std::vector<BranchCylinder>& cylinders) {
   return norm(link.junction - cylinders[link.from].centre) + norm(link.junction - cylinders[link.to].centre);
