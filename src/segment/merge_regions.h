@@ -1,4 +1,4 @@
-// A start that needs no luck: small regions merged pairwise, the pair that costs least first.
+// A start that is the same for every random seed: small regions merged pairwise, the pair that costs least first.
 #pragma once
 
 #include <cstddef>
