@@ -4,9 +4,9 @@
 #include "bisector/device.h"
 #include "core/words.h"
 #include "remesh/remesh.h"
-#include "segment/segment.h"
+#include "bisector/segment.h"
 #include "tree/iges.h"
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 namespace bisector::cli {
 
