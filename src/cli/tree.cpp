@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "bisector/tree.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "io/mesh_io.h"
 #include "tree/coverage.h"
-#include "bisector/tree.h"
 #include "commands.h"
 #include "console.h"
 #include "options.h"
