@@ -9,7 +9,7 @@
 
 #include "bisector/io.h"
 #include "core/parallel.h"
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 namespace {
 

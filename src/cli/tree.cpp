@@ -8,11 +8,10 @@
 
 #include "bisector/io.h"
 #include "core/geometry.h"
+#include "bisector/tree.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "tree/coverage.h"
-#include "tree/tree.h"
-#include "tree/tree_io.h"
 #include "commands.h"
 #include "console.h"
 #include "options.h"

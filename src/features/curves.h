@@ -10,25 +10,6 @@
 
 namespace bisector {
 
-<<<<<<< HEAD
-// Where a seed may be.
-struct SeedPlace {
-  enum class Kind : unsigned char {
-    surface,   // anywhere on the surface
-    curve,     // on one feature curve
-    fixed,     // where it is
-    interior,  // anywhere: the inside of a solid
-  };
-  Kind kind = Kind::surface;
-  Index curve = kNone;   // the feature curve it lies on, if one alone
-  Index corner = kNone;  // index in FeatureGraph::corners of the corner it lies at, if any
-  double position = 0;   // arc length along `curve`, if there is one
-=======
-// Seeds and their places, parallel.
-struct PlacedSeeds {
-  std::vector<Vec3> seeds;
-  std::vector<SeedPlace> places;
->>>>>>> base
 class FeatureCurves {
  public:
   FeatureCurves() = default;

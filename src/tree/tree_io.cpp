@@ -1,4 +1,4 @@
-#include "tree/tree_io.h"
+#include "bisector/tree.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -19,6 +19,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "mesh/topology.h"
+#include "tree/coverage.h"
 #include "support/models.h"
 #include "support/tree_model.h"
 #include "tree/coverage.h"
