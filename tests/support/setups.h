@@ -103,7 +103,7 @@ inline void expect_same_areas(const Surface& surface, const Diagram& reference, 
   EXPECT_LE(worst, tolerance);
 }
 
-inline void expect_parity(const Surface& surface, const Diagram& reference, const Diagram& found, Processor processor) {
+inline void expect_parity(const Surface& surface, const Diagram& reference, const Evaluated& found, Processor processor) {
   const Parity parity = compare(reference.moments, reference.polygons, found.moments, found.polygons, surface);
   EXPECT_TRUE(parity.same_pairs);
   EXPECT_TRUE(parity.same_labels);
@@ -121,9 +121,9 @@ inline void expect_parity(const Surface& surface, const Diagram& reference, cons
   if (processor != Processor::single) {
     EXPECT_TRUE(parity.bitwise) << "not the CPU's bits";
   }
-  EXPECT_EQ(found.moments.certification.pairs, reference.polygons.pairs.size());
+  EXPECT_EQ(found.report.certification.pairs, reference.polygons.pairs.size());
   if (processor != Processor::single) {
-    EXPECT_EQ(found.moments.certification.doubled, 0u);
+    EXPECT_EQ(found.report.certification.doubled, 0u);
   }
 }
 

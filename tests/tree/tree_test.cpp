@@ -22,8 +22,6 @@
 #include "tree/coverage.h"
 #include "support/models.h"
 #include "support/tree_model.h"
-#include "tree/coverage.h"
-#include "tree/tree_io.h"
 
 namespace bisector {
 namespace {
