@@ -7,7 +7,7 @@
 
 #include "remesh/remesh.h"
 #include "segment/segment.h"
-#include "tetmesh/tetmesh.h"
+#include "bisector/tetmesh.h"
 #include "tree/tree.h"
 
 namespace bisector::cli {

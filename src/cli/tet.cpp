@@ -13,7 +13,7 @@
 #include "io/tet_io.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "tetmesh/tetmesh.h"
+#include "bisector/tetmesh.h"
 #include "commands.h"
 #include "common.h"
 #include "console.h"

@@ -69,7 +69,7 @@ void check_edges(const TriangleMesh& mesh, const EdgeTable& table, const std::ve
   }
   if (open.any())
     throw Error("the surface is not closed: " + open.list("edge has one triangle", "edges have one triangle") +
-                "; close the holes or join the cracks (--weld)");
+                "; close the holes or weld the cracks");
   if (multiple.any())
     throw Error("the surface is not manifold: " +
                 multiple.list("edge has more than two triangles", "edges have more than two triangles") +

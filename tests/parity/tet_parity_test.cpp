@@ -7,7 +7,7 @@
 
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "tetmesh/tetmesh.h"
+#include "bisector/tetmesh.h"
 #include "support/setups.h"
 #include "support/solids.h"
 
