@@ -8,9 +8,9 @@
 #include "bisector/quality.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
+#include "bisector/tetmesh.h"
 #include "support/setups.h"
 #include "support/solids.h"
-#include "tetmesh/tetmesh.h"
 
 namespace bisector::test {
 namespace {
