@@ -16,10 +16,10 @@ constexpr double kTiny = 1e-300;    // length in place of 0, so that nothing is 
 // The barycentric coordinates of p; all are -infinity if the tetrahedron has no volume.
 std::array<double, 4> barycentric(const TetMesh& mesh, const Tetrahedron& tet, const Vec3& p) {
   const Vec3 v[4] = {mesh.vertices[tet[0]], mesh.vertices[tet[1]], mesh.vertices[tet[2]], mesh.vertices[tet[3]]};
-  const double whole = six_rounded_volumes(v[0], v[1], v[2], v[3]), none = -std::numeric_limits<double>::infinity();
+  const double whole = rounded_six_volume(v[0], v[1], v[2], v[3]), none = -std::numeric_limits<double>::infinity();
   if (whole == 0) return {none, none, none, none};
-  return {six_rounded_volumes(p, v[1], v[2], v[3]) / whole, six_rounded_volumes(v[0], p, v[2], v[3]) / whole,
-          six_rounded_volumes(v[0], v[1], p, v[3]) / whole, six_rounded_volumes(v[0], v[1], v[2], p) / whole};
+  return {rounded_six_volume(p, v[1], v[2], v[3]) / whole, rounded_six_volume(v[0], p, v[2], v[3]) / whole,
+          rounded_six_volume(v[0], v[1], p, v[3]) / whole, rounded_six_volume(v[0], v[1], v[2], p) / whole};
 }
 
 }  // namespace

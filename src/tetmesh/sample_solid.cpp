@@ -53,7 +53,7 @@ std::vector<Vec3> sample_solid(const TetMesh& mesh, std::size_t count, std::uint
   for (std::size_t k = 0; k < order.size(); ++k) {
     const auto [a, b, c, d] = mesh.tets[order[k]];
     const double volume =
-        std::abs(six_rounded_volumes(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], mesh.vertices[d]));
+        std::abs(rounded_six_volume(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], mesh.vertices[d]));
     sum += density.empty() ? volume : volume * (density[a] + density[b] + density[c] + density[d]);
     sums[k] = sum;
   }

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "backend/solid_backend.h"
+#include "backend/backend.h"
 #include "bisector/tetmesh.h"
 
 namespace bisector {

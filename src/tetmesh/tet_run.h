@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "backend/solid_backend.h"
+#include "backend/backend.h"
 #include "bisector/tetmesh.h"
 #include "cvt/optimise.h"
 #include "features/curves.h"

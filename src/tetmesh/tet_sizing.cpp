@@ -39,7 +39,7 @@ constexpr double kOutside = -1e-6;     // least barycentric coordinate of a poin
 constexpr double kLeastDensity = 1e-100, kMostDensity = 1e100;  // of an attribute
 
 double volume_of(const TetMesh& mesh, const Tetrahedron& t) {
-  return std::abs(six_rounded_volumes(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]])) / 6;
+  return std::abs(rounded_six_volume(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]])) / 6;
 }
 
 // Volumes and areas, over which the number of vertices is an integral.
