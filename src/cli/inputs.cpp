@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "bisector/error.h"
-#include "io/mesh_io.h"
+#include "bisector/io.h"
 #include "console.h"
 
 namespace bisector::cli {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "bisector/device.h"
-#include "features/features.h"
+#include "bisector/features.h"
 #include "remesh/sizing.h"
 #include "parsed_option.h"
 

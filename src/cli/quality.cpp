@@ -6,12 +6,10 @@
 #include <string>
 #include <utility>
 
+#include "bisector/io.h"
+#include "bisector/quality.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "io/mesh_io.h"
-#include "io/tet_io.h"
-#include "mesh/distance.h"
-#include "mesh/quality.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 #include "commands.h"

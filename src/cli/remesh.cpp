@@ -4,12 +4,12 @@
 #include <memory>
 #include <string>
 
+#include "bisector/io.h"
+#include "bisector/preview.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "io/mesh_io.h"
-#include "mesh/distance.h"
-#include "mesh/quality.h"
-#include "preview/preview.h"
 #include "remesh/remesh.h"
 #include "commands.h"
 #include "console.h"

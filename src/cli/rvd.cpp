@@ -8,12 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "bisector/io.h"
+#include "bisector/preview.h"
 #include "compute/compute.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "io/mesh_io.h"
+#include "io/files.h"
 #include "mesh/sampling.h"
-#include "preview/preview.h"
 #include "voronoi/diagram.h"
 #include "voronoi/tiling.h"
 #include "cells.h"

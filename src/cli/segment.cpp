@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "bisector/io.h"
+#include "bisector/preview.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "io/mesh_io.h"
-#include "mesh/distance.h"
-#include "mesh/quality.h"
-#include "preview/preview.h"
 #include "segment/dual_graph.h"
 #include "segment/segment.h"
 #include "cells.h"

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "bisector/device.h"
+#include "bisector/quality.h"
 #include "mesh/topology.h"
 #include "console.h"
 #include "report.h"

@@ -9,14 +9,14 @@
 #include <system_error>
 #include <utility>
 
+#include "bisector/io.h"
+#include "bisector/preview.h"
+#include "bisector/quality.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "io/mesh_io.h"
-#include "io/tet_io.h"
-#include "mesh/distance.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "preview/tet_preview.h"
 #include "tetmesh/tetmesh.h"
 #include "commands.h"
 #include "console.h"

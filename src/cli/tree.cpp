@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "bisector/io.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "io/mesh_io.h"
 #include "tree/coverage.h"
 #include "tree/tree.h"
 #include "tree/tree_io.h"

@@ -25,16 +25,17 @@
 #include <utility>
 #include <vector>
 
+#include "bisector/io.h"
+#include "bisector/quality.h"
 #include "cli/words.h"
 #include "compute/compute.h"
-#include "io/mesh_io.h"
-#include "io/tet_io.h"
+#include "core/geometry.h"
 #include "mesh/tet_topology.h"
 #include "mesh/topology.h"
-#include "tetmesh/tetgen.h"
 #include "support/models.h"
 #include "support/solids.h"
 #include "support/tree_model.h"
+#include "tetmesh/tetgen.h"
 
 namespace bisector {
 namespace {
