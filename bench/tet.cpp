@@ -17,7 +17,7 @@
 #include "mesh/tet_topology.h"
 #include "remesh/remesh.h"
 #include "tetmesh/check_surface.h"
-#include "tetmesh/tetmesh.h"
+#include "bisector/tetmesh.h"
 #include "common.h"
 #include "mesh3.h"
 #if BISECTOR_TETGEN

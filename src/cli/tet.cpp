@@ -17,7 +17,7 @@
 #include "core/stopwatch.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "tetmesh/tetmesh.h"
+#include "bisector/tetmesh.h"
 #include "commands.h"
 #include "console.h"
 #include "inputs.h"

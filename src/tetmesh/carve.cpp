@@ -11,66 +11,108 @@ namespace bisector {
 
 namespace {
 
-// The three rotations of a triangle are the same side of it.
+// The same for all three rotations of a triangle, but not for its other side.
 Triangle rotated(Triangle t) {
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
   return t;
 }
 
+// One side of each triangle of the boundary, as the facet of a tetrahedron there.
+class Sides {
+ public:
+  void add(const Triangle& facet, Index triangle) { sides_.emplace_back(rotated(facet), triangle); }
+  void sort() { std::sort(sides_.begin(), sides_.end()); }
+  // The triangle with this side, as rotated() gives it, or kNone.
+  Index find(const Triangle& facet) const {
+    const auto at = std::lower_bound(sides_.begin(), sides_.end(), std::pair(facet, Index{0}));
+    return at != sides_.end() && at->first == facet ? at->second : kNone;
+  }
+
+ private:
+  std::vector<std::pair<Triangle, Index>> sides_;
+};
+
+// Spreads inside and outside from the triangles of the boundary over the tetrahedra.
+class Carver {
+ public:
+  explicit Carver(const std::vector<Tetrahedron>& tets)
+      : tets_(tets), adjacent_(tet_adjacency(tets)), side_(tets.size(), unknown),
+        wall_(tets.size(), {false, false, false, false}) {}
+
+  // Marks the tetrahedra at the boundary. Returns the triangles that are not facets.
+  std::vector<Index> mark_at_boundary(const std::vector<Triangle>& boundary) {
+    Sides inner, outer;
+    for (Index i = 0; i < boundary.size(); ++i) {
+      const Triangle& t = boundary[i];
+      inner.add(t, i);
+      outer.add({t[0], t[2], t[1]}, i);
+    }
+    inner.sort();
+    outer.sort();
+    std::vector<char> found(boundary.size(), 0);
+    for (Index t = 0; t < tets_.size(); ++t)
+      for (int k = 0; k < 4; ++k) {
+        const Triangle facet = rotated(facet_of(tets_[t], k));
+        const Index in = inner.find(facet), out = outer.find(facet);
+        if (in == kNone && out == kNone) continue;
+        wall_[t][static_cast<std::size_t>(k)] = true;
+        if (in != kNone) found[in] = 1;
+        mark(t, in != kNone ? inside : outside);
+      }
+    std::vector<Index> missing;
+    for (Index i = 0; i < boundary.size(); ++i)
+      if (!found[i]) missing.push_back(i);
+    return missing;
+  }
+
+  // Marks what is joined to marked tetrahedra by facets that are not on the boundary.
+  void spread() {
+    for (std::size_t head = 0; head < queue_.size(); ++head) {
+      const Index t = queue_[head];
+      for (std::size_t k = 0; k < 4; ++k) {
+        if (wall_[t][k]) continue;
+        if (adjacent_[t][k] != kNone)
+          mark(adjacent_[t][k], side_[t]);
+        else if (side_[t] == inside)
+          throw Error("the tetrahedra do not fill the surface; please report this as a bug");
+      }
+    }
+  }
+
+  std::vector<Tetrahedron> tets_inside() const {
+    std::vector<Tetrahedron> chosen;
+    for (Index t = 0; t < tets_.size(); ++t)
+      if (side_[t] == inside) chosen.push_back(tets_[t]);
+    return chosen;
+  }
+
+ private:
+  enum Side : char { unknown, inside, outside };
+
+  void mark(Index tet, Side side) {
+    if (side_[tet] == side) return;
+    if (side_[tet] != unknown)
+      throw Error("the surface does not separate inside from outside; it must be closed and oriented");
+    side_[tet] = side;
+    queue_.push_back(tet);
+  }
+
+  const std::vector<Tetrahedron>& tets_;
+  std::vector<std::array<Index, 4>> adjacent_;
+  std::vector<Side> side_;
+  std::vector<std::array<bool, 4>> wall_;  // facets on the boundary
+  std::vector<Index> queue_;               // marked tetrahedra, in the order of their marks
+};
+
 }  // namespace
 
 Carved carve(const std::vector<Tetrahedron>& tets, const std::vector<Triangle>& boundary) {
-  std::vector<std::pair<Triangle, Index>> inner,
-      outer;  // sides of boundary triangles, as facets of the tetrahedra there
-  for (Index i = 0; i < boundary.size(); ++i) {
-    const Triangle& t = boundary[i];
-    inner.emplace_back(rotated(t), i);
-    outer.emplace_back(rotated({t[0], t[2], t[1]}), i);
-  }
-  std::sort(inner.begin(), inner.end());
-  std::sort(outer.begin(), outer.end());
-  const auto find = [](const std::vector<std::pair<Triangle, Index>>& sides, const Triangle& facet) {
-    const auto at = std::lower_bound(sides.begin(), sides.end(), std::pair(facet, Index{0}));
-    return at != sides.end() && at->first == facet ? at->second : kNone;
-  };
-
-  enum : char { unknown, inside, outside };
-  const std::vector<std::array<Index, 4>> adjacent = tet_adjacency(tets);
-  std::vector<char> state(tets.size(), unknown), found(boundary.size(), 0);
-  std::vector<std::array<bool, 4>> wall(tets.size(), {false, false, false, false});
-  std::vector<Index> queue;
-  const auto mark = [&](Index tet, char side) {
-    if (state[tet] == side) return;
-    if (state[tet] != unknown)
-      throw Error("the surface does not separate inside from outside; it must be closed and oriented");
-    state[tet] = side;
-    queue.push_back(tet);
-  };
-  for (Index t = 0; t < tets.size(); ++t)
-    for (int k = 0; k < 4; ++k) {
-      const Triangle facet = rotated(facet_of(tets[t], k));
-      const Index in = find(inner, facet), out = find(outer, facet);
-      if (in == kNone && out == kNone) continue;
-      wall[t][static_cast<std::size_t>(k)] = true;
-      if (in != kNone) found[in] = 1;
-      mark(t, in != kNone ? inside : outside);
-    }
+  Carver carver(tets);
   Carved carved;
-  for (Index i = 0; i < boundary.size(); ++i)
-    if (!found[i]) carved.missing.push_back(i);
+  carved.missing = carver.mark_at_boundary(boundary);
   if (!carved.missing.empty()) return carved;
-  for (std::size_t head = 0; head < queue.size(); ++head) {
-    const Index t = queue[head];
-    for (std::size_t k = 0; k < 4; ++k) {
-      if (wall[t][k]) continue;
-      if (adjacent[t][k] != kNone)
-        mark(adjacent[t][k], state[t]);
-      else if (state[t] == inside)
-        throw Error("the tetrahedra do not fill the surface; please report this as a bug");
-    }
-  }
-  for (Index t = 0; t < tets.size(); ++t)
-    if (state[t] == inside) carved.tets.push_back(tets[t]);
+  carver.spread();
+  carved.tets = carver.tets_inside();
   return carved;
 }
 

@@ -13,8 +13,8 @@ struct Carved {
 };
 
 // `tets`: positive, each facet with at most two. `boundary`: closed, counter-clockwise seen from outside the solid, no
-// triangle twice. Throws Error if some tetrahedron is inside by one triangle and outside by another, or the inside
-// reaches the tetrahedra's own border elsewhere.
+// triangle twice. Throws Error if one triangle puts a tetrahedron inside and another one outside, or if the inside
+// reaches the tetrahedra's own border elsewhere than at the boundary.
 Carved carve(const std::vector<Tetrahedron>& tets, const std::vector<Triangle>& boundary);
 
 }  // namespace bisector

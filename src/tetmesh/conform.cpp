@@ -19,6 +19,8 @@ namespace bisector {
 
 namespace {
 
+constexpr double kSphereMargin = 1 + 1e-6;  // factor of a sphere's radius that covers rounding
+
 void check_points(const std::vector<Vec3>& vertices) {
   std::vector<std::size_t> order(vertices.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -63,7 +65,7 @@ class Encroachment {
     const Vec3 u = b - a, v = c - a, n = cross(u, v);
     const Vec3 to_centre = (0.5 / norm2(n)) * cross(norm2(u) * v - norm2(v) * u, n);
     const Vec3 centre = a + to_centre;
-    const double radius = (1 + 1e-6) * norm(to_centre);
+    const double radius = kSphereMargin * norm(to_centre);
     near_.clear();
     tree_.near({centre, centre}, radius, near_);
     for (const Index i : near_)
@@ -76,6 +78,87 @@ class Encroachment {
   SeedTree tree_;
   std::vector<Index> near_;
 };
+
+// The boundary's vertices and the points, and which of them the Delaunay triangulation is made of.
+struct Candidates {
+  Candidates(const TriangleMesh& boundary, const std::vector<Vec3>& points)
+      : first_point(boundary.vertices.size()), vertices(boundary.vertices) {
+    vertices.insert(vertices.end(), points.begin(), points.end());
+    check_points(vertices);
+    used.assign(vertices.size(), 0);
+    std::fill(used.begin() + static_cast<std::ptrdiff_t>(first_point), used.end(), char{1});
+    for (const Triangle& t : boundary.triangles)
+      for (const Index v : t) used[v] = 1;
+  }
+
+  bool uses_point(std::size_t i) const { return used[first_point + i] != 0; }
+  // False if it was left out already.
+  bool leave_out_point(std::size_t i) { return std::exchange(used[first_point + i], char{0}) != 0; }
+
+  std::size_t first_point;  // index of the first point among the vertices
+  std::vector<Vec3> vertices;
+  std::vector<char> used;   // not: vertices that no triangle of the boundary has, and points left out
+};
+
+// Leaves out points in the diametral spheres of missing triangles until no triangle is missing or no such point is
+// left. `carved` then belongs to the points that stay.
+void leave_out_encroaching(const TriangleMesh& boundary, const std::vector<Vec3>& points, const Context& context,
+                           Candidates& candidates, Carved& carved) {
+  if (carved.missing.empty() || points.empty()) return;
+  Encroachment encroachment(points);
+  for (bool changed = true; changed && !carved.missing.empty();) {
+    context.check();
+    changed = false;
+    for (const Index t : carved.missing) {
+      const auto [a, b, c] = boundary.triangles[t];
+      encroachment.each_in_sphere(boundary.vertices[a], boundary.vertices[b], boundary.vertices[c],
+                                  [&](Index i) { changed |= candidates.leave_out_point(i); });
+    }
+    if (changed) carved = delaunay_inside(candidates.vertices, candidates.used, boundary.triangles);
+  }
+}
+
+// Takes the tetrahedra inside the boundary, with those of the points that they have as corners. `vertex` becomes the
+// vertex of each of these.
+TetMesh take_delaunay(const TriangleMesh& boundary, const std::vector<Vec3>& points, std::vector<Tetrahedron> tets,
+                      std::vector<Index>& vertex) {
+  const std::size_t count = boundary.vertices.size();
+  std::vector<char> inside(count + points.size(), 0);
+  for (const Tetrahedron& t : tets)
+    for (const Index v : t) inside[v] = 1;
+  TetMesh mesh;
+  mesh.vertices = boundary.vertices;
+  std::vector<Index> place(count + points.size(), kNone);
+  std::iota(place.begin(), place.begin() + static_cast<std::ptrdiff_t>(count), Index{0});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!inside[count + i]) continue;
+    place[count + i] = vertex[i] = static_cast<Index>(mesh.vertices.size());
+    mesh.vertices.push_back(points[i]);
+  }
+  for (Tetrahedron& t : tets)
+    for (Index& v : t) v = place[v];
+  mesh.tets = std::move(tets);
+  mesh.boundary = boundary.triangles;
+  mesh.boundary_labels = boundary.labels;
+  mesh.feature_edges = boundary.feature_edges;
+  return mesh;
+}
+
+// TetGen's tetrahedra of the boundary alone, for where some of its triangles are missing whatever points are left out.
+TetgenResult fill_by_tetgen(const TriangleMesh& boundary, const std::vector<Index>& missing, const TetgenOptions& options,
+                            const Context& context) {
+  if (find_tetgen().empty() && options.program.empty())
+    throw Error(fmt::format("{} of {} boundary triangles are no Delaunay facets (first: {}), and TetGen, which could "
+                            "fit tetrahedra to them, is not there; build with BISECTOR_TETGEN or set BISECTOR_TETGEN "
+                            "to the path of bisector-tetgen",
+                            missing.size(), boundary.triangles.size(), missing.front()));
+  TetgenResult tets = tetgen_tets(boundary, options, context);
+  if (tets.zero_volume > 0)
+    throw Error(fmt::format("TetGen gave {} flat tetrahedra where boundary triangles are no Delaunay facets; ask for "
+                            "more vertices",
+                            tets.zero_volume));
+  return tets;
+}
 
 // Puts the boundary's vertices first, then the points, then all others. `vertex`: of each point, or kNone.
 TetMesh in_order(TetMesh mesh, std::size_t boundary, const std::vector<Index>& vertex) {
@@ -93,87 +176,44 @@ TetMesh in_order(TetMesh mesh, std::size_t boundary, const std::vector<Index>& v
   return mesh;
 }
 
+// Puts the points that were left out into the mesh, as far as they fit.
+void insert_left_out(const std::vector<Vec3>& points, const Candidates& candidates, const Context& context, TetMesh& mesh,
+                     std::vector<Index>& vertex) {
+  std::vector<Vec3> late;
+  std::vector<Index> late_points, late_vertices;
+  for (Index i = 0; i < points.size(); ++i) {
+    if (candidates.uses_point(i)) continue;
+    late.push_back(points[i]);
+    late_points.push_back(i);
+  }
+  if (late.empty()) return;
+  mesh = insert_points(mesh, late, late_vertices, context);
+  for (std::size_t k = 0; k < late.size(); ++k) vertex[late_points[k]] = late_vertices[k];
+  mesh = in_order(std::move(mesh), candidates.first_point, vertex);
+}
+
 }  // namespace
 
 ConformingTets conforming_tets(const TriangleMesh& boundary, const std::vector<Vec3>& points,
                                const TetgenOptions& options, const Context& context) {
   ConformingTets result;
-  const std::size_t count = boundary.vertices.size();
-  std::vector<Vec3> vertices = boundary.vertices;
-  vertices.insert(vertices.end(), points.begin(), points.end());
-  check_points(vertices);
-  std::vector<char> used(vertices.size(), 0);  // not: vertices that no triangle uses
-  std::fill(used.begin() + static_cast<std::ptrdiff_t>(count), used.end(), char{1});
-  for (const Triangle& t : boundary.triangles)
-    for (const Index v : t) used[v] = 1;
-
-  Carved carved = delaunay_inside(vertices, used, boundary.triangles);
+  Candidates candidates(boundary, points);
+  Carved carved = delaunay_inside(candidates.vertices, candidates.used, boundary.triangles);
   result.missing = carved.missing.size();
   result.delaunay = carved.missing.empty();
-  if (!carved.missing.empty() && !points.empty()) {
-    Encroachment encroachment(points);
-    for (bool changed = true; changed && !carved.missing.empty();) {
-      context.check();
-      changed = false;
-      for (const Index t : carved.missing) {
-        const Triangle& corners = boundary.triangles[t];
-        encroachment.each_in_sphere(vertices[corners[0]], vertices[corners[1]], vertices[corners[2]], [&](Index i) {
-          changed |= used[count + i] != 0;
-          used[count + i] = 0;
-        });
-      }
-      if (changed) carved = delaunay_inside(vertices, used, boundary.triangles);
-    }
-  }
+  leave_out_encroaching(boundary, points, context, candidates, carved);
   context.check();
 
   std::vector<Index> vertex(points.size(), kNone);  // of each point
   if (carved.missing.empty()) {
-    std::vector<char> inside(vertices.size(), 0);
-    for (const Tetrahedron& t : carved.tets)
-      for (const Index v : t) inside[v] = 1;
-    std::vector<Index> place(vertices.size(), kNone);
-    result.mesh.vertices = boundary.vertices;
-    std::iota(place.begin(), place.begin() + static_cast<std::ptrdiff_t>(count), Index{0});
-    for (std::size_t i = 0; i < points.size(); ++i)
-      if (inside[count + i]) {
-        place[count + i] = vertex[i] = static_cast<Index>(result.mesh.vertices.size());
-        result.mesh.vertices.push_back(points[i]);
-      }
-    for (Tetrahedron& t : carved.tets)
-      for (Index& v : t) v = place[v];
-    result.mesh.tets = std::move(carved.tets);
-    result.mesh.boundary = boundary.triangles;
-    result.mesh.boundary_labels = boundary.labels;
-    result.mesh.feature_edges = boundary.feature_edges;
+    result.mesh = take_delaunay(boundary, points, std::move(carved.tets), vertex);
   } else {
-    if (find_tetgen().empty() && options.program.empty())
-      throw Error(fmt::format("{} of {} boundary triangles are no Delaunay facets (first: {}), and TetGen, which could "
-                              "fit tetrahedra to them, is not there; build with BISECTOR_TETGEN or set BISECTOR_TETGEN "
-                              "to the path of bisector-tetgen",
-                              carved.missing.size(), boundary.triangles.size(), carved.missing.front()));
-    TetgenResult tets = tetgen_tets(boundary, options, context);
-    if (tets.zero_volume > 0)
-      throw Error(fmt::format("TetGen gave {} flat tetrahedra where boundary triangles are no Delaunay facets; ask for "
-                              "more vertices",
-                              tets.zero_volume));
+    TetgenResult tets = fill_by_tetgen(boundary, carved.missing, options, context);
     result.mesh = std::move(tets.mesh);
     result.steiner_points = tets.steiner_points;
-    std::fill(used.begin() + static_cast<std::ptrdiff_t>(count), used.end(), char{0});
+    for (std::size_t i = 0; i < points.size(); ++i) candidates.leave_out_point(i);
   }
-
-  std::vector<Vec3> late;
-  std::vector<Index> late_points, late_vertices;
-  for (Index i = 0; i < points.size(); ++i)
-    if (!used[count + i]) {
-      late.push_back(points[i]);
-      late_points.push_back(i);
-    }
-  if (!late.empty()) {
-    result.mesh = insert_points(result.mesh, late, late_vertices, context);
-    for (std::size_t k = 0; k < late.size(); ++k) vertex[late_points[k]] = late_vertices[k];
-    result.mesh = in_order(std::move(result.mesh), count, vertex);
-  }
+  insert_left_out(points, candidates, context, result.mesh, vertex);
   for (Index i = 0; i < points.size(); ++i)
     if (vertex[i] == kNone) result.refused.push_back(i);
   return result;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/stopwatch.h"
 #include "mesh/tet_quality.h"
 #include "tetmesh/smooth.h"
 #include "tetmesh/tet_edit.h"
@@ -18,13 +18,16 @@
 namespace bisector {
 namespace {
 
-constexpr double kGain = 1e-3;      // of a sine: a smaller rise is none
-constexpr double kMeanGain = 2e-3;  // of the mean radius ratio
-constexpr int kLastSweeps = 2;
-constexpr std::size_t kCheck = 1024;  // vertices or tetrahedra between two looks at whether to go on
-// Parts of the angle below which vertices are put in, one after the other.
+constexpr double kGain = 1e-3;           // by which a change must at least raise the least sine of a dihedral angle
+constexpr double kMeanGain = 2e-3;       // of the mean radius ratio by a round, below which no further one follows
+constexpr int kLastSweeps = 2;           // of smoothing for the mean, at the end
+constexpr std::size_t kCheckEvery = 1024;  // vertices or tetrahedra between two checks for cancellation
+// Shares of TetImproveOptions::insert_below, up to which tetrahedra may get a new vertex. The stages follow each other:
+// new vertices are few, and the worst tetrahedra have the first choice.
 constexpr std::array<double, 4> kInsertStages{0, 0.5, 0.75, 1};
-constexpr std::size_t kTrials = 4;    // places for a new vertex that are tried
+constexpr std::size_t kTrials = 4;       // places for a new vertex that are tried for each tetrahedron
+// Fractions of the improvement for progress: where each of its three parts begins, and how much the first two take.
+constexpr double kSmoothingFrom = 0.1, kClimbingFrom = 0.5, kLastFrom = 0.9, kPart = 0.4;
 
 double sine(double degrees) { return std::sin(degrees * std::numbers::pi / 180); }
 
@@ -47,7 +50,7 @@ class Improver {
   void smooth_all(double floor, bool steep);
   double least_shape() const;
   double mean_ratio() const;
-  // Works on all tetrahedra with a shape below the goal, worst first; how many gave way.
+  // Tries to improve all tetrahedra with a shape below the goal, worst first; returns how many it could.
   std::size_t climb();
   bool mend(Index t);
   bool swap(Index t);
@@ -55,12 +58,13 @@ class Improver {
   bool contract(Index t);
   bool may_insert(Index t) const { return insertions_left_ && edit_.tet(t).shape < insert_below_; }
   bool insert_vertex(Index t);
-  // Those at the vertices with a shape of `beat` or less.
+  // The tetrahedra at the vertices whose shape is `beat` or less.
   Shapes poor_around(const std::vector<Index>& vertices, double beat);
-  // Whether all have a shape above `beat` now, but for poor ones that were there before and are no worse.
+  // Whether each changed tetrahedron has a shape above `beat`, or was among the poor ones before and is no worse.
   bool worth_keeping(const std::vector<Index>& changed, const Shapes& poor, double beat) const;
-  // Notes that there is something new around the tetrahedra, and whether there is since all was tried on one.
+  // Notes that something changed at the tetrahedra's vertices.
   void touch(const std::vector<Index>& tets);
+  // Whether everything was tried on the tetrahedron in vain and nothing has changed at its vertices since.
   bool tried(Index t) const;
 
   TetEdit edit_;
@@ -72,10 +76,11 @@ class Improver {
   double insert_below_ = 0;  // tetrahedra with a smaller shape may get a vertex now
   std::size_t insertions_left_;
 
+  // Of everything that could be tried on a tetrahedron.
   struct Failure {
-    Tetrahedron corners;
+    Tetrahedron corners;  // of the tetrahedron that was in the slot then
     std::uint64_t time;
-    bool insert;
+    bool insert;          // a new vertex was tried, too
   };
   std::uint64_t time_ = 1;
   std::vector<std::uint64_t> touched_;  // of each vertex, when something around it changed
@@ -94,7 +99,7 @@ void Improver::report_progress(const char* phase, int round, double fraction) co
 
 void Improver::smooth_all(double floor, bool steep) {
   for (Index v = 0; v < edit_.points(); ++v) {
-    if (v % kCheck == 0) context_.check();
+    if (v % kCheckEvery == 0) context_.check();
     if (!smoother_.raise_ratios(v, floor, steep)) continue;
     touch(edit_.star(v));
     ++report_.moves;
@@ -234,7 +239,7 @@ std::size_t Improver::climb() {
             [](const Item& a, const Item& b) { return a.shape != b.shape ? a.shape < b.shape : a.tet < b.tet; });
   std::size_t mended = 0, done = 0;
   for (const Item& item : queue) {
-    if (done++ % kCheck == 0) context_.check();
+    if (done++ % kCheckEvery == 0) context_.check();
     const TetEdit::Tet& tet = edit_.tet(item.tet);
     if (!tet.alive || tet.corners != item.corners || tet.shape >= goal_ || tried(item.tet)) continue;
     if (mend(item.tet)) {
@@ -248,25 +253,24 @@ std::size_t Improver::climb() {
 }
 
 void Improver::run() {
-  // The mean first, while it rises; what is poor then is left to the climb.
+  // First the mean is raised, as long as it rises enough.
   double mean = 0;
   for (int round = 0; round < options_.rounds; ++round) {
-    report_progress("smoothing", round, 0.1 + 0.4 * round / options_.rounds);
+    report_progress("smoothing", round, kSmoothingFrom + kPart * round / options_.rounds);
     smooth_all(least_shape(), true);
     climb();
     const double before = std::exchange(mean, mean_ratio());
     if (mean < before + kMeanGain) break;
   }
-  // New vertices are few: the worst have the first choice.
   std::size_t stage = 0;
   for (int round = 0; round < options_.rounds && stage < kInsertStages.size(); ++round) {
-    report_progress("removing slivers", round, 0.5 + 0.4 * round / options_.rounds);
+    report_progress("removing slivers", round, kClimbingFrom + kPart * round / options_.rounds);
     ++report_.rounds;
     insert_below_ = sine(kInsertStages[stage] * options_.insert_below);
     if (!climb()) ++stage;
   }
   for (int round = 0; round < kLastSweeps; ++round) {
-    report_progress("smoothing", round, 0.9);
+    report_progress("smoothing", round, kLastFrom);
     smooth_all(goal_, false);
   }
 }
@@ -300,7 +304,7 @@ TetImproveResult improve_tets(const TetMesh& mesh, const TetImproveOptions& opti
                 " degrees: give 0 to 60");
   if (!(options.insertions >= 0 && options.insertions <= 10))
     throw Error("the share of new vertices is " + std::to_string(options.insertions) + ": give 0 to 10");
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   TetImproveResult result;
   Improver improver(mesh, options, result.report, context);
   result.report.before = measure_shapes(mesh, options.goal);
@@ -309,7 +313,7 @@ TetImproveResult improve_tets(const TetMesh& mesh, const TetImproveOptions& opti
   for (Index& v : result.source)
     if (v >= mesh.vertices.size()) v = kNone;
   result.report.after = measure_shapes(result.mesh, options.goal);
-  result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.report.seconds = watch.seconds();
   return result;
 }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bisector/context.h"
-#include "core/geometry.h"
+#include "bisector/tetmesh.h"
 #include "tetmesh/slide.h"
 
 namespace bisector {
@@ -23,19 +23,7 @@ struct TetImproveOptions {
   TetSlide slide = {};        // how boundary vertices may move; as it is, they don't
 };
 
-struct TetShapes {
-  double dihedral_min = 0, dihedral_max = 0;  // degrees
-  double radius_ratio_min = 0, radius_ratio_mean = 0;  // 3 r_in / R_circ
-  std::size_t below = 0;                      // tetrahedra with a dihedral angle below the goal
-};
 TetShapes measure_shapes(const TetMesh& mesh, double goal);
-
-struct TetImproveReport {
-  std::size_t edge_removals = 0, face_removals = 0, contractions = 0, insertions = 0, moves = 0;
-  int rounds = 0;
-  TetShapes before, after;
-  double seconds = 0;
-};
 
 struct TetImproveResult {
   TetMesh mesh;                // kept vertices in the order given, then new ones; marks as given

@@ -14,12 +14,13 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kCheck = 1024;  // points between two looks at whether to go on
+constexpr std::size_t kCheckEvery = 1024;  // points between two checks for cancellation
 
 class Inserter {
  public:
   explicit Inserter(TetEdit& mesh) : mesh_(mesh) {}
 
+  // The new vertex, or kNone if the point cannot become one.
   Index insert(const Vec3& p) {
     p_ = p;
     last_ = locate();
@@ -44,7 +45,8 @@ class Inserter {
   }
 
  private:
-  int side(Index t, int k) const {  // positive inside
+  // Positive if the point is on the tetrahedron's side of its facet k.
+  int side(Index t, int k) const {
     const Triangle f = facet_of(mesh_.tet(t).corners, k);
     return orientation(p_, mesh_.point(f[0]), mesh_.point(f[1]), mesh_.point(f[2]));
   }
@@ -55,14 +57,15 @@ class Inserter {
     return true;
   }
 
-  // A tetrahedron that holds the point. The walk ends at the boundary of a solid that is not convex; then all are
-  // searched.
+  // A tetrahedron that holds the point. The walk ends at the boundary of a solid that is not convex; then all
+  // tetrahedra are searched.
   Index locate() const {
     Index t = last_ != kNone && mesh_.tet(last_).alive ? last_ : kNone;
     for (std::size_t step = 0; t != kNone && step < mesh_.size(); ++step) {
       int out = -1;
       for (int k = 0; k < 4 && out < 0; ++k) {
-        const int facet = static_cast<int>((static_cast<std::size_t>(k) + step) & 3);  // or it could go in circles
+        // Always beginning with the same facet, the walk could go in circles.
+        const int facet = static_cast<int>((static_cast<std::size_t>(k) + step) & 3);
         if (side(t, facet) < 0) out = facet;
       }
       if (out < 0) return t;
@@ -73,13 +76,16 @@ class Inserter {
     return kNone;
   }
 
+  // Whether the tetrahedron is in the cavity.
   bool contains(Index t) const { return std::find(cavity_.begin(), cavity_.end(), t) != cavity_.end(); }
+  // Whether facet k of a tetrahedron of the cavity lies between two of the cavity.
   bool inner(Index t, int k) const {
     const Index other = mesh_.tet(t).across[k];
     return other != kNone && !mesh_.kept(t, k) && contains(other);
   }
 
-  // Rounding here changes which of many valid cavities is taken.
+  // Whether the point is in the tetrahedron's circumscribed sphere. This is not exact: rounding may change which of
+  // many valid cavities is taken.
   bool in_sphere(Index t) const {
     const Tetrahedron& c = mesh_.tet(t).corners;
     const Vec3 a = mesh_.point(c[0]) - p_, b = mesh_.point(c[1]) - p_;
@@ -89,9 +95,19 @@ class Inserter {
            0;
   }
 
-  bool find_cavity(Index seed) {
-    cavity_.assign(1, seed);
-    std::size_t core = 1;  // those that hold the point, on a facet or an edge of theirs
+  // The tetrahedra to be replaced around the point; `first` holds it. False if there are none.
+  bool find_cavity(Index first) {
+    std::size_t core = 0;
+    if (!find_core(first, core)) return false;
+    grow();
+    return shrink(core);
+  }
+
+  // Starts the cavity with the tetrahedra that hold the point inside, or on a facet or an edge of theirs: `core` of
+  // them. False if something kept holds the point.
+  bool find_core(Index first, std::size_t& core) {
+    cavity_.assign(1, first);
+    core = 1;
     for (std::size_t i = 0; i < core; ++i)
       for (int k = 0; k < 4; ++k) {
         if (side(cavity_[i], k) != 0) continue;
@@ -99,24 +115,38 @@ class Inserter {
         const Index other = mesh_.tet(cavity_[i]).across[k];
         if (!contains(other)) cavity_.push_back(other), ++core;
       }
+    return true;
+  }
+
+  // Adds the tetrahedra around with the point in their circumscribed sphere.
+  void grow() {
     for (std::size_t i = 0; i < cavity_.size(); ++i)
       for (int k = 0; k < 4; ++k) {
         if (mesh_.kept(cavity_[i], k)) continue;
         const Index other = mesh_.tet(cavity_[i]).across[k];
         if (!contains(other) && in_sphere(other)) cavity_.push_back(other);
       }
-    // What the point does not see, or would enclose, is left out again.
+  }
+
+  // Takes out tetrahedra until the point sees every facet around the cavity from inside and nothing kept and no vertex
+  // is enclosed. False if one of the core would have to go.
+  bool shrink(std::size_t core) {
     while (true) {
-      std::size_t bad = cavity_.size();
-      for (std::size_t i = cavity_.size(); i-- > 0 && bad == cavity_.size();)
-        for (int k = 0; k < 4; ++k)
-          if (!inner(cavity_[i], k) && side(cavity_[i], k) <= 0) bad = i;
+      std::size_t bad = unseen();
       if (bad == cavity_.size()) bad = enclosing();
       if (bad == cavity_.size()) return true;
       if (bad < core) return false;
       cavity_.erase(cavity_.begin() + static_cast<std::ptrdiff_t>(bad));
       drop_loose(core);
     }
+  }
+
+  // The last tetrahedron with an outer facet that the point does not see; the cavity's size if there is none.
+  std::size_t unseen() const {
+    for (std::size_t i = cavity_.size(); i-- > 0;)
+      for (int k = 0; k < 4; ++k)
+        if (!inner(cavity_[i], k) && side(cavity_[i], k) <= 0) return i;
+    return cavity_.size();
   }
 
   // The last tetrahedron with a vertex that no facet around the cavity has, or with a kept facet inside the cavity;
@@ -139,7 +169,7 @@ class Inserter {
     return cavity_.size();
   }
 
-  // Leaves out what is not joined to the core by facets any more.
+  // Takes out the tetrahedra that are no longer joined to the core by facets.
   void drop_loose(std::size_t core) {
     std::vector<Index> joined(cavity_.begin(), cavity_.begin() + static_cast<std::ptrdiff_t>(core));
     for (std::size_t i = 0; i < joined.size(); ++i)
@@ -153,7 +183,7 @@ class Inserter {
 
   TetEdit& mesh_;
   Vec3 p_;
-  Index last_ = 0;
+  Index last_ = 0;  // the tetrahedron from which the next walk starts
   std::vector<Index> cavity_;
 };
 
@@ -169,7 +199,7 @@ TetMesh insert_points(const TetMesh& mesh, const std::vector<Vec3>& points, std:
   vertices.assign(points.size(), kNone);
   std::size_t done = 0;
   for (const Index i : hilbert_order(points)) {
-    if (done++ % kCheck == 0) context.check();
+    if (done++ % kCheckEvery == 0) context.check();
     vertices[i] = inserter.insert(points[i]);
   }
 

@@ -5,26 +5,31 @@
 #include <cmath>
 #include <limits>
 
+#include "core/grouping.h"
+
 namespace bisector {
 namespace {
 
-// All are -infinity where there is no volume.
+constexpr double kMostCells = 512;  // of the grid, in each direction
+constexpr double kTiny = 1e-300;    // length in place of 0, so that nothing is divided by it
+
+// The barycentric coordinates of p; all are -infinity if the tetrahedron has no volume.
 std::array<double, 4> barycentric(const TetMesh& mesh, const Tetrahedron& tet, const Vec3& p) {
-  const auto volume = [](const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) { return dot(b - a, cross(c - a, d - a)); };
   const Vec3 v[4] = {mesh.vertices[tet[0]], mesh.vertices[tet[1]], mesh.vertices[tet[2]], mesh.vertices[tet[3]]};
-  const double whole = volume(v[0], v[1], v[2], v[3]), none = -std::numeric_limits<double>::infinity();
+  const double whole = rounded_six_volume(v[0], v[1], v[2], v[3]), none = -std::numeric_limits<double>::infinity();
   if (whole == 0) return {none, none, none, none};
-  return {volume(p, v[1], v[2], v[3]) / whole, volume(v[0], p, v[2], v[3]) / whole, volume(v[0], v[1], p, v[3]) / whole,
-          volume(v[0], v[1], v[2], p) / whole};
+  return {rounded_six_volume(p, v[1], v[2], v[3]) / whole, rounded_six_volume(v[0], p, v[2], v[3]) / whole,
+          rounded_six_volume(v[0], v[1], p, v[3]) / whole, rounded_six_volume(v[0], v[1], v[2], p) / whole};
 }
 
 }  // namespace
 
 TetLocator::TetLocator(const TetMesh& mesh) : mesh_(mesh), box_(bounding_box(mesh.vertices)), size_{1, 1, 1} {
   const Vec3 extent = box_.hi - box_.lo;
-  const double volume = std::max({extent.x, 1e-300}) * std::max({extent.y, 1e-300}) * std::max({extent.z, 1e-300});
+  const double volume = std::max(extent.x, kTiny) * std::max(extent.y, kTiny) * std::max(extent.z, kTiny);
   const double longest = std::max({extent.x, extent.y, extent.z});
-  width_ = std::max({std::cbrt(volume / static_cast<double>(std::max<std::size_t>(1, mesh.tets.size()))), longest / 512, 1e-300});
+  const auto tets = static_cast<double>(std::max<std::size_t>(1, mesh.tets.size()));
+  width_ = std::max({std::cbrt(volume / tets), longest / kMostCells, kTiny});
   for (int k = 0; k < 3; ++k) size_[k] = std::max(1, static_cast<int>(std::ceil(extent[k] / width_)));
   const auto for_each_cell = [&](const Tetrahedron& tet, const auto& visit) {
     Box box{mesh.vertices[tet[0]], mesh.vertices[tet[0]]};
@@ -39,12 +44,10 @@ TetLocator::TetLocator(const TetMesh& mesh) : mesh_(mesh), box_(bounding_box(mes
         for (int x = from[0]; x <= to[0]; ++x)
           visit((static_cast<std::size_t>(z) * size_[1] + y) * size_[0] + x);
   };
-  tets_.offsets.assign(static_cast<std::size_t>(size_[0]) * size_[1] * size_[2] + 1, 0);
-  for (const Tetrahedron& tet : mesh.tets) for_each_cell(tet, [&](std::size_t c) { ++tets_.offsets[c + 1]; });
-  for (std::size_t c = 1; c < tets_.offsets.size(); ++c) tets_.offsets[c] += tets_.offsets[c - 1];
-  tets_.values.resize(tets_.offsets.back());
-  std::vector<std::size_t> next(tets_.offsets.begin(), tets_.offsets.end() - 1);
-  for (Index t = 0; t < mesh.tets.size(); ++t) for_each_cell(mesh.tets[t], [&](std::size_t c) { tets_.values[next[c]++] = t; });
+  const std::size_t cells = static_cast<std::size_t>(size_[0]) * size_[1] * size_[2];
+  tets_ = group_into_rows<Index>(cells, [&](const auto& put) {
+    for (Index t = 0; t < mesh.tets.size(); ++t) for_each_cell(mesh.tets[t], [&](std::size_t c) { put(c, t); });
+  });
 }
 
 std::array<int, 3> TetLocator::cell_of(const Vec3& p) const {
@@ -63,7 +66,7 @@ Index TetLocator::nearest(const Vec3& p) const {
   Index best = 0;
   double deepest = -std::numeric_limits<double>::infinity();
   const int most = std::max({size_[0], size_[1], size_[2]});
-  // One more ring once something was found: what lies in the next cell may be nearer.
+  // Once a tetrahedron was found one more ring is searched: what lies in the next cells may be nearer.
   for (int ring = 0, last = most; ring <= last; ++ring) {
     for (int z = centre[2] - ring; z <= centre[2] + ring; ++z)
       for (int y = centre[1] - ring; y <= centre[1] + ring; ++y)

@@ -12,16 +12,20 @@
 namespace bisector {
 namespace {
 
-// Uniform on the tetrahedron: the gaps that three numbers leave in [0, 1]. A linear density is the mixture of its corners'
-// shares, and the density of corner k alone is Dirichlet(.., 2, ..): four numbers leave five gaps, and k takes two.
-std::array<double, 4> weights_of(Random& random, const double* density) {
-  std::array<double, 4> u{};
-  std::array<double, 4> w{};
-  if (!density) {
-    for (int k = 0; k < 3; ++k) u[k] = random.uniform();
-    std::sort(u.begin(), u.begin() + 3);
-    return {u[0], u[1] - u[0], u[2] - u[1], 1 - u[2]};
-  }
+// Barycentric coordinates of a uniform point: the lengths of the four gaps that three numbers leave in [0, 1].
+std::array<double, 4> uniform_weights(Random& random) {
+  std::array<double, 3> u{};
+  for (double& x : u) x = random.uniform();
+  std::sort(u.begin(), u.end());
+  return {u[0], u[1] - u[0], u[2] - u[1], 1 - u[2]};
+}
+
+// Barycentric coordinates of a point with a density that is linear between the corners' values. That is the mixture of
+// four densities, each 1 at one corner and 0 at the others, with the corners' values as weights. A point of the one of
+// corner k is made of the five gaps that four numbers leave in [0, 1]: corner k has the sum of two of them (a Dirichlet
+// distribution).
+std::array<double, 4> linear_weights(Random& random, const std::array<double, 4>& density) {
+  std::array<double, 4> u{}, w{};
   double pick = random.uniform() * (density[0] + density[1] + density[2] + density[3]);
   std::size_t k = 0;
   while (k < 3 && pick >= density[k]) pick -= density[k++];
@@ -48,9 +52,8 @@ std::vector<Vec3> sample_solid(const TetMesh& mesh, std::size_t count, std::uint
   double sum = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
     const auto [a, b, c, d] = mesh.tets[order[k]];
-    const Vec3 p = mesh.vertices[a];
     const double volume =
-        std::abs(dot(mesh.vertices[b] - p, cross(mesh.vertices[c] - p, mesh.vertices[d] - p)));
+        std::abs(rounded_six_volume(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], mesh.vertices[d]));
     sum += density.empty() ? volume : volume * (density[a] + density[b] + density[c] + density[d]);
     sums[k] = sum;
   }
@@ -62,9 +65,9 @@ std::vector<Vec3> sample_solid(const TetMesh& mesh, std::size_t count, std::uint
     const std::size_t k = std::min(static_cast<std::size_t>(std::upper_bound(sums.begin(), sums.end(), at) - sums.begin()),
                                    sums.size() - 1);
     const Tetrahedron& tet = mesh.tets[order[k]];
-    double rho[4];
-    for (int m = 0; m < 4 && !density.empty(); ++m) rho[m] = density[tet[m]];
-    const std::array<double, 4> w = weights_of(random, density.empty() ? nullptr : rho);
+    const std::array<double, 4> w =
+        density.empty() ? uniform_weights(random)
+                        : linear_weights(random, {density[tet[0]], density[tet[1]], density[tet[2]], density[tet[3]]});
     Vec3 p;
     for (int m = 0; m < 4; ++m) p += w[m] * mesh.vertices[tet[m]];
     points[i] = p;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "mesh/tet_adjacency.h"
 #include "mesh/tet_quality.h"
@@ -12,7 +11,7 @@
 namespace bisector {
 namespace {
 
-constexpr double kBand = 0.03;  // sines within so much of the least one are climbed together
+constexpr double kBand = 0.03;  // sines within so much of the least one are raised together
 
 // The point of the convex hull of `points` nearest to the origin (Gilbert 1966, with steps away from the farthest
 // point).
@@ -136,7 +135,6 @@ bool TetSmoother::admit(Index v, Vec3& x) const {
   x = slide_.project(v, x);
   for (int k = 0; k < 3; ++k)
     if (!std::isfinite(x[k])) return false;
-  constexpr double kDegree = std::numbers::pi / 180;
   for (const Index t : star_.tets) {
     const TetEdit::Tet& tet = mesh_.tet(t);
     for (int k = 0; k < 4; ++k) {
@@ -148,10 +146,10 @@ bool TetSmoother::admit(Index v, Vec3& x) const {
         after[i] = f[i] == v ? x : before[i];
       }
       const double angle = smallest_angle(after[0], after[1], after[2]);
-      if (angle < slide_.min_angle * kDegree && angle < smallest_angle(before[0], before[1], before[2])) return false;
+      if (angle < slide_.min_angle * kRadiansPerDegree && angle < smallest_angle(before[0], before[1], before[2])) return false;
       const Vec3 m = cross(first_[f[1]] - first_[f[0]], first_[f[2]] - first_[f[0]]);
       const Vec3 n = cross(after[1] - after[0], after[2] - after[0]);
-      if (dot(m, n) < std::cos(slide_.max_turn * kDegree) * norm(m) * norm(n)) return false;
+      if (dot(m, n) < std::cos(slide_.max_turn * kRadiansPerDegree) * norm(m) * norm(n)) return false;
     }
   }
   return true;

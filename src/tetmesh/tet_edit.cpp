@@ -167,22 +167,8 @@ bool TetEdit::ring(Index t, int i, int j, std::size_t most, std::vector<Index>& 
   return true;
 }
 
-bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> fresh,
-                       const std::vector<Index>* slots) {
-  if (!slots)
-    for (const Tetrahedron& corners : fresh)
-      if (!positive(corners)) return false;
-
-  struct Side {
-    Triangle corners;
-    bool odd;
-    bool fresh;
-    std::uint8_t kept;
-    Index tet;  // outside, or the place in `fresh`
-    int facet;
-  };
-  static thread_local std::vector<Side> sides;
-  sides.clear();
+bool TetEdit::collect_sides(std::span<const Index> old, std::span<const Tetrahedron> fresh) {
+  sides_.clear();
   ++stamp_;
   for (const Index t : old) stamps_[t] = stamp_;
   for (const Index t : old) {
@@ -201,45 +187,60 @@ bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> 
       }
       Triangle corners = facet_of(tet.corners, k);
       const bool odd = sort_corners(corners);
-      sides.push_back({corners, odd, false, kept, other, facet});
+      sides_.push_back({corners, odd, false, kept, other, facet});
     }
   }
   for (Index t = 0; t < fresh.size(); ++t)
     for (int k = 0; k < 4; ++k) {
       Triangle corners = facet_of(fresh[t], k);
       const bool odd = sort_corners(corners);
-      sides.push_back({corners, odd, true, 0, t, k});
+      sides_.push_back({corners, odd, true, 0, t, k});
     }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+  std::sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
     return a.corners != b.corners ? a.corners < b.corners : a.fresh < b.fresh;
   });
-  // The cavity's boundary occurs once and the inner facets from either side: with positive tetrahedra this is a tiling.
-  if (sides.size() % 2) return false;
-  for (std::size_t k = 0; k < sides.size(); k += 2) {
-    const Side &a = sides[k], &b = sides[k + 1];
-    if (a.corners != b.corners || !b.fresh || (a.odd == b.odd) == a.fresh) return false;
-    if (k && sides[k - 1].corners == a.corners) return false;
-  }
-  if (!kept_edges_.empty()) {
-    const auto has_edge = [&](std::array<Index, 2> e) {
-      return std::any_of(fresh.begin(), fresh.end(), [&](const Tetrahedron& c) {
-        return std::find(c.begin(), c.end(), e[0]) != c.end() && std::find(c.begin(), c.end(), e[1]) != c.end();
-      });
-    };
-    for (const Index t : old)
-      for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < i; ++j)
-          if (const auto e = sorted_edge(tets_[t].corners[i], tets_[t].corners[j]);
-              kept_edge(e[0], e[1]) && !has_edge(e))
-            return false;
-  }
+  return true;
+}
 
-  Change change{Change::replaced};
-  if (recording_) {
-    change.slots = tets_.size();
-    change.freed.assign(old.begin(), old.end());
-    for (const Index t : old) change.removed.push_back(tets_[t].corners);
+bool TetEdit::sides_match() const {
+  if (sides_.size() % 2) return false;
+  for (std::size_t k = 0; k < sides_.size(); k += 2) {
+    const Side &a = sides_[k], &b = sides_[k + 1];
+    if (a.corners != b.corners || !b.fresh || (a.odd == b.odd) == a.fresh) return false;
+    if (k && sides_[k - 1].corners == a.corners) return false;
   }
+  return true;
+}
+
+bool TetEdit::loses_kept_edge(std::span<const Index> old, std::span<const Tetrahedron> fresh) const {
+  if (kept_edges_.empty()) return false;
+  const auto has_edge = [&](std::array<Index, 2> e) {
+    return std::any_of(fresh.begin(), fresh.end(), [&](const Tetrahedron& c) {
+      return std::find(c.begin(), c.end(), e[0]) != c.end() && std::find(c.begin(), c.end(), e[1]) != c.end();
+    });
+  };
+  for (const Index t : old)
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < i; ++j) {
+        const auto e = sorted_edge(tets_[t].corners[i], tets_[t].corners[j]);
+        if (kept_edge(e[0], e[1]) && !has_edge(e)) return true;
+      }
+  return false;
+}
+
+Index TetEdit::new_slot() {
+  if (free_.empty()) {
+    tets_.emplace_back();
+    stamps_.push_back(0);
+    return static_cast<Index>(tets_.size() - 1);
+  }
+  const Index slot = free_.back();
+  free_.pop_back();
+  return slot;
+}
+
+void TetEdit::put_in_slots(std::span<const Index> old, std::span<const Tetrahedron> fresh,
+                           const std::vector<Index>* slots) {
   const std::int32_t region = tets_[old[0]].region;
   for (const Index t : old) {
     tets_[t].alive = false;
@@ -247,17 +248,7 @@ bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> 
   }
   added_.clear();
   for (const Tetrahedron& corners : fresh) {
-    Index slot;
-    if (slots) {
-      slot = (*slots)[added_.size()];
-    } else if (free_.empty()) {
-      slot = static_cast<Index>(tets_.size());
-      tets_.emplace_back();
-      stamps_.push_back(0);
-    } else {
-      slot = free_.back();
-      free_.pop_back();
-    }
+    const Index slot = slots ? (*slots)[added_.size()] : new_slot();
     tets_[slot] = {corners, {kNone, kNone, kNone, kNone}, shape_of(corners), region, 0, true};
     for (const Index v : corners) tet_of_[v] = slot;
     added_.push_back(slot);
@@ -267,13 +258,30 @@ bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> 
   for (const Tetrahedron& corners : fresh)
     for (const Index v : corners) alive_[v] = 1;
   if (!slots) free_.insert(free_.end(), old.begin(), old.end());
-  for (std::size_t k = 0; k < sides.size(); k += 2) {
-    const Side &a = sides[k], &b = sides[k + 1];
+}
+
+void TetEdit::link_sides() {
+  for (std::size_t k = 0; k < sides_.size(); k += 2) {
+    const Side &a = sides_[k], &b = sides_[k + 1];
     const Index inner = added_[b.tet], outer = a.fresh ? added_[a.tet] : a.tet;
     tets_[inner].across[b.facet] = outer;
     if (outer != kNone) tets_[outer].across[a.facet] = inner;
     if (a.kept) tets_[inner].kept |= static_cast<std::uint8_t>(1 << b.facet);
   }
+}
+
+bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> fresh,
+                       const std::vector<Index>* slots) {
+  if (!slots && !std::all_of(fresh.begin(), fresh.end(), [&](const Tetrahedron& t) { return positive(t); })) return false;
+  if (!collect_sides(old, fresh) || !sides_match() || loses_kept_edge(old, fresh)) return false;
+  Change change{Change::replaced};
+  if (recording_) {
+    change.slots = tets_.size();
+    change.freed.assign(old.begin(), old.end());
+    for (const Index t : old) change.removed.push_back(tets_[t].corners);
+  }
+  put_in_slots(old, fresh, slots);
+  link_sides();
   if (recording_) {
     change.added = added_;
     changes_.push_back(std::move(change));

@@ -73,10 +73,31 @@ class TetEdit {
     std::size_t slots = 0;                      // before
   };
 
+  // A facet of an old tetrahedron on the cavity's boundary, or any facet of a fresh one.
+  struct Side {
+    Triangle corners;  // ascending
+    bool odd;          // whether sorting them took an odd permutation
+    bool fresh;
+    std::uint8_t kept;
+    Index tet;         // the one outside, or the place among the fresh ones
+    int facet;         // of it
+  };
+
   double shape_of(const Tetrahedron& corners) const;
   bool positive(const Tetrahedron& corners) const;
-  // `slots`: where the fresh ones are to go, known to fit; otherwise null.
+  // replace(). `slots`: where the fresh ones are to go, known to fit; otherwise null.
   bool exchange(std::span<const Index> old, std::span<const Tetrahedron> fresh, const std::vector<Index>* slots);
+  // Fills sides_, sorted by corners, old ones first. False if old ones differ in region or a kept facet lies between
+  // them.
+  bool collect_sides(std::span<const Index> old, std::span<const Tetrahedron> fresh);
+  // Whether each side of the cavity occurs once among the fresh facets and every other fresh facet from either side:
+  // with positive tetrahedra this is a tiling.
+  bool sides_match() const;
+  bool loses_kept_edge(std::span<const Index> old, std::span<const Tetrahedron> fresh) const;
+  Index new_slot();
+  // Frees the old slots and fills others; the links across facets come from link_sides.
+  void put_in_slots(std::span<const Index> old, std::span<const Tetrahedron> fresh, const std::vector<Index>* slots);
+  void link_sides();
 
   std::vector<Vec3> points_;
   std::vector<Tet> tets_;
@@ -93,6 +114,7 @@ class TetEdit {
   std::vector<Change> changes_;
   std::vector<Index> added_;
   std::vector<Index> star_;
+  std::vector<Side> sides_;  // of the exchange under way
   std::vector<std::uint32_t> stamps_;
   std::uint32_t stamp_ = 0;
 };

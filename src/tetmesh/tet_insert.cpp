@@ -9,18 +9,21 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kCavity = 40;  // tetrahedra, at most
+constexpr std::size_t kMostInCavity = 40;  // tetrahedra
 
+// A facet around a cavity.
 struct Facet {
-  Index tet;
-  int corner;
-  double shape;
+  Index tet;     // inside
+  int corner;    // of it, opposite the facet
+  double shape;  // of the tetrahedron that the facet makes with the point
 };
 
+// Tetrahedra around a point that is to become a vertex.
 class Cavity {
  public:
   Cavity(const TetEdit& mesh, const Vec3& p) : mesh_(mesh), p_(p) {}
 
+  // False if something kept lies between the tetrahedra.
   bool start(const std::vector<Index>& tets) {
     tets_ = tets;
     for (const Index t : tets_)
@@ -35,8 +38,9 @@ class Cavity {
     return true;
   }
 
+  // Adds the tetrahedron beyond the worst facet as long as that helps.
   void grow() {
-    while (tets_.size() < kCavity) {
+    while (tets_.size() < kMostInCavity) {
       const auto worst = std::min_element(facets_.begin(), facets_.end(), [](const Facet& a, const Facet& b) {
         return a.shape != b.shape ? a.shape < b.shape : a.tet != b.tet ? a.tet < b.tet : a.corner < b.corner;
       });
@@ -44,6 +48,7 @@ class Cavity {
     }
   }
 
+  // The least shape of the tetrahedra that the facets make with the point.
   double least() const {
     double value = std::numeric_limits<double>::infinity();
     for (const Facet& f : facets_) value = std::min(value, f.shape);
@@ -71,24 +76,25 @@ class Cavity {
     });
   }
 
-  // Adds the tetrahedron beyond a facet if its other facets do better, and no vertex is enclosed or met a second time.
+  // Adds the tetrahedron beyond a facet if its other facets all make better tetrahedra with the point, and if the
+  // cavity then neither encloses a vertex nor touches itself at one.
   bool take(const Facet& facet) {
     if (mesh_.kept(facet.tet, facet.corner)) return false;
     const Index next = mesh_.tet(facet.tet).across[facet.corner];
     const TetEdit::Tet& tet = mesh_.tet(next);
     int shared = 0;
     Index apex = kNone;
-    double best = std::numeric_limits<double>::infinity();
+    double least = std::numeric_limits<double>::infinity();
     for (int k = 0; k < 4; ++k) {
       if (tet.across[k] != kNone && contains(tet.across[k])) {
         if (mesh_.kept(next, k)) return false;
         ++shared;
         apex = tet.corners[k];
       } else {
-        best = std::min(best, shape(next, k));
+        least = std::min(least, shape(next, k));
       }
     }
-    if (shared > 2 || !(best > facet.shape) || (shared == 1 && has_vertex(apex))) return false;
+    if (shared > 2 || !(least > facet.shape) || (shared == 1 && has_vertex(apex))) return false;
     tets_.push_back(next);
     std::erase_if(facets_, [&](const Facet& f) { return mesh_.tet(f.tet).across[f.corner] == next; });
     for (int k = 0; k < 4; ++k)
@@ -123,7 +129,7 @@ std::vector<TetInsertion> find_insertions(TetEdit& mesh, Index t) {
   std::vector<Index> tets, ring;
   for (int i = 0; i < 4; ++i)
     for (int j = i + 1; j < 4; ++j)
-      if (!mesh.kept_edge(tet.corners[i], tet.corners[j]) && mesh.ring(t, i, j, kCavity, tets, ring))
+      if (!mesh.kept_edge(tet.corners[i], tet.corners[j]) && mesh.ring(t, i, j, kMostInCavity, tets, ring))
         attempt(0.5 * (at(i) + at(j)), tets);
   std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.shape > b.shape; });
   return found;

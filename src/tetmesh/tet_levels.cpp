@@ -4,12 +4,14 @@
 #include <numeric>
 #include <set>
 
+#include "core/grouping.h"
+
 namespace bisector {
 namespace {
 
-constexpr std::size_t kCoarsest = 100;  // sites, at least
-constexpr std::size_t kLevels = 3;
-constexpr std::size_t kRatio = 8;
+constexpr std::size_t kCoarsest = 100;  // sites of the coarsest level, at least
+constexpr std::size_t kLevels = 3;      // at most
+constexpr std::size_t kRatio = 8;       // sites of a level over those of the next coarser one
 
 }  // namespace
 
@@ -52,11 +54,13 @@ std::vector<Vec3> far_corners(const ClippedPolyhedra& polyhedra, const CellMomen
   std::iota(order.begin(), order.end(), Index{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](Index a, Index b) { return moments.cells[a].second > moments.cells[b].second; });
-  std::vector<std::vector<Index>> around(seeds.size());
-  for (const auto& [a, b] : dual_edges(polyhedra)) {
-    around[a].push_back(b);
-    around[b].push_back(a);
-  }
+  const std::vector<std::array<Index, 2>> edges = dual_edges(polyhedra);
+  const Csr<Index> around = group_into_rows<Index>(seeds.size(), [&](const auto& put) {
+    for (const auto& [a, b] : edges) {
+      put(a, b);
+      put(b, a);
+    }
+  });
   std::vector<char> taken(seeds.size(), 0);
   std::set<std::array<double, 3>> distinct;
   std::vector<Vec3> points;
@@ -69,7 +73,7 @@ std::vector<Vec3> far_corners(const ClippedPolyhedra& polyhedra, const CellMomen
       if (!distinct.insert({corner[i].x, corner[i].y, corner[i].z}).second) continue;  // shared by several cells
       points.push_back(corner[i]);
       if (spread)
-        for (const Index j : around[i]) blocked[j] = 1;
+        for (const Index* j = around.begin(i); j != around.end(i); ++j) blocked[*j] = 1;
     }
   }
   return points;

@@ -13,12 +13,13 @@ namespace bisector {
 // Pairs of cells that share a facet inside the solid, lower first, sorted.
 std::vector<std::array<Index, 2>> dual_edges(const ClippedPolyhedra& polyhedra);
 
-// Sites per level, coarse to fine, the last being `count`: the sites and the middles of all edges of a body-centred cubic
-// lattice, 7 for each site, are such a lattice of half the size, so a level has an eighth of the next one's sites.
+// Sites per level, coarse to fine, the last being `count`: the sites and the middles of all edges of a body-centred
+// cubic lattice, 7 for each site, are such a lattice of half the size, so a level has an eighth of the next one's
+// sites.
 std::vector<std::size_t> tet_level_counts(std::size_t count);
 
-// The seeds and the middles of their dual edges, those of the longest edges if that is too many for `count`; if it is too few, also
-// corners of cells that are far from their seeds, cells of the highest energy first.
+// The seeds and the middles of their dual edges, those of the longest edges if that is too many for `count`; if it is
+// too few, also corners of cells that are far from their seeds, cells of the highest energy first.
 std::vector<Vec3> refine_sites(const ClippedPolyhedra& polyhedra, const CellMoments& moments, const std::vector<Vec3>& seeds,
                                std::size_t count);
 

@@ -22,22 +22,27 @@
 namespace bisector {
 namespace {
 
-// Cubic cells of side a have 2 vertices, 8 edges of length a sqrt(3) / 2 and 6 of length a at each: mean 0.9235 a.
+// Vertices of a body-centred cubic lattice per volume, for a mean edge length of 1. A cubic cell of side a has 2
+// vertices, with 8 edges of length a sqrt(3) / 2 and 6 of length a at each: 0.9235 a on average.
 constexpr double kPerVolume = 2 * 0.9235 * 0.9235 * 0.9235;
-constexpr double kPerArea = 1 / std::numbers::sqrt3;  // half of 2 / sqrt 3
-constexpr double kMostVertices = 1e8;
-constexpr double kLongest = 2;       // edge length by h above which an edge is bisected
-constexpr std::size_t kMostTets = 2'000'000;
-constexpr int kRounds = 6;           // of refinement and calibration
-constexpr int kTrials = 40;          // of a calibration
-constexpr double kSettled = 1e-3;    // relative error of the calibration
+// Vertices of an equilateral triangulation per area, 2 / sqrt(3), of which each counts half: the other half of its cell
+// is outside.
+constexpr double kPerArea = 1 / std::numbers::sqrt3;
+constexpr double kMostVertices = 1e8;  // that may be asked for
+constexpr double kLongest = 2;         // lengths h at an edge's end, beyond which the edge is bisected
+constexpr std::size_t kMostTets = 2'000'000;  // unless the input has more
+constexpr int kRounds = 6;             // of refinement and calibration
+constexpr int kTrials = 40;            // factors tried by a calibration
+constexpr double kCalibrated = 1e-3;   // relative error of the edge length, at which a calibration ends
+constexpr double kNarrowest = 1e-9;    // relative width of the interval of factors, at which it gives up
+constexpr double kOutside = -1e-6;     // least barycentric coordinate of a point that counts as within the background mesh
+constexpr double kLeastDensity = 1e-100, kMostDensity = 1e100;  // of an attribute
 
 double volume_of(const TetMesh& mesh, const Tetrahedron& t) {
-  const Vec3 a = mesh.vertices[t[0]];
-  return std::abs(dot(mesh.vertices[t[1]] - a, cross(mesh.vertices[t[2]] - a, mesh.vertices[t[3]] - a))) / 6;
+  return std::abs(rounded_six_volume(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]])) / 6;
 }
 
-// What a count is an integral over.
+// Volumes and areas, over which the number of vertices is an integral.
 struct Extent {
   Extent(const TetMesh& mesh, const TriangleMesh& boundary) : volumes(mesh.tets.size()), areas(boundary.triangles.size()) {
     parallel_each(volumes.size(), [&](std::size_t t) { volumes[t] = volume_of(mesh, mesh.tets[t]); });
@@ -86,37 +91,48 @@ double uniform_edge(const Extent& extent, double vertices) {
   return high;
 }
 
-void check(const TetMesh& mesh, const TetSizingOptions& options, const SizingTarget& target) {
-  const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
+bool positive(double x) { return x > 0 && std::isfinite(x); }
+
+void check_bounds(const SizingOptions& field, const SizingTarget& target) {
   if ((target.vertices > 0) == (target.edge_length != 0) || (target.vertices == 0 && !positive(target.edge_length)))
     throw Error("sizing: give either a number of vertices or a positive edge length");
-  const SizingOptions& field = options.field;
   if (!positive(field.gradation)) throw Error("sizing: the gradation inside a solid must be positive; correct it");
   for (const double bound : {field.min_edge, field.max_edge})
     if (bound != 0 && !positive(bound)) throw Error("sizing: the least and largest edge length must be positive; correct them");
   if (field.max_edge > 0 && field.min_edge > field.max_edge)
     throw Error(fmt::format("sizing: the least edge length {:g} is larger than the largest {:g}; correct them", field.min_edge,
                             field.max_edge));
-  if (options.sizes.points.size() != options.sizes.lengths.size())
-    throw Error(fmt::format("sizing: {} lengths for {} points; give one per point", options.sizes.lengths.size(),
-                            options.sizes.points.size()));
-  for (const Tetrahedron& tet : options.sizes.tets)
-    for (Index v : tet)
-      if (v >= options.sizes.points.size()) throw Error(fmt::format("sizing: the background mesh has no vertex {}; correct it", v));
-  for (std::size_t k = 0; k < options.sizes.lengths.size(); ++k)
-    if (!positive(options.sizes.lengths[k]))
-      throw Error(fmt::format("sizing: the edge length {:g} of point {} is not positive; correct it", options.sizes.lengths[k], k));
-  if (field.kind != DensityKind::attribute || !options.sizes.points.empty()) return;
-  if (field.attribute.empty() || field.attribute.size() > mesh.vertices.size())
-    throw Error(fmt::format("sizing: {} densities for {} vertices; give one per vertex", field.attribute.size(),
-                            mesh.vertices.size()));
-  for (std::size_t v = 0; v < field.attribute.size(); ++v)
-    if (!(field.attribute[v] >= 1e-100 && field.attribute[v] <= 1e100))
-      throw Error(fmt::format("sizing: the density {:g} of vertex {} is not within 1e-100 and 1e100; correct it",
-                              field.attribute[v], v));
 }
 
-// The samples that the field grows from, up to a factor.
+void check_samples(const SizeSamples& sizes) {
+  const std::size_t points = sizes.points.size();
+  if (points != sizes.lengths.size())
+    throw Error(fmt::format("sizing: {} lengths for {} points; give one per point", sizes.lengths.size(), points));
+  for (const Tetrahedron& tet : sizes.tets)
+    for (Index v : tet)
+      if (v >= points) throw Error(fmt::format("sizing: the background mesh has no vertex {}; correct it", v));
+  for (std::size_t k = 0; k < points; ++k)
+    if (!positive(sizes.lengths[k]))
+      throw Error(fmt::format("sizing: the edge length {:g} of point {} is not positive; correct it", sizes.lengths[k], k));
+}
+
+void check_attribute(const std::vector<double>& attribute, std::size_t vertices) {
+  if (attribute.empty() || attribute.size() > vertices)
+    throw Error(fmt::format("sizing: {} densities for {} vertices; give one per vertex", attribute.size(), vertices));
+  for (std::size_t v = 0; v < attribute.size(); ++v)
+    if (!(attribute[v] >= kLeastDensity && attribute[v] <= kMostDensity))
+      throw Error(fmt::format("sizing: the density {:g} of vertex {} is not within 1e-100 and 1e100; correct it",
+                              attribute[v], v));
+}
+
+void check(const TetMesh& mesh, const TetSizingOptions& options, const SizingTarget& target) {
+  check_bounds(options.field, target);
+  check_samples(options.sizes);
+  if (options.field.kind == DensityKind::attribute && options.sizes.points.empty())
+    check_attribute(options.field.attribute, mesh.vertices.size());
+}
+
+// The samples from which the field of lengths grows, up to a factor.
 SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options, double uniform) {
   if (!options.sizes.points.empty()) return options.sizes;
   SizeSamples samples;
@@ -126,7 +142,8 @@ SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const 
     if (samples.points.size() == mesh.vertices.size()) samples.tets = mesh.tets;
     return samples;
   }
-  // On the surface where edges are as long as they will be here, refined until it shows the field.
+  // The surface's own sizing, for edges as long as the solid's will be, on a surface refined until it can carry the
+  // field.
   SizingTarget target;
   target.edge_length = uniform;
   SizingOptions field = options.field;
@@ -143,16 +160,16 @@ SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const 
   return samples;
 }
 
-// The samples' lengths by a factor, within bounds, as a field.
-class Scaled {
+// The field of edge lengths that grows from the samples, their lengths multiplied by a factor and kept within bounds.
+class ScaledField {
  public:
-  Scaled(const SizeSamples& samples, const SizingOptions& bounds) : samples_(samples), bounds_(bounds) {
+  ScaledField(const SizeSamples& samples, const SizingOptions& bounds) : samples_(samples), bounds_(bounds) {
     if (samples.tets.empty()) return;
     background_.vertices = samples.points;
     background_.tets = samples.tets;
     locator_.emplace(background_);
   }
-  Scaled(const Scaled&) = delete;
+  ScaledField(const ScaledField&) = delete;
 
   void scale(double factor) {
     lengths_ = samples_.lengths;
@@ -178,12 +195,12 @@ class Scaled {
   }
 
   Index locate(const Vec3& x) const { return locator_ ? locator_->nearest(x) : kNone; }
-  // On the background mesh; infinite beside it.
+  // The length that is linear on the background mesh; infinite outside it.
   double linear(const Vec3& x, Index tet) const {
-    const double nothing = std::numeric_limits<double>::infinity();
-    if (tet == kNone) return nothing;
+    const double infinite = std::numeric_limits<double>::infinity();
+    if (tet == kNone) return infinite;
     const std::array<double, 4> w = locator_->weights(tet, x);
-    if (!(*std::min_element(w.begin(), w.end()) > -1e-6)) return nothing;
+    if (!(*std::min_element(w.begin(), w.end()) > kOutside)) return infinite;
     double h = 0;
     for (std::size_t k = 0; k < 4; ++k) h += w[k] * lengths_[background_.tets[tet][k]];
     return h;
@@ -195,12 +212,14 @@ class Scaled {
   std::vector<double> lengths_;
   TetMesh background_;
   std::optional<TetLocator> locator_;
-  std::vector<Index> near_, tet_of_;  // of the points asked for last, of which the next are a continuation
+  // Of the points that at() was given last: the sample found near each and its tetrahedron of the background mesh. The
+  // next call's points begin with the same ones.
+  std::vector<Index> near_, tet_of_;
 };
 
-// Finds the factor with which the estimate meets the target; h at the vertices.
+// Finds the factor with which the estimate meets the target, beginning with the one given. Returns h at the vertices.
 std::vector<double> calibrate(const Extent& extent, const TetMesh& mesh, const TriangleMesh& boundary,
-                              const SizingTarget& target, Scaled& field, double& factor) {
+                              const SizingTarget& target, ScaledField& field, double& factor) {
   double low = 0, high = 0;
   std::vector<double> h;
   for (int k = 0; k < kTrials; ++k) {
@@ -209,7 +228,7 @@ std::vector<double> calibrate(const Extent& extent, const TetMesh& mesh, const T
     const TetEstimate e = estimate(extent, mesh, boundary, h);
     const double off = target.vertices ? std::log(static_cast<double>(target.vertices) / e.vertices) / 3
                                        : std::log(e.mean_edge / target.edge_length);
-    if (std::abs(off) < kSettled || (low > 0 && high > 0 && std::log(high / low) < 1e-9)) break;
+    if (std::abs(off) < kCalibrated || (low > 0 && high > 0 && std::log(high / low) < kNarrowest)) break;
     (off < 0 ? low : high) = factor;
     const double next = factor * std::exp(-off);
     factor = low > 0 && high > 0 && !(next > low && next < high) ? std::sqrt(low * high) : next;
@@ -220,7 +239,7 @@ std::vector<double> calibrate(const Extent& extent, const TetMesh& mesh, const T
 // Bisection of edges with all their tetrahedra and marked triangles.
 class Refiner {
  public:
-  Refiner(SizedSolid& sized, TriangleMesh& boundary, const Scaled& field, std::vector<double>& lengths)
+  Refiner(SizedSolid& sized, TriangleMesh& boundary, const ScaledField& field, std::vector<double>& lengths)
       : mesh_(sized.mesh), boundary_(boundary), splits_(sized.splits), field_(field), lengths_(lengths) {
     for (Index t = 0; t < mesh_.tets.size(); ++t) index_tet(t);
     for (Index t = 0; t < mesh_.boundary.size(); ++t) index_triangle(mesh_.boundary[t], t, marked_);
@@ -250,7 +269,8 @@ class Refiner {
  private:
   using Edge = std::tuple<double, Index, Index>;  // squared length, lower and upper end
   using Around = std::unordered_map<std::uint64_t, std::vector<Index>>;
-  struct Later {
+  // Of equally long edges the one with lower ends comes first.
+  struct Shorter {
     bool operator()(const Edge& e, const Edge& f) const {
       if (std::get<0>(e) != std::get<0>(f)) return std::get<0>(e) < std::get<0>(f);
       return std::tie(std::get<1>(e), std::get<2>(e)) > std::tie(std::get<1>(f), std::get<2>(f));
@@ -272,6 +292,8 @@ class Refiner {
     for (int k = 0; k < 3; ++k) around[key(v[k], v[(k + 1) % 3])].push_back(t);
   }
 
+  // From edge to longer edge of the same tetrahedron, up to one that is the longest of all its tetrahedra (Rivara
+  // 1984).
   Edge longest_beyond(Edge longest) const {
     for (bool moved = true; moved;) {
       moved = false;
@@ -281,7 +303,7 @@ class Refiner {
         for (int i = 0; i < 4; ++i)
           for (int j = i + 1; j < 4; ++j) {
             const Edge other = edge(mesh_.tets[t][i], mesh_.tets[t][j]);
-            if (!Later()(longest, other)) continue;
+            if (!Shorter()(longest, other)) continue;
             longest = other;
             moved = true;
           }
@@ -295,6 +317,7 @@ class Refiner {
     if (std::get<0>(e) > most * most) queue_.push(e);
   }
 
+  // False if the edge is not there any more, or too short for a vertex between its ends.
   bool bisect(Index a, Index b) {
     const Vec3 middle = 0.5 * mesh_.vertices[a] + 0.5 * mesh_.vertices[b];
     if (middle == mesh_.vertices[a] || middle == mesh_.vertices[b]) return false;
@@ -306,28 +329,7 @@ class Refiner {
     mesh_.vertices.push_back(middle);
     lengths_.push_back(field_.at(middle));
     splits_.push_back({std::min(a, b), std::max(a, b), m});
-    for (const Index t : around) {
-      const auto added = static_cast<Index>(mesh_.tets.size());
-      Tetrahedron &first = mesh_.tets[t], second = first;
-      std::replace(first.begin(), first.end(), b, m);
-      std::replace(second.begin(), second.end(), a, m);
-      std::vector<Index> others;
-      for (Index v : first)
-        if (v != a && v != m) others.push_back(v);
-      mesh_.tets.push_back(second);
-      if (!mesh_.regions.empty()) mesh_.regions.push_back(mesh_.regions[t]);
-      tets_[key(a, m)].push_back(t);
-      tets_[key(m, b)].push_back(added);
-      tets_[key(others[0], others[1])].push_back(added);
-      for (Index c : others) {
-        std::vector<Index>& beyond = tets_[key(b, c)];
-        std::replace(beyond.begin(), beyond.end(), t, added);
-        std::vector<Index>& between = tets_[key(m, c)];
-        const bool fresh = between.empty();
-        between.insert(between.end(), {t, added});
-        if (fresh) push(m, c);
-      }
-    }
+    for (const Index t : around) split_tet(a, b, m, t);
     split_triangles(a, b, m, mesh_.boundary, mesh_.boundary_labels, marked_);
     split_triangles(a, b, m, boundary_.triangles, boundary_.labels, outer_);
     if (features_.erase(key(a, b))) {
@@ -337,6 +339,30 @@ class Refiner {
     push(a, m);
     push(m, b);
     return true;
+  }
+
+  // Divides tetrahedron t, which keeps corner a, at the middle m of its edge from a to b.
+  void split_tet(Index a, Index b, Index m, Index t) {
+    const auto added = static_cast<Index>(mesh_.tets.size());
+    Tetrahedron &first = mesh_.tets[t], second = first;
+    std::replace(first.begin(), first.end(), b, m);
+    std::replace(second.begin(), second.end(), a, m);
+    std::vector<Index> others;
+    for (Index v : first)
+      if (v != a && v != m) others.push_back(v);
+    mesh_.tets.push_back(second);
+    if (!mesh_.regions.empty()) mesh_.regions.push_back(mesh_.regions[t]);
+    tets_[key(a, m)].push_back(t);
+    tets_[key(m, b)].push_back(added);
+    tets_[key(others[0], others[1])].push_back(added);
+    for (Index c : others) {
+      std::vector<Index>& beyond = tets_[key(b, c)];
+      std::replace(beyond.begin(), beyond.end(), t, added);
+      std::vector<Index>& between = tets_[key(m, c)];
+      const bool fresh = between.empty();
+      between.insert(between.end(), {t, added});
+      if (fresh) push(m, c);
+    }
   }
 
   static void split_triangles(Index a, Index b, Index m, std::vector<Triangle>& triangles, std::vector<std::int32_t>& labels,
@@ -372,12 +398,24 @@ class Refiner {
   TetMesh& mesh_;
   TriangleMesh& boundary_;
   EdgeSplits& splits_;
-  const Scaled& field_;
+  const ScaledField& field_;
   std::vector<double>& lengths_;
   Around tets_, marked_, outer_;  // at each edge
   std::unordered_map<std::uint64_t, char> features_;
-  std::priority_queue<Edge, std::vector<Edge>, Later> queue_;
+  std::priority_queue<Edge, std::vector<Edge>, Shorter> queue_;
 };
+
+// The length and number that the target means where all edges are alike.
+void set_uniform(const Extent& extent, const SizingTarget& target, SizedSolid& sized) {
+  const auto count = static_cast<double>(target.vertices);
+  sized.edge_length = target.vertices ? uniform_edge(extent, count) : target.edge_length;
+  const double wanted =
+      target.vertices ? count : estimate_tet_vertices(extent.volume, extent.area, sized.edge_length);
+  if (wanted > kMostVertices)
+    throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones", sized.edge_length,
+                            kMostVertices));
+  sized.vertices = static_cast<std::size_t>(std::llround(wanted));
+}
 
 std::vector<double> powers(const std::vector<double>& lengths, double unit, int exponent) {
   std::vector<double> rho(lengths.size());
@@ -402,19 +440,11 @@ SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, c
   check(mesh, options, target);
   SizedSolid sized;
   sized.mesh = mesh;
-  const Extent whole(mesh, boundary);
-  const double uniform =
-      target.vertices ? uniform_edge(whole, static_cast<double>(target.vertices)) : target.edge_length;
-  const double wanted =
-      target.vertices ? static_cast<double>(target.vertices) : estimate_tet_vertices(whole.volume, whole.area, uniform);
-  if (wanted > kMostVertices)
-    throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones", uniform, kMostVertices));
-  sized.edge_length = uniform;
-  sized.vertices = static_cast<std::size_t>(std::llround(wanted));
+  set_uniform(Extent(mesh, boundary), target, sized);
   if (options.field.kind == DensityKind::uniform && options.sizes.points.empty()) return sized;
 
-  const SizeSamples samples = samples_of(mesh, boundary, options, uniform);
-  Scaled field(samples, options.field);
+  const SizeSamples samples = samples_of(mesh, boundary, options, sized.edge_length);
+  ScaledField field(samples, options.field);
   TriangleMesh surface = boundary;
   double factor = 1;
   const std::size_t limit = std::max(kMostTets, mesh.tets.size());

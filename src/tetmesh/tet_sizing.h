@@ -1,32 +1,17 @@
-// Edge lengths for tetrahedral meshes: from a field on the boundary, on the vertices or on a background mesh to one length
-// everywhere in the solid (thesis 5.5.1).
+// Edge lengths for tetrahedral meshes: from a field on the boundary, on the vertices or on a background mesh to one
+// length everywhere in the solid (thesis 5.5.1).
 //
-// A CVT spreads its energy evenly over the cells; the energy of a cell of diameter h in three dimensions is about rho h^5, so
-// the edges of the result have the length h = unit_edge rho^(-1/5) (Du, Faber and Gunzburger 1999).
+// A CVT spreads its energy evenly over the cells; the energy of a cell of diameter h in three dimensions is about rho
+// h^5, so the edges of the result have the length h = unit_edge rho^(-1/5) (Du, Faber and Gunzburger 1999).
 #pragma once
 
 #include <vector>
 
-#include "core/geometry.h"
+#include "bisector/tetmesh.h"
 #include "features/edge_splits.h"
 #include "remesh/sizing.h"
 
 namespace bisector {
-
-// Edge lengths at points, or at the vertices of a background mesh, on whose tetrahedra they are linear.
-struct SizeSamples {
-  std::vector<Vec3> points;
-  std::vector<double> lengths;
-  std::vector<Tetrahedron> tets = {};
-};
-
-struct TetSizingOptions {
-  // As for surfaces (remesh/sizing.h), from the boundary into the solid; but an attribute has one value for each vertex of the
-  // tetrahedra (in which these lengths are linear), or of the surface that they were made of, and edges are as long as its power
-  // -1/5. Gradation must not be 0.
-  SizingOptions field;
-  SizeSamples sizes;  // if not empty, instead of the field's kind: edge lengths, up to a common factor if a count is asked for
-};
 
 // A solid whose tetrahedra can carry the density.
 struct SizedSolid {
@@ -40,16 +25,16 @@ struct SizedSolid {
   std::vector<double> surface_density() const;  // (edge_length / h)^4, for Surface
 };
 
-// The vertices of a tetrahedral mesh with edges of length h: a body-centred cubic lattice, whose cells a CVT's are about, has
-// 1.575 / h^3 of them per volume for the mean h of its edges; on the boundary there are as many as an equilateral
-// triangulation has, each with half a cell.
+// The vertices of a tetrahedral mesh with edges of length h: a body-centred cubic lattice, whose cells a CVT's are
+// about, has 1.575 / h^3 of them per volume for the mean h of its edges; on the boundary there are as many as an
+// equilateral triangulation has, each with half a cell.
 double estimate_tet_vertices(double volume, double area, double h);
 
-// Bisects edges that are longer than 2 h at one of their ends, longest first (Rivara 1984). With a gradation of 0.2 the linear
-// density then stands for lengths within 8 % of h, and its integrals are exact; edges of length h would take eight times as many
-// tetrahedra. A uniform size bisects nothing.
-// `target.vertices` is of the whole mesh. Stops at 2 million tetrahedra or the input's number, if that is larger.
-// `boundary` is the mesh's, on the same vertices. Throws Error as refine_for_density does.
+// Bisects edges that are longer than 2 h at one of their ends, longest first (Rivara 1984). With a gradation of 0.2 the
+// linear density then stands for lengths within 8 % of h, and its integrals are exact; edges of length h would take
+// eight times as many tetrahedra. A uniform size bisects nothing. `target.vertices` is of the whole mesh. Stops at 2
+// million tetrahedra or the input's number, if that is larger. `boundary` is the mesh's, on the same vertices. Throws
+// Error as refine_for_density does.
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
                             const SizingTarget& target);
 

@@ -9,8 +9,8 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kRing = 10;  // tetrahedra around an edge that is taken out, at most
-constexpr int kDepth = 3;          // facets from the first that are taken out with it, at most
+constexpr std::size_t kRing = 10;  // tetrahedra around an edge that is removed, at most
+constexpr int kDepth = 3;          // steps from the first facet that is removed to the last one removed with it, at most
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double shape(const TetEdit& mesh, Index a, Index b, Index c, Index d) {
@@ -21,7 +21,7 @@ int corner_of(const Tetrahedron& corners, Index v) {
   return static_cast<int>(std::find(corners.begin(), corners.end(), v) - corners.begin());
 }
 
-// Triangulates v_i .. v_j of the ring by the table of middle vertices.
+// The tetrahedra of a and b with the triangulation of ring vertices i to j that the table of third corners describes.
 void collect(const std::vector<Index>& ring, const int middle[kRing][kRing], int i, int j, Index a, Index b,
              std::vector<Tetrahedron>& fresh) {
   if (j == i + 1) return;
@@ -32,6 +32,8 @@ void collect(const std::vector<Index>& ring, const int middle[kRing][kRing], int
   collect(ring, middle, k, j, a, b, fresh);
 }
 
+// Klincsek's dynamic programming: value[i][j] is the best least shape of the tetrahedra over a triangulation of ring
+// vertices i to j, and middle[i][j] the third corner of its triangle at the edge from i to j.
 bool remove_edge(const TetEdit& mesh, Index t, int corner_a, int corner_b, TetSwap& best) {
   static thread_local std::vector<Index> tets, ring;
   const Index a = mesh.tet(t).corners[corner_a], b = mesh.tet(t).corners[corner_b];
@@ -64,19 +66,20 @@ bool remove_edge(const TetEdit& mesh, Index t, int corner_a, int corner_b, TetSw
   return true;
 }
 
-// Facets that the edge from a to b is to pass through, found outwards from the first.
+// The facets sandwiched between a and b that the edge between the two is to pass through (Shewchuk 2002), found
+// outwards from the first one.
 struct Sandwich {
   const TetEdit& mesh;
   Index a, b;
-  double beat;
+  double beat;  // shape that everything new must exceed
 
   struct Part {
-    std::vector<Index> old;
+    std::vector<Index> old;  // tetrahedra on either side of the facets
     std::vector<std::array<Index, 2>> edges;  // around the facets, in turn; each gives a tetrahedron with a and b
     double shape = kInfinity;
   };
 
-  // What is best beyond the edge from u to v, where `below` has the corners (a, u, v) and `above` (b, u, v).
+  // The best part beyond the edge from u to v, where `below` has the corners (a, u, v) and `above` (b, u, v).
   Part beyond(Index below, Index above, Index u, Index v, int depth) const {
     Part stop{{}, {{u, v}}, shape(mesh, a, b, u, v)};
     if (depth == 0) return stop;

@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -21,12 +20,13 @@
 #include <utility>
 
 #include "bisector/error.h"
-#include "core/orientation.h"
 #include "core/parallel.h"
+#include "core/stopwatch.h"
+#include "core/orientation.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/tet_topology.h"
-#include "tetgen/protocol.h"
 #include "tetmesh/carve.h"
+#include "tetgen/protocol.h"
 
 extern char** environ;
 
@@ -35,13 +35,12 @@ namespace bisector {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 #ifndef BISECTOR_TETGEN_PROGRAM
 #define BISECTOR_TETGEN_PROGRAM ""
 #endif
 
-constexpr const char* kSimplify = "simplify or remesh the surface first (bisector remesh), or give a tetrahedral mesh";
+constexpr const char* kSimplify = "simplify or remesh the surface first, or give a tetrahedral mesh";
 
 class Descriptor {
  public:
@@ -99,13 +98,13 @@ class Child {
 
   // Sends the request and reads the reply to its end.
   std::string talk(const std::string& request, double time_limit, const Context& context) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     std::string reply;
     std::size_t sent = 0;
     bool listening = true, hearing = true;
     while (listening) {
       context.check();
-      if (time_limit > 0 && std::chrono::duration<double>(Clock::now() - start).count() > time_limit)
+      if (time_limit > 0 && watch.seconds() > time_limit)
         throw Error(fmt::format("TetGen took longer than {} s; {}", time_limit, kSimplify));
       pollfd polls[2] = {{channel_.get(), static_cast<short>(POLLIN | (sent < request.size() ? POLLOUT : 0)), 0},
                          {hearing ? messages_.get() : -1, POLLIN, 0}};
@@ -292,7 +291,7 @@ void turn_positive(const std::vector<Vec3>& vertices, std::vector<Tetrahedron>& 
     const Tetrahedron& t = tets[i];
     sign[i] = static_cast<signed char>(orientation(vertices[t[0]], vertices[t[1]], vertices[t[2]], vertices[t[3]]));
   });
-  // TetGen's tetrahedra are alike; which way round shows the majority. One of the other sign is inverted.
+  // TetGen orients its tetrahedra alike, and the majority shows which way. One of the other sign is inverted.
   const auto positive = std::count(sign.begin(), sign.end(), 1), negative = std::count(sign.begin(), sign.end(), -1);
   if (positive > 0 && negative > 0)
     throw Error(fmt::format("TetGen gave {} inverted tetrahedra; {}", std::min(positive, negative), kSimplify));

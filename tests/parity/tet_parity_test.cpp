@@ -6,11 +6,11 @@
 #include <string>
 
 #include "bisector/quality.h"
+#include "bisector/tetmesh.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 #include "support/setups.h"
 #include "support/solids.h"
-#include "tetmesh/tetmesh.h"
 
 namespace bisector::test {
 namespace {

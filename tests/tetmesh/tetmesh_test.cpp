@@ -1,5 +1,5 @@
 // Tetrahedral meshing end to end on generated solids: validity, topology, quality, features, sizes, and input it has to refuse.
-#include "tetmesh/tetmesh.h"
+#include "bisector/tetmesh.h"
 
 #include <gtest/gtest.h>
 

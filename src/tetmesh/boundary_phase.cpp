@@ -1,0 +1,147 @@
+#include "tetmesh/boundary_phase.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bisector/error.h"
+#include "core/stopwatch.h"
+#include "cvt/constrain.h"
+#include "bisector/quality.h"
+#include "spatial/hilbert.h"
+
+namespace bisector {
+namespace {
+
+using Kind = SeedPlace::Kind;
+
+constexpr double kJointShare = 0.2;  // of the steps that the whole run is allowed
+constexpr int kJointRounds = 3;      // with sites that join the boundary in between
+constexpr int kLayoutSteps = 10;     // of the surface's own optimisation, to spread the sites along features
+constexpr int kBoundarySteps = 30;   // likewise, before the boundary is extracted
+// The solid counts as thin from so many cells at the boundary on, over the sites that its edge lengths ask for. Of a
+// free CVT 0.9 to 1.2 times as many meet the boundary, and nearly all where the solid is two cells thick.
+constexpr double kThin = 1.25;
+constexpr std::size_t kFewestOnBoundary = 8;
+
+// Vertices of an equilateral triangulation of the surface with the edge lengths aimed at.
+double boundary_vertices(const Surface& surface, const SizedSolid& sized) {
+  const TriangleMesh& mesh = surface.mesh;
+  double count = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 a = mesh.vertices[t[0]], b = mesh.vertices[t[1]], c = mesh.vertices[t[2]];
+    double per_area = 0;
+    for (const Index v : t) {
+      const double h = sized.lengths.empty() ? sized.edge_length : sized.lengths[v];
+      per_area += 2 / (3 * std::sqrt(3.0) * h * h);
+    }
+    count += 0.5 * norm(twice_area_normal(a, b, c)) * per_area;
+  }
+  return count;
+}
+
+// So many of the points, evenly along their spatial order.
+std::vector<Vec3> thinned(const std::vector<Vec3>& points, std::size_t count) {
+  const std::vector<Index> order = hilbert_order(points);
+  std::vector<Vec3> kept;
+  for (std::size_t k = 0; k < count; ++k) kept.push_back(points[order[k * points.size() / count]]);
+  return kept;
+}
+
+// The free sites, those whose cells meet the boundary moved to it.
+struct Split {
+  std::vector<Vec3> on_boundary, inside;
+};
+
+Split split_at_boundary(SolidBackend& solid, const std::vector<Vec3>& free) {
+  CellMoments moments;
+  solid.evaluate(free, moments);
+  std::vector<Vec3> feet = free, normals;
+  project_to_cells(solid.surface(), moments.triangles, {}, feet, normals);
+  Split split;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    if (moments.triangles.size(i) == 0) split.inside.push_back(free[i]);
+    else split.on_boundary.push_back(feet[i]);
+  }
+  return split;
+}
+
+RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<SeedPlace> places, bool final_pass) {
+  const Stopwatch watch;
+  RemeshOptions options;
+  options.seeds = std::move(seeds);
+  options.places = std::move(places);
+  options.iterations = final_pass ? kBoundarySteps : kLayoutSteps;
+  options.tolerance = run.options.tolerance;
+  options.topology = final_pass ? TopologyControl::enforce : TopologyControl::off;
+  options.min_angle = final_pass ? run.options.min_angle : 0;
+  Context quiet = run.context;
+  quiet.progress = nullptr;
+  RemeshResult result = remesh(run.boundary, run.features, options, quiet);
+  run.seconds_boundary += watch.seconds();
+  return result;
+}
+
+// Sites inside whose cells have come to the boundary join it while that has fewer than `room`; where the solid is thin,
+// all of them. True if any did.
+bool join_boundary(CvtState& state, double room, bool thin) {
+  const auto held = std::count_if(state.places.begin(), state.places.end(),
+                                  [](const SeedPlace& place) { return place.kind != Kind::interior; });
+  double left = room - static_cast<double>(held);
+  bool any = false;
+  for (const Index i : inner_sites_at_boundary(state)) {
+    if (left-- < 1 && !thin) break;
+    state.places[i] = {};
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace
+
+JointSites joint_phase(TetRun& run, const std::vector<Vec3>& free, const BoundaryShare& share) {
+  Split split = split_at_boundary(run.solid, free);
+  // With no more sites on the boundary than that, tetrahedra inside and at the boundary are alike, and something is
+  // left inside.
+  const double room = boundary_vertices(run.solid.surface(), run.sized) + share.surplus;
+  const auto met = static_cast<double>(split.on_boundary.size());
+  JointSites joint;
+  joint.met_boundary = split.on_boundary.size();
+  joint.thin = share.thin || met > kThin * room;
+  if (run.options.seeds.empty() && met > room)
+    split.on_boundary =
+        thinned(split.on_boundary, std::max(kFewestOnBoundary, static_cast<std::size_t>(std::llround(room))));
+  joint.state = with_boundary(remesh_boundary(run, std::move(split.on_boundary), {}, false), split.inside);
+  for (int round = 0; round < kJointRounds; ++round) {
+    optimise_sites(run, run.solid, joint.state, "with the boundary", kJointShare / kJointRounds, true);
+    if (round + 1 < kJointRounds && !join_boundary(joint.state, room, joint.thin) && round > 0) break;
+  }
+  return joint;
+}
+
+RemeshResult finish_boundary(TetRun& run, const CvtState& sites) {
+  std::vector<Vec3> seeds;
+  std::vector<SeedPlace> places;
+  for (std::size_t i = 0; i < sites.seeds.size(); ++i) {
+    if (sites.places[i].kind == Kind::interior) continue;
+    seeds.push_back(sites.seeds[i]);
+    places.push_back(sites.places[i]);
+  }
+  RemeshResult surface = remesh_boundary(run, std::move(seeds), std::move(places), true);
+  std::size_t crossings = count_self_intersections(surface.mesh);
+  // Where sheets meet at a small angle, another pass may mend what one leaves, with more vertices.
+  if (crossings > 0 || !surface.topology.closed || !surface.topology.manifold) {
+    surface = remesh_boundary(run, surface.mesh.vertices, surface.places, true);
+    crossings = count_self_intersections(surface.mesh);
+  }
+  if (crossings > 0)
+    throw Error(fmt::format("the boundary of the result crosses itself at {} pairs of triangles: parts are thinner than its edges; "
+                            "ask for more vertices", crossings));
+  if (!surface.topology.closed || !surface.topology.manifold)
+    throw Error("the boundary of the result is not a closed manifold: parts are thinner than its edges; ask for more vertices");
+  return surface;
+}
+
+}  // namespace bisector

@@ -1,0 +1,84 @@
+#include "tetmesh/stand_ins.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bisector/error.h"
+#include "compute/compute.h"
+#include "tetmesh/check_surface.h"
+#include "tetmesh/tet_sizing.h"
+#include "tetmesh/tetgen.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kManyTets = 8;         // tetrahedra of the solid for each site, from which on a stand-in pays
+constexpr int kSurfaceSteps = 20;            // iterations of its surface's optimisation, per level
+constexpr std::size_t kFewestVertices = 100; // of its surface
+constexpr std::size_t kFewerTriangles = 4;   // triangles of the surface given for each vertex of its surface, at least
+
+}  // namespace
+
+// A solid and what computes its diagrams.
+struct StandIns::Domain {
+  Domain(TetMesh mesh, std::vector<double> density, const ComputeOptions& compute, const Context& context)
+      : solid(std::move(mesh), std::move(density)), backend(make_backend(solid, compute, context)) {}
+
+  Solid solid;
+  std::unique_ptr<SolidBackend> backend;
+};
+
+StandIns::StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& boundary, const FeatureGraph& features,
+                   const TetOptions& options, const Context& context)
+    : mesh_(mesh), surface_(surface), boundary_(boundary), features_(features), options_(options), context_(context) {}
+
+StandIns::~StandIns() = default;
+
+SolidBackend* StandIns::choose(std::size_t count, std::size_t final_count, const SolidBackend& whole) {
+  if (!whole.solid().density.empty()) {
+    if (count == final_count) return nullptr;
+    domain_ = make_sized(count);
+    return domain_->backend.get();
+  }
+  if (whole.solid().mesh.tets.size() < kManyTets * final_count) return nullptr;
+  if (!std::exchange(tried_, true)) {
+    // Twice as many vertices as the result will have on its boundary, which has edges of the same length.
+    const double h = std::cbrt(whole.solid().volume / static_cast<double>(final_count));
+    domain_ = make_coarse(static_cast<std::size_t>(2 * boundary_.surface().area / (h * h)));
+  }
+  return domain_ ? domain_->backend.get() : nullptr;
+}
+
+// The solid refined only as far as `count` sites ask for.
+std::unique_ptr<StandIns::Domain> StandIns::make_sized(std::size_t count) const {
+  SizingTarget target;
+  target.vertices = count;
+  SizedSolid sized = refine_for_sizes(mesh_, surface_, options_.sizing, target);
+  std::vector<double> density = sized.volume_density();
+  return std::make_unique<Domain>(std::move(sized.mesh), std::move(density), options_.compute, context_);
+}
+
+// The inside of a remeshed boundary. There is none where that does not bound a solid, or without TetGen.
+std::unique_ptr<StandIns::Domain> StandIns::make_coarse(std::size_t vertices) const {
+  if (find_tetgen().empty() || kFewerTriangles * vertices > surface_.triangles.size()) return nullptr;
+  RemeshOptions remeshing;
+  remeshing.vertices = std::max(vertices, kFewestVertices);
+  remeshing.iterations = kSurfaceSteps;
+  remeshing.topology = TopologyControl::check;
+  remeshing.min_angle = 0;
+  Context quiet = context_;
+  quiet.progress = nullptr;
+  quiet.warning = nullptr;
+  const RemeshResult coarse = remesh(boundary_, features_, remeshing, quiet);
+  try {
+    return std::make_unique<Domain>(tetgen_tets(check_surface(coarse.mesh), {}, quiet).mesh, std::vector<double>{},
+                                    options_.compute, context_);
+  } catch (const DeviceError&) {
+    throw;
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
+}  // namespace bisector

@@ -1,0 +1,42 @@
+// Solids with fewer tetrahedra that stand in for the whole one while sites are free, when neither the boundary's
+// details nor a density between the sites matter yet.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "backend/backend.h"
+#include "bisector/tetmesh.h"
+
+namespace bisector {
+
+class StandIns {
+ public:
+  // `mesh` and `surface` are the solid's as given, `boundary` and `features` those of the solid as refined for its
+  // sizes. Everything must outlive the object.
+  StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& boundary, const FeatureGraph& features,
+           const TetOptions& options, const Context& context);
+  ~StandIns();
+
+  // The stand-in for `whole` with `count` of `final_count` sites; null if the solid itself will do. It lasts until the
+  // next call.
+  SolidBackend* choose(std::size_t count, std::size_t final_count, const SolidBackend& whole);
+
+ private:
+  struct Domain;
+
+  std::unique_ptr<Domain> make_sized(std::size_t count) const;
+  std::unique_ptr<Domain> make_coarse(std::size_t vertices) const;
+
+  const TetMesh& mesh_;
+  const TriangleMesh& surface_;
+  Backend& boundary_;
+  const FeatureGraph& features_;
+  const TetOptions& options_;
+  const Context& context_;
+  std::unique_ptr<Domain> domain_;
+  bool tried_ = false;  // to make a coarse one
+};
+
+}  // namespace bisector
