@@ -11,6 +11,7 @@
 #include "bisector/export.h"
 #include "bisector/features.h"
 #include "bisector/mesh.h"
+#include "bisector/quality.h"
 #include "remesh/remesh.h"
 
 namespace bisector {

@@ -9,7 +9,7 @@
 #include "bisector/error.h"
 #include "core/stopwatch.h"
 #include "cvt/constrain.h"
-#include "mesh/quality.h"
+#include "bisector/quality.h"
 #include "spatial/hilbert.h"
 
 namespace bisector {

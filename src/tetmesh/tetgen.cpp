@@ -20,13 +20,13 @@
 #include <utility>
 
 #include "bisector/error.h"
-#include "core/orientation.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "core/orientation.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/tet_topology.h"
-#include "tetgen/protocol.h"
 #include "tetmesh/carve.h"
+#include "tetgen/protocol.h"
 
 extern char** environ;
 

@@ -9,9 +9,7 @@
 #include <utility>
 
 #include "bisector/error.h"
-#include "bisector/quality.h"
 #include "compute/compute.h"
-#include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "mesh/tet_topology.h"
@@ -25,6 +23,7 @@
 #include "tetmesh/locate.h"
 #include "tetmesh/stand_ins.h"
 #include "tetmesh/tetgen.h"
+#include "voronoi/clipped.h"
 #include "voronoi/tiling.h"
 
 namespace bisector {

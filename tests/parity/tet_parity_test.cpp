@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bisector/quality.h"
+#include "bisector/tetmesh.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 #include "bisector/tetmesh.h"
