@@ -11,6 +11,7 @@
 
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "core/geometry.h"
 #include "io/files.h"
 
 namespace bisector {

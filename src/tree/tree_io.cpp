@@ -14,6 +14,7 @@
 #include "io/bytes.h"
 #include "io/files.h"
 #include "io/mesh_formats.h"
+#include "tree/iges.h"
 
 namespace bisector {
 namespace {
