@@ -1,7 +1,7 @@
 # bisector_embed_kernels(TARGET SYMBOL FILES...) compiles compute shaders, checks the SPIR-V and adds it to TARGET as
 # `extern const std::span<const bisector::host::Module> bisector::host::SYMBOL` (see host/device/modules.h).
-# FILE.comp gives the module FILE. One that includes "real.glsl" itself gives FILE_single (BISECTOR_DOUBLE=0) and FILE_double
-# (BISECTOR_DOUBLE=1).
+# FILE.comp gives the module FILE. One that includes "real.glsl" itself gives FILE_single (BISECTOR_DOUBLE=0) and
+# FILE_double (BISECTOR_DOUBLE=1).
 
 if(CMAKE_SCRIPT_MODE_FILE)
   # The build runs this file to write OUTPUT from the .spv FILES, separated by "|".
@@ -12,8 +12,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
     get_filename_component(name ${file} NAME_WE)
     file(READ ${file} bytes HEX)
     string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1," words "${bytes}")
-    string(REGEX REPLACE "(0x........,0x........,0x........,0x........,0x........,0x........,0x........,0x........,)" "\\1\n"
-           words "${words}")
+    string(REPEAT "0x........," 8 eight_words)
+    string(REGEX REPLACE "(${eight_words})" "\\1\n" words "${words}")
     string(APPEND arrays "constexpr std::uint32_t ${name}[] = {\n${words}};\n")
     string(APPEND table "    {\"${name}\", spirv::${name}},\n")
   endforeach()

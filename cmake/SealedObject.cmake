@@ -1,9 +1,9 @@
-# bisector_sealed_object(VARIABLE OBJECTS...) sets VARIABLE to one object file that has the code of all OBJECTS and in which
-# only what is exported remains global.
+# bisector_sealed_object(VARIABLE OBJECTS...) sets VARIABLE to one object file that has the code of all OBJECTS and in
+# which only what is exported remains global.
 #
-# A library of the objects as they are would also offer its instances of templates and inline functions, of which the linker
-# keeps one for the whole program: a user's, compiled with other flags and perhaps rounding otherwise, could take the place of
-# the library's. The descriptions of classes stay global, so that exceptions are recognised.
+# A library of the objects as they are would also offer its instances of templates and inline functions, of which the
+# linker keeps one for the whole program: a user's, compiled with other flags and perhaps rounding otherwise, could take
+# the place of the library's. The descriptions of classes stay global, so that exceptions are recognised.
 function(bisector_sealed_object variable)
   set(sealed ${PROJECT_BINARY_DIR}/bisector${CMAKE_CXX_OUTPUT_EXTENSION})
   set(list_mergeable "${CMAKE_NM} --defined-only --format=posix ${sealed} |
