@@ -12,9 +12,18 @@ namespace {
 using Colour = std::array<unsigned char, 3>;
 
 // Light enough for shading to show, and told apart side by side.
-constexpr std::array<Colour, 12> kPalette{{{232, 160, 140}, {140, 190, 224}, {244, 211, 128}, {158, 206, 158},
-                                           {196, 170, 220}, {240, 186, 206}, {120, 196, 190}, {214, 190, 160},
-                                           {186, 204, 112}, {150, 160, 214}, {246, 180, 112}, {208, 216, 224}}};
+constexpr std::array<Colour, 12> kPalette{{{232, 160, 140},
+                                           {140, 190, 224},
+                                           {244, 211, 128},
+                                           {158, 206, 158},
+                                           {196, 170, 220},
+                                           {240, 186, 206},
+                                           {120, 196, 190},
+                                           {214, 190, 160},
+                                           {186, 204, 112},
+                                           {150, 160, 214},
+                                           {246, 180, 112},
+                                           {208, 216, 224}}};
 
 std::vector<std::array<Index, 2>> adjacent_cells(const RestrictedPolygons& polygons) {
   std::vector<std::array<Index, 2>> edges;  // the higher cell first

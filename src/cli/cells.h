@@ -10,8 +10,8 @@
 
 namespace bisector::cli {
 
-// A colour for each of `count` patches, given those that meet: pairs, the higher first, ascending. Neighbours differ, up
-// to eleven neighbours of lower index.
+// A colour for each of `count` patches, given those that meet: pairs, the higher first, ascending. Neighbours differ,
+// up to eleven neighbours of lower index.
 std::vector<std::array<unsigned char, 3>> contrasting_colours(const std::vector<std::array<Index, 2>>& neighbours,
                                                               std::size_t count);
 

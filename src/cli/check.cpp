@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "check/device_check.h"
-#include "core/parallel.h"
-#include "core/stopwatch.h"
 #include "commands.h"
 #include "console.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "options.h"
 #include "outputs.h"
 #include "report.h"
@@ -30,7 +30,8 @@ void add_options(CLI::App* app, CheckCommand& command) {
   add_device(app, command.device,
              "what to check: auto (the best GPU; default), cpu (against\n"
              "itself), vulkan, vulkan:INDEX or vulkan:UUID");
-  add_words(app, "--precision", command.precision, kPrecisionWords, "auto (both, where the device has double), single or double")
+  add_words(app, "--precision", command.precision, kPrecisionWords,
+            "auto (both, where the device has double), single or double")
       ->group("Computation");
   add_common_options(app, command.common, "write a JSON report with one row for each case; - for\nstdout");
 }
@@ -53,49 +54,51 @@ std::string differences(const DeviceCheckRow& row) {
 }
 
 void print_head(Console& console) {
-  console.print(fmt::format("{:<10} {:<10} {:<9} {:<7} {:>6} {:>7}  {:<7} {:>8} {:>8} {:>8} {:>8}  "
-                            "{:>9} {:>6} {:>6}  {:>8} {:>8}",
-                            "model", "seeds", "neighbors", "prec.", "seeds", "pairs", "result", "mass", "centroid",
-                            "energy", "sum", "uncertain", "double", "cpu", "seconds", "CPU s"));
+  console.print(
+      fmt::format("{:<10} {:<10} {:<9} {:<7} {:>6} {:>7}  {:<7} {:>8} {:>8} {:>8} {:>8}  "
+                  "{:>9} {:>6} {:>6}  {:>8} {:>8}",
+                  "model", "seeds", "neighbors", "prec.", "seeds", "pairs", "result", "mass", "centroid", "energy",
+                  "sum", "uncertain", "double", "cpu", "seconds", "CPU s"));
 }
 
 double uncertain_share(const Certification& certification) {
-  return static_cast<double>(certification.uncertain) / static_cast<double>(std::max<std::size_t>(certification.pairs, 1));
+  return static_cast<double>(certification.uncertain) /
+         static_cast<double>(std::max<std::size_t>(certification.pairs, 1));
 }
 
 void print_row(Console& console, const DeviceCheckRow& row) {
   const Parity& p = row.parity;
   const Certification& c = row.certification;
-  console.print(fmt::format(
-      "{:<10} {:<10} {:<9} {:<7} {:>6} {:>7}  {:<7} {:>8.1e} {:>8.1e} {:>8.1e} {:>8.1e}  "
-      "{:>8.3f}% {:>6} {:>6}  {:>8.4f} {:>8.4f}",
-      row.model, row.seeds, kNeighbourWords.word_of(row.neighbours), row.device.precision, row.seed_count, c.pairs, differences(row),
-      p.mass_error, p.centroid_error, p.energy_error, p.sum_error, 100 * uncertain_share(c), c.doubled, c.cpu, row.seconds,
-      row.cpu_seconds));
+  console.print(
+      fmt::format("{:<10} {:<10} {:<9} {:<7} {:>6} {:>7}  {:<7} {:>8.1e} {:>8.1e} {:>8.1e} {:>8.1e}  "
+                  "{:>8.3f}% {:>6} {:>6}  {:>8.4f} {:>8.4f}",
+                  row.model, row.seeds, kNeighbourWords.word_of(row.neighbours), row.device.precision, row.seed_count,
+                  c.pairs, differences(row), p.mass_error, p.centroid_error, p.energy_error, p.sum_error,
+                  100 * uncertain_share(c), c.doubled, c.cpu, row.seconds, row.cpu_seconds));
 }
 
 Json row_json(const DeviceCheckRow& row) {
   const Parity& p = row.parity;
   Json json{{"model", row.model},
-          {"seeds", row.seeds},
-          {"neighbors", kNeighbourWords.word_of(row.neighbours)},
-          {"precision", row.device.precision},
-          {"triangles", row.triangles},
-          {"seed_count", row.seed_count},
-          {"passed", row.passed},
-          {"same_pairs", p.same_pairs},
-          {"same_labels", p.same_labels},
-          {"same_dual", p.same_dual},
-          {"bitwise", p.bitwise},
-          {"repeats", row.repeats},
-          {"mass_error", p.mass_error},
-          {"centroid_error", p.centroid_error},
-          {"energy_error", p.energy_error},
-          {"sum_error", p.sum_error},
-          {"uncertain_share", uncertain_share(row.certification)},
-          {"certification", certification_json(row.certification)},
-          {"seconds", row.seconds},
-          {"cpu_seconds", row.cpu_seconds}};
+            {"seeds", row.seeds},
+            {"neighbors", kNeighbourWords.word_of(row.neighbours)},
+            {"precision", row.device.precision},
+            {"triangles", row.triangles},
+            {"seed_count", row.seed_count},
+            {"passed", row.passed},
+            {"same_pairs", p.same_pairs},
+            {"same_labels", p.same_labels},
+            {"same_dual", p.same_dual},
+            {"bitwise", p.bitwise},
+            {"repeats", row.repeats},
+            {"mass_error", p.mass_error},
+            {"centroid_error", p.centroid_error},
+            {"energy_error", p.energy_error},
+            {"sum_error", p.sum_error},
+            {"uncertain_share", uncertain_share(row.certification)},
+            {"certification", certification_json(row.certification)},
+            {"seconds", row.seconds},
+            {"cpu_seconds", row.cpu_seconds}};
   if (row.tets) json["tets"] = row.tets;
   return json;
 }
@@ -147,12 +150,12 @@ void run(const CheckCommand& command) {
 
 Command add_check(CLI::App& program) {
   const auto command = std::make_shared<CheckCommand>();
-  CLI::App* app = add_command(
-      program, "check", "Compare a device's diagrams with the CPU's.", "bisector check [--device DEVICE] [options]",
-      "Examples:\n"
-      "  bisector check\n"
-      "  bisector check --device vulkan:1 --precision single --report check.json\n\n"
-      "Prints one line for each case, and exits with 1 if any does not agree.");
+  CLI::App* app = add_command(program, "check", "Compare a device's diagrams with the CPU's.",
+                              "bisector check [--device DEVICE] [options]",
+                              "Examples:\n"
+                              "  bisector check\n"
+                              "  bisector check --device vulkan:1 --precision single --report check.json\n\n"
+                              "Prints one line for each case, and exits with 1 if any does not agree.");
   add_options(app, *command);
   return {app, {}, [=] { run(*command); }};
 }

@@ -12,8 +12,8 @@ struct Command {
   CLI::App* app;
   // What options ask of each other; may be empty. Throws CLI::ValidationError.
   std::function<void()> check_usage;
-  // Reads the input, calls the library, and writes and prints the result. Throws Error and Cancelled; then no output was
-  // written, except for a check whose report tells what does not agree.
+  // Reads the input, calls the library, and writes and prints the result. Throws Error and Cancelled; then no output
+  // was written, except for a check whose report tells what does not agree.
   std::function<void()> run;
 };
 

@@ -14,8 +14,8 @@ namespace bisector::cli {
 
 // Exit codes, part of the program's contract.
 inline constexpr int kSuccess = 0;
-inline constexpr int kFailure = 1;      // bad input or a failed run
-inline constexpr int kUsage = 2;        // bad usage
+inline constexpr int kFailure = 1;        // bad input or a failed run
+inline constexpr int kUsage = 2;          // bad usage
 inline constexpr int kInterrupted = 130;  // Ctrl-C or SIGTERM: nothing was written
 
 // From here on Ctrl-C and SIGTERM set the flag that is returned; a second one ends the program at once.
@@ -57,7 +57,7 @@ class Console {
   void clear_line();
 
   bool quiet_;
-  bool live_;             // stderr is a terminal and may show progress
+  bool live_;  // stderr is a terminal and may show progress
   std::FILE* out_;
   std::vector<std::string> warnings_;
   std::size_t shown_ = 0;  // characters of the progress line

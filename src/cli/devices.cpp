@@ -7,10 +7,10 @@
 #include <string>
 
 #include "bisector/device.h"
-#include "core/parallel.h"
-#include "core/processor.h"
 #include "commands.h"
 #include "console.h"
+#include "core/parallel.h"
+#include "core/processor.h"
 #include "options.h"
 #include "outputs.h"
 #include "report.h"
@@ -43,27 +43,21 @@ Json cpu_entry() {
 }
 
 Json device_entry(const DeviceDescription& device) {
-  Json entry{{"name", device.name},
-             {"kind", device.kind},
-             {"precision", device.float64 ? "double" : "single"},
-             {"index", device.index},
-             {"uuid", device.uuid},
-             {"driver", device.driver},
-             {"api", device.api},
-             {"memory", device.memory},
-             {"float64", device.float64},
-             {"features", device.features}};
+  Json entry{
+      {"name", device.name},        {"kind", device.kind},     {"precision", device.float64 ? "double" : "single"},
+      {"index", device.index},      {"uuid", device.uuid},     {"driver", device.driver},
+      {"api", device.api},          {"memory", device.memory}, {"float64", device.float64},
+      {"features", device.features}};
   if (!device.rejected.empty()) entry["rejected"] = device.rejected;
   return entry;
 }
 
 std::string describe(const DeviceDescription& device) {
-  std::string line = fmt::format("vulkan:{}  {}: {}, driver {}, Vulkan {}, {} of memory, {}, uuid {}", device.index,
-                                 device.name, device.kind, device.driver, device.api,
-                                 gibibytes(static_cast<double>(device.memory)),
-                                 device.features.empty() ? "no optional features"
-                                                         : fmt::format("features {}", fmt::join(device.features, " ")),
-                                 device.uuid);
+  std::string line = fmt::format(
+      "vulkan:{}  {}: {}, driver {}, Vulkan {}, {} of memory, {}, uuid {}", device.index, device.name, device.kind,
+      device.driver, device.api, gibibytes(static_cast<double>(device.memory)),
+      device.features.empty() ? "no optional features" : fmt::format("features {}", fmt::join(device.features, " ")),
+      device.uuid);
   if (!device.rejected.empty()) line += "; cannot be used: " + device.rejected;
   return line;
 }

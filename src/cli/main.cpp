@@ -64,7 +64,8 @@ int run_guarded(const std::function<void()>& command) {
 
 int main(int argc, char** argv) {
   CLI::App program{
-      "Bisector makes high-quality triangle meshes of surfaces and tetrahedral meshes of solids by optimising certified\n"
+      "Bisector makes high-quality triangle meshes of surfaces and tetrahedral meshes of solids by optimising "
+      "certified\n"
       "Voronoi diagrams, and reconstructs trees from laser scans."};
   program.name("bisector");
   program.formatter(std::make_shared<Help>("bisector COMMAND ..."));
@@ -81,8 +82,9 @@ int main(int argc, char** argv) {
   program.get_help_ptr()->description("print this and exit");
   program.require_subcommand(0, 1);
 
-  const std::vector<Command> commands{add_remesh(program), add_rvd(program),     add_tet(program),     add_segment(program),
-                                      add_tree(program),   add_quality(program), add_devices(program), add_check(program)};
+  const std::vector<Command> commands{add_remesh(program),  add_rvd(program),  add_tet(program),
+                                      add_segment(program), add_tree(program), add_quality(program),
+                                      add_devices(program), add_check(program)};
   const auto chosen = [&]() -> const Command* {
     const auto found = std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.app->parsed(); });
     return found == commands.end() ? nullptr : &*found;

@@ -147,7 +147,9 @@ void add_compute_options(CLI::App* app, ComputeOptions& options) {
 
 void add_common_options(CLI::App* app, CommonOptions& options, const char* about) {
   app->add_option("--threads", options.threads, "at most so many; default: all cores. The result is the same")
-      ->type_name("N")->check(whole_number(1, 1024))->group("Computation");
+      ->type_name("N")
+      ->check(whole_number(1, 1024))
+      ->group("Computation");
   add_file(app, "--report", options.report, "FILE", about)->group("Output");
   app->add_flag("--quiet", options.quiet, "print errors only")->group("Output");
   app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
@@ -161,22 +163,31 @@ void add_edge_length(CLI::App* app, double& length, double& relative) {
   app->add_option("--edge-length", length,
                   "mean edge length of the result, in the mesh's unit,\n"
                   "instead of -n")
-      ->type_name("L")->check(number_above_zero())->group("Size");
-  app->add_option("--edge-length-relative", relative,
-                  "the same as a share of the bounding box's diagonal")
-      ->type_name("R")->check(number_above_zero())->group("Size");
+      ->type_name("L")
+      ->check(number_above_zero())
+      ->group("Size");
+  app->add_option("--edge-length-relative", relative, "the same as a share of the bounding box's diagonal")
+      ->type_name("R")
+      ->check(number_above_zero())
+      ->group("Size");
 }
 
 void add_edge_bounds(CLI::App* app, SizingOptions& sizing) {
   app->add_option("--edge-min", sizing.min_edge, "edges aimed at are no shorter, in the mesh's unit")
-      ->type_name("L")->check(number_above_zero())->group("Size");
+      ->type_name("L")
+      ->check(number_above_zero())
+      ->group("Size");
   app->add_option("--edge-max", sizing.max_edge, "and no longer")
-      ->type_name("L")->check(number_above_zero())->group("Size");
+      ->type_name("L")
+      ->check(number_above_zero())
+      ->group("Size");
 }
 
 void add_iterations(CLI::App* app, int& iterations, const char* help) {
   app->add_option("--iterations", iterations, help)
-      ->type_name("N")->check(whole_number(0, 1'000'000))->group("Optimisation");
+      ->type_name("N")
+      ->check(whole_number(0, 1'000'000))
+      ->group("Optimisation");
 }
 
 void add_tolerance(CLI::App* app, double& tolerance, const char* help) {
@@ -191,7 +202,9 @@ void add_density(CLI::App* app, SizingOptions& sizing, std::string& attribute, c
     attribute = density.attribute;
   };
   app->add_option_function<std::string>("--density", set, help)
-      ->type_name("WORD")->check(parsed_by(parse_density))->group("Size");
+      ->type_name("WORD")
+      ->check(parsed_by(parse_density))
+      ->group("Size");
 }
 
 void add_features(CLI::App* app, FeatureOptions& features, const char* help) {
@@ -209,7 +222,9 @@ void add_weld(CLI::App* app, double& tolerance) {
   app->add_option("--weld", tolerance,
                   "join borders that are no farther apart, in the mesh's\n"
                   "unit; default: only what lies at the same point")
-      ->type_name("T")->check(number_below(1e100))->group("Features");
+      ->type_name("T")
+      ->check(number_below(1e100))
+      ->group("Features");
 }
 
 void Usage::refuse(const char* option, const char* why) const {

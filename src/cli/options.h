@@ -9,8 +9,8 @@
 
 #include "bisector/device.h"
 #include "bisector/features.h"
-#include "remesh/sizing.h"
 #include "parsed_option.h"
+#include "remesh/sizing.h"
 
 namespace bisector::cli {
 
@@ -56,7 +56,7 @@ void add_edge_length(CLI::App* app, double& length, double& relative);
 void add_edge_bounds(CLI::App* app, SizingOptions& sizing);
 void add_iterations(CLI::App* app, int& iterations, const char* help);
 void add_tolerance(CLI::App* app, double& tolerance, const char* help);
-// "uniform", "lfs[:EXP]", "curvature[:EXP]" or "attribute:NAME": the kind and the exponent go to `sizing`, NAME to `attribute`.
+// "uniform", "lfs[:EXP]", "curvature[:EXP]" or "attribute:NAME": kind and exponent go to `sizing`, NAME to `attribute`.
 void add_density(CLI::App* app, SizingOptions& sizing, std::string& attribute, const char* help);
 // "auto", "none" or an angle in degrees.
 void add_features(CLI::App* app, FeatureOptions& features, const char* help);

@@ -41,8 +41,7 @@ void check_extension(const Output& output) {
 void check_writable(const std::string& path) {
   const fs::path target = target_of(path);
   std::error_code error;
-  if (path.back() == '/' || fs::is_directory(target, error))
-    throw Error(path + ": is a directory; name a file");
+  if (path.back() == '/' || fs::is_directory(target, error)) throw Error(path + ": is a directory; name a file");
   if (is_special(target)) {
     if (access(target.c_str(), W_OK) != 0)
       throw Error(fmt::format("{}: cannot be written: {}; name another file", path, std::strerror(errno)));

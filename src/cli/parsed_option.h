@@ -29,7 +29,9 @@ CLI::Validator parsed_by(const Parse& parse) {
 // An option whose word a parser turns into a value.
 template <class Value, class Parse>
 CLI::Option* add_parsed(CLI::App* app, const char* name, Value& value, const Parse& parse, const char* help) {
-  return app->add_option_function<std::string>(name, [&value, parse](const std::string& word) { value = parse(word); }, help)
+  return app
+      ->add_option_function<std::string>(
+          name, [&value, parse](const std::string& word) { value = parse(word); }, help)
       ->type_name("WORD")
       ->check(parsed_by(parse));
 }
@@ -37,7 +39,8 @@ CLI::Option* add_parsed(CLI::App* app, const char* name, Value& value, const Par
 // An option whose words a table lists.
 template <class E, std::size_t N>
 CLI::Option* add_words(CLI::App* app, const char* name, E& value, const WordTable<E, N>& words, const char* help) {
-  return add_parsed(app, name, value, [words](const std::string& word) { return words.parse(word); }, help);
+  return add_parsed(
+      app, name, value, [words](const std::string& word) { return words.parse(word); }, help);
 }
 
 }  // namespace bisector::cli

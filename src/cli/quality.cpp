@@ -8,12 +8,12 @@
 
 #include "bisector/io.h"
 #include "bisector/quality.h"
+#include "commands.h"
+#include "console.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "commands.h"
-#include "console.h"
 #include "options.h"
 #include "outputs.h"
 #include "report.h"
@@ -30,7 +30,8 @@ struct QualityCommand {
 void add_options(CLI::App* app, QualityCommand& command) {
   add_file(app, "MESH", command.mesh, "FILE",
            "surface to measure: .off, .obj, .ply or .stl; or\n"
-           "tetrahedra: .mesh, .msh, .vtk or .vtu")->required();
+           "tetrahedra: .mesh, .msh, .vtk or .vtu")
+      ->required();
   add_file(app, "--reference", command.reference, "IN", "also measure the two-sided distance to this mesh")
       ->group("Output");
   add_common_options(app, command.common, "write a JSON report; - for stdout");
@@ -69,7 +70,8 @@ void print_tets(Console& console, const TetQualityReport& q, const TetTopology& 
   row("dihedral_min", number(q.dihedral_min), "smallest dihedral angle, degrees");
   row("dihedral_min_mean", number(q.dihedral_min_mean), "average of each tetrahedron's smallest");
   row("dihedral_max", number(q.dihedral_max), "largest dihedral angle, degrees");
-  row("radius_ratio_min", number(q.radius_ratio_min), "worst 3 r / R of inscribed and circumscribed sphere; 1 is regular");
+  row("radius_ratio_min", number(q.radius_ratio_min),
+      "worst 3 r / R of inscribed and circumscribed sphere; 1 is regular");
   row("radius_ratio_mean", number(q.radius_ratio_mean), "average");
   row("volume", number(q.volume), "");
   row("volume_min", number(q.volume_min), "of a tetrahedron");
@@ -200,11 +202,10 @@ void run(const QualityCommand& command) {
 
 Command add_quality(CLI::App& program) {
   const auto command = std::make_shared<QualityCommand>();
-  CLI::App* app = add_command(
-      program, "quality", "Measure angles, topology and distance to another mesh.",
-      "bisector quality MESH [--reference IN] [options]",
-      "Example:\n"
-      "  bisector quality out.obj --reference bunny.off");
+  CLI::App* app = add_command(program, "quality", "Measure angles, topology and distance to another mesh.",
+                              "bisector quality MESH [--reference IN] [options]",
+                              "Example:\n"
+                              "  bisector quality out.obj --reference bunny.off");
   add_options(app, *command);
   return {app, {}, [=] { run(*command); }};
 }

@@ -7,15 +7,15 @@
 #include "bisector/io.h"
 #include "bisector/preview.h"
 #include "bisector/quality.h"
+#include "commands.h"
+#include "console.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "remesh/remesh.h"
-#include "commands.h"
-#include "console.h"
 #include "inputs.h"
 #include "options.h"
 #include "outputs.h"
+#include "remesh/remesh.h"
 #include "report.h"
 #include "summary.h"
 #include "words.h"
@@ -25,7 +25,7 @@ namespace {
 
 struct RemeshCommand {
   std::string input, output, seeds, preview;
-  std::string attribute;            // of the input's vertices, a density
+  std::string attribute;  // of the input's vertices, a density
   std::string feature_file, feature_output;
   double edge_length_relative = 0;  // of the input's diagonal; 0: not given
   double weld = -1;                 // not given
@@ -38,7 +38,9 @@ void add_options(CLI::App* app, RemeshCommand& command) {
   add_file(app, "-o", command.output, "FILE", "mesh to write")->required()->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the result")->group("Output");
   app->add_option("-n", command.options.vertices, "vertices of the result, at least 4")
-      ->type_name("N")->check(whole_number(4, kMostSeeds))->group("Seeds");
+      ->type_name("N")
+      ->check(whole_number(4, kMostSeeds))
+      ->group("Seeds");
   add_file(app, "--seeds", command.seeds, "FILE.xyz",
            "start from these points (\"x y z\" lines) in one level;\n"
            "-n is then not needed")
@@ -54,7 +56,9 @@ void add_options(CLI::App* app, RemeshCommand& command) {
   app->add_option("--gradation", command.options.sizing.gradation,
                   "edge lengths change by at most so much per length;\n"
                   "0: no bound; default 0.2. Not for uniform density")
-      ->type_name("G")->check(number_below(10))->group("Size");
+      ->type_name("G")
+      ->check(number_below(10))
+      ->group("Size");
   add_edge_bounds(app, command.options.sizing);
   add_features(app, command.options.features,
                "sharp edges to keep: auto (default), none, or all with a\n"
@@ -78,7 +82,9 @@ void add_options(CLI::App* app, RemeshCommand& command) {
   app->add_option("--min-angle", command.options.min_angle,
                   "degrees that the last pass tries to get all angles\n"
                   "above; 0: no such pass; default 40")
-      ->type_name("A")->check(number_below(60))->group("Optimisation");
+      ->type_name("A")
+      ->check(number_below(60))
+      ->group("Optimisation");
   app->add_flag("--fit", command.options.fit,
                 "move the result's vertices off the surface, to where\n"
                 "its triangles are nearest to the input")
@@ -90,7 +96,9 @@ void add_options(CLI::App* app, RemeshCommand& command) {
   app->add_option("--levels", command.options.levels,
                   "coarse-to-fine levels, 1 to 8; default: as many as the\n"
                   "count allows, at most 3")
-      ->type_name("N")->check(whole_number(1, 8))->group("Optimisation");
+      ->type_name("N")
+      ->check(whole_number(1, 8))
+      ->group("Optimisation");
   add_compute_options(app, command.options.compute);
   add_common_options(app, command.common,
                      "write a JSON report with quality, distance to the\n"
@@ -142,17 +150,20 @@ void require_sound(const RemeshResult& result) {
 void warn_of_labels(Console& console, const TriangleMesh& input, const std::string& output) {
   const std::string extension = extension_of(output);
   if (input.labels.empty() || extension == ".ply" || extension == ".obj") return;
-  console.warn(fmt::format("{}: {} files hold no face labels, the input's are lost; write .ply or .obj", output, extension));
+  console.warn(
+      fmt::format("{}: {} files hold no face labels, the input's are lost; write .ply or .obj", output, extension));
 }
 
 void warn_of_features(Console& console, const RemeshResult& result) {
   if (result.features.broken > 0)
     console.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices",
-                             result.features.broken, counted(result.features.curves, "feature curve", "feature curves")));
+                             result.features.broken,
+                             counted(result.features.curves, "feature curve", "feature curves")));
   if (2 * result.features.seeds > result.mesh.vertices.size())
-    console.warn(fmt::format("features take {} of {}; for better triangles ask for more vertices, or for fewer features "
-                             "(--features)", result.features.seeds,
-                             counted(result.mesh.vertices.size(), "vertex", "vertices")));
+    console.warn(
+        fmt::format("features take {} of {}; for better triangles ask for more vertices, or for fewer features "
+                    "(--features)",
+                    result.features.seeds, counted(result.mesh.vertices.size(), "vertex", "vertices")));
 }
 
 void warn_of_topology(Console& console, const RemeshResult& result) {
@@ -177,9 +188,11 @@ Json faults_json(const RemeshResult& result) {
 }
 
 Json weld_json(const WeldResult& welded) {
-  return {{"merged_vertices", welded.merged_vertices}, {"split_edges", welded.split_edges},
+  return {{"merged_vertices", welded.merged_vertices},
+          {"split_edges", welded.split_edges},
           {"removed_triangles", welded.degenerate_triangles + welded.duplicate_triangles},
-          {"border_edges_before", welded.border_before}, {"border_edges_after", welded.border_after}};
+          {"border_edges_before", welded.border_before},
+          {"border_edges_after", welded.border_after}};
 }
 
 Json remesh_report(Console& console, const RemeshResult& result, const QualityReport& quality,
@@ -210,10 +223,13 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["noisy"] = result.noisy;
   report["weld"] = weld_json(result.welded);
   if (options.min_angle > 0 && options.energy != Energy::restricted && !result.noisy)
-    report["improved"] = {{"made", result.improved.made}, {"inserted", result.improved.inserted},
-                          {"removed", result.improved.removed}, {"missed", result.improved.missed}};
+    report["improved"] = {{"made", result.improved.made},
+                          {"inserted", result.improved.inserted},
+                          {"removed", result.improved.removed},
+                          {"missed", result.improved.missed}};
   if (options.fit)
-    report["fit"] = {{"iterations", result.fitted.iterations}, {"damped", result.fitted.damped},
+    report["fit"] = {{"iterations", result.fitted.iterations},
+                     {"damped", result.fitted.damped},
                      {"restored", result.fitted.restored}};
   return report;
 }
@@ -246,7 +262,8 @@ void print_summary(Console& console, const RemeshCommand& command, const RemeshR
     console.print(fmt::format("features   {} of {} kept, {}", result.features.curves - result.features.broken,
                               counted(result.features.curves, "curve", "curves"),
                               counted(result.features.corners, "corner", "corners")));
-  if (result.noisy) console.print("noise      seeds were left off the surface, whose normals are noise at this edge length");
+  if (result.noisy)
+    console.print("noise      seeds were left off the surface, whose normals are noise at this edge length");
   console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));
   print_device(console, result.device);
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));

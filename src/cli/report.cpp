@@ -12,9 +12,7 @@
 namespace bisector::cli {
 namespace {
 
-std::string dumped(const Json& value) {
-  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
+std::string dumped(const Json& value) { return value.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 // Objects are spread over lines, and so are arrays of objects or arrays, one element a line: a report reads well, and
 // the rows of a large one stay rows.
@@ -54,8 +52,12 @@ Json device_json(const BackendDescription& device) {
 
 Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds) {
   if (device.kind == "cpu" && device.fallback.empty()) return nullptr;
-  return {{"transfer", seconds.transfer}, {"grid", seconds.grid}, {"neighbours", seconds.neighbours},
-          {"owners", seconds.owners},     {"clip", seconds.clip}, {"sort", seconds.sort},
+  return {{"transfer", seconds.transfer},
+          {"grid", seconds.grid},
+          {"neighbours", seconds.neighbours},
+          {"owners", seconds.owners},
+          {"clip", seconds.clip},
+          {"sort", seconds.sort},
           {"sum", seconds.sum}};
 }
 
@@ -157,8 +159,13 @@ void add_distance(Json& quality, const DistanceReport& distance) {
 
 Json features_json(const FeatureResult& features, std::size_t edges) {
   const FeatureDistance& d = features.distance;
-  return {{"curves", features.curves}, {"corners", features.corners}, {"broken", features.broken}, {"edges", edges},
-          {"vertices", features.seeds}, {"distance_vertices", d.vertices}, {"distance_max", std::max(d.to_reference, d.from_reference)}};
+  return {{"curves", features.curves},
+          {"corners", features.corners},
+          {"broken", features.broken},
+          {"edges", edges},
+          {"vertices", features.seeds},
+          {"distance_vertices", d.vertices},
+          {"distance_max", std::max(d.to_reference, d.from_reference)}};
 }
 
 Json point_json(const Vec3& p) {

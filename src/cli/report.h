@@ -22,7 +22,7 @@ Json device_json(const BackendDescription& device);
 Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds);
 Json seconds_json(const DiagramSeconds& seconds);
 void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds);
-Json input_json(const TriangleMesh& mesh);   // faces as in the file
+Json input_json(const TriangleMesh& mesh);  // faces as in the file
 Json output_json(const TriangleMesh& mesh);
 Json size_json(const TetMesh& mesh);  // faces: marked triangles
 Json certification_json(const Certification& certification);

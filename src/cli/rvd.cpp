@@ -10,21 +10,21 @@
 
 #include "bisector/io.h"
 #include "bisector/preview.h"
-#include "compute/compute.h"
-#include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "io/files.h"
-#include "mesh/sampling.h"
-#include "voronoi/diagram.h"
-#include "voronoi/tiling.h"
 #include "cells.h"
 #include "commands.h"
+#include "compute/compute.h"
 #include "console.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "inputs.h"
+#include "io/files.h"
+#include "mesh/sampling.h"
 #include "options.h"
 #include "outputs.h"
 #include "report.h"
 #include "summary.h"
+#include "voronoi/diagram.h"
+#include "voronoi/tiling.h"
 
 namespace bisector::cli {
 namespace {
@@ -47,7 +47,9 @@ void add_options(CLI::App* app, RvdCommand& command) {
   add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the cells")->group("Output");
   add_file(app, "--seeds", command.seeds, "FILE.xyz", "the seeds, as \"x y z\" lines")->group("Seeds");
   app->add_option("-n", command.count, "so many random seeds instead")
-      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Seeds");
+      ->type_name("N")
+      ->check(whole_number(1, kMostSeeds))
+      ->group("Seeds");
   add_random_seed(app, command.random_seed, "another number, another start; default 1")->group("Seeds");
   add_compute_options(app, command.compute);
   add_common_options(app, command.common,
@@ -129,7 +131,8 @@ void write_cells(const RvdCommand& command, const RestrictedPolygons& polygons, 
   write_preview(command.preview, cells.vertices, cells.polygons, picture);
 }
 
-Json rvd_report(const Computed& computed, const TriangleMesh& input, const std::vector<Vec3>& seeds, const Json& seconds) {
+Json rvd_report(const Computed& computed, const TriangleMesh& input, const std::vector<Vec3>& seeds,
+                const Json& seconds) {
   Json report = start_report("rvd");
   report["device"] = device_json(computed.device);
   report["input"] = input_json(input);
@@ -147,11 +150,11 @@ Json rvd_report(const Computed& computed, const TriangleMesh& input, const std::
 void print_summary(Console& console, const RvdCommand& command, const Computed& computed, const TriangleMesh& input,
                    const Json& seconds) {
   const CellMoments& moments = computed.diagram.moments;
-  const auto empty = std::count_if(moments.cells.begin(), moments.cells.end(),
-                                   [](const Moments& m) { return m.mass == 0; });
+  const auto empty =
+      std::count_if(moments.cells.begin(), moments.cells.end(), [](const Moments& m) { return m.mass == 0; });
   console.print(fmt::format("input      {}: {}", command.input, size_of(input_json(input))));
-  console.print(fmt::format("cells      {}, {} of them empty; energy {:.6e}", moments.cells.size(), empty,
-                            moments.energy));
+  console.print(
+      fmt::format("cells      {}, {} of them empty; energy {:.6e}", moments.cells.size(), empty, moments.energy));
   console.print(fmt::format("pairs      {} of a cell and a triangle, {} decided in exact arithmetic",
                             computed.evaluation.certification.pairs, computed.evaluation.certification.cpu));
   console.print(fmt::format("dual       {}", counted(computed.diagram.dual.triangles.size(), "triangle", "triangles")));
@@ -165,8 +168,9 @@ void print_summary(Console& console, const RvdCommand& command, const Computed& 
 void run(const RvdCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{command.output, {".ply"}}, {command.preview, {".png"}}, {command.pairs, {}}, report_output(report_path)},
-                {command.input, command.seeds});
+  check_outputs(
+      {{command.output, {".ply"}}, {command.preview, {".png"}}, {command.pairs, {}}, report_output(report_path)},
+      {command.input, command.seeds});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
 
@@ -206,12 +210,11 @@ void run(const RvdCommand& command) {
 
 Command add_rvd(CLI::App& program) {
   const auto command = std::make_shared<RvdCommand>();
-  CLI::App* app = add_command(
-      program, "rvd", "Compute one restricted Voronoi diagram of a surface.",
-      "bisector rvd IN --seeds FILE.xyz|-n N [-o CELLS.ply] [options]",
-      "Examples:\n"
-      "  bisector rvd bunny.off -n 500 -o cells.ply --preview cells.png\n"
-      "  bisector rvd bunny.off --seeds points.xyz --report -");
+  CLI::App* app = add_command(program, "rvd", "Compute one restricted Voronoi diagram of a surface.",
+                              "bisector rvd IN --seeds FILE.xyz|-n N [-o CELLS.ply] [options]",
+                              "Examples:\n"
+                              "  bisector rvd bunny.off -n 500 -o cells.ply --preview cells.png\n"
+                              "  bisector rvd bunny.off --seeds points.xyz --report -");
   add_options(app, *command);
   return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }

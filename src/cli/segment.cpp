@@ -16,17 +16,17 @@
 #include "bisector/io.h"
 #include "bisector/preview.h"
 #include "bisector/quality.h"
-#include "core/geometry.h"
 #include "bisector/segment.h"
-#include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "segment/dual_graph.h"
 #include "cells.h"
 #include "commands.h"
 #include "console.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "options.h"
 #include "outputs.h"
 #include "report.h"
+#include "segment/dual_graph.h"
 #include "summary.h"
 #include "words.h"
 
@@ -45,16 +45,21 @@ void add_options(CLI::App* app, SegmentCommand& command) {
   SegmentOptions& options = command.options;
   add_file(app, "IN", command.input, "FILE", "surface: .off, .obj, .ply or .stl")->required();
   add_file(app, "-o", command.output, "FILE", "mesh to write, with the region of each triangle")
-      ->required()->group("Output");
+      ->required()
+      ->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the regions")->group("Output");
   app->add_flag("--project", options.project, "move the vertices onto the surfaces found")->group("Output");
   app->add_option("--proxies", options.proxies, "so many regions")
-      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Regions");
+      ->type_name("N")
+      ->check(whole_number(1, kMostSeeds))
+      ->group("Regions");
   app->add_option("--error", options.error,
                   "as few regions as keep the root mean square distance to\n"
                   "their surfaces below E percent of the bounding box's\n"
                   "diagonal; default 0.1")
-      ->type_name("E")->check(number_above_zero())->group("Regions");
+      ->type_name("E")
+      ->check(number_above_zero())
+      ->group("Regions");
   add_words(app, "--surfaces", options.surfaces, kSurfaceWords,
             "what a region may be: planes, quadrics (planes too), or\n"
             "all (tori too; default)")
@@ -66,16 +71,22 @@ void add_options(CLI::App* app, SegmentCommand& command) {
       ->group("Regions");
   add_random_seed(app, options.random_seed, "another number, another random start; default 1")->group("Regions");
   app->add_option("--iterations", options.iterations, "Lloyd steps at most, each time; default 30")
-      ->type_name("N")->check(whole_number(0, 100'000))->group("Regions");
+      ->type_name("N")
+      ->check(whole_number(0, 100'000))
+      ->group("Regions");
   app->add_option("--smooth", options.smooth,
                   "weight of the borders' length against distances; 0:\n"
                   "borders are left as they are; default 1, up to 10 for\n"
                   "free forms")
-      ->type_name("LAMBDA")->check(number_below(1e6))->group("Borders");
+      ->type_name("LAMBDA")
+      ->check(number_below(1e6))
+      ->group("Borders");
   app->add_option("--fuzzy-rings", options.fuzzy_rings,
                   "triangles up to so many steps from a border may change\n"
                   "sides; default 1, 2 or 3 for free forms")
-      ->type_name("K")->check(whole_number(1, 1000))->group("Borders");
+      ->type_name("K")
+      ->check(whole_number(1, 1000))
+      ->group("Borders");
   add_common_options(app, command.common,
                      "write a JSON report with type, parameters and error of\n"
                      "each region; - for stdout");
@@ -93,8 +104,8 @@ void check_usage(const SegmentCommand& command, const Usage& usage) {
 void warn_of_format(Console& console, const std::string& output) {
   const std::string extension = extension_of(output);
   if (extension == ".ply" || extension == ".obj") return;
-  console.warn(fmt::format("{}: {} files hold no face labels, the regions are lost; write .ply or .obj", output,
-                           extension));
+  console.warn(
+      fmt::format("{}: {} files hold no face labels, the regions are lost; write .ply or .obj", output, extension));
 }
 
 // The input's triangles, labelled by region and moved where that was asked for.
@@ -240,7 +251,7 @@ Json segment_report(Console& console, const SegmentResult& result, const Triangl
 }
 
 Json segment_seconds(const SegmentSeconds& seconds) {
-  return {{"total", seconds.total},   {"start", seconds.start},       {"lloyd", seconds.lloyd},
+  return {{"total", seconds.total},     {"start", seconds.start},       {"lloyd", seconds.lloyd},
           {"improve", seconds.improve}, {"classify", seconds.classify}, {"smooth", seconds.smooth},
           {"project", seconds.project}, {"segment", seconds.total}};
 }
@@ -255,8 +266,8 @@ void print_summary(Console& console, const SegmentCommand& command, const Segmen
                             100 * result.rms / diagonal, 100 * worst->max / diagonal, worst - result.regions.begin(),
                             name_of(type_of(worst->proxy))));
   if (command.options.smooth > 0)
-    console.print(fmt::format("borders    {:.6g} long, {:.6g} before smoothing", result.border_after,
-                              result.border_before));
+    console.print(
+        fmt::format("borders    {:.6g} long, {:.6g} before smoothing", result.border_after, result.border_before));
   console.print(fmt::format("steps      {}, {}, {}, {}", counted(result.iterations, "iteration", "iterations"),
                             counted(result.insertions, "insertion", "insertions"),
                             counted(result.merges, "merge", "merges"),
@@ -320,15 +331,15 @@ void run(const SegmentCommand& command) {
 
 Command add_segment(CLI::App& program) {
   const auto command = std::make_shared<SegmentCommand>();
-  CLI::App* app = add_command(
-      program, "segment", "Divide a surface into planes, quadrics and tori.",
-      "bisector segment IN -o OUT [--proxies N|--error E] [options]",
-      "Examples:\n"
-      "  bisector segment part.stl -o regions.ply --proxies 22 --preview regions.png\n"
-      "  bisector segment part.stl -o regions.obj --error 0.05 --report regions.json\n"
-      "  bisector segment bunny.off -o regions.ply --proxies 28 --smooth 5 --fuzzy-rings 2\n\n"
-      ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C stops the run; nothing is\n"
-      "written.");
+  CLI::App* app = add_command(program, "segment", "Divide a surface into planes, quadrics and tori.",
+                              "bisector segment IN -o OUT [--proxies N|--error E] [options]",
+                              "Examples:\n"
+                              "  bisector segment part.stl -o regions.ply --proxies 22 --preview regions.png\n"
+                              "  bisector segment part.stl -o regions.obj --error 0.05 --report regions.json\n"
+                              "  bisector segment bunny.off -o regions.ply --proxies 28 --smooth 5 --fuzzy-rings 2\n\n"
+                              ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C "
+                              "stops the run; nothing is\n"
+                              "written.");
   add_options(app, *command);
   return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }

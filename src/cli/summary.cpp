@@ -33,10 +33,8 @@ void print_seconds(Console& console, const Json& seconds, const Json& device_sec
 }
 
 void print_device(Console& console, const BackendDescription& device) {
-  if (device.kind != "cpu")
-    console.print(fmt::format("device     {}, {} precision", device.name, device.precision));
-  else if (!device.fallback.empty())
-    console.print(fmt::format("device     {}; {}", device.name, device.fallback));
+  if (device.kind != "cpu") console.print(fmt::format("device     {}, {} precision", device.name, device.precision));
+  else if (!device.fallback.empty()) console.print(fmt::format("device     {}; {}", device.name, device.fallback));
 }
 
 }  // namespace bisector::cli

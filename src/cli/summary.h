@@ -5,8 +5,8 @@
 
 #include "bisector/device.h"
 #include "bisector/quality.h"
-#include "mesh/topology.h"
 #include "console.h"
+#include "mesh/topology.h"
 #include "report.h"
 
 namespace bisector::cli {

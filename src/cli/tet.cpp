@@ -12,15 +12,15 @@
 #include "bisector/io.h"
 #include "bisector/preview.h"
 #include "bisector/quality.h"
-#include "core/geometry.h"
-#include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "mesh/tet_quality.h"
-#include "mesh/tet_topology.h"
 #include "bisector/tetmesh.h"
 #include "commands.h"
 #include "console.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "inputs.h"
+#include "mesh/tet_quality.h"
+#include "mesh/tet_topology.h"
 #include "options.h"
 #include "outputs.h"
 #include "report.h"
@@ -34,7 +34,7 @@ constexpr double kPoorDihedral = 8;
 
 struct TetCommand {
   std::string input, output, seeds, boundary, preview;
-  std::string attribute;            // of the input's vertices, a density
+  std::string attribute;  // of the input's vertices, a density
   std::string sizes, feature_file;
   double edge_length_relative = 0;  // of the input's diagonal; 0: not given
   double weld = -1;                 // not given
@@ -45,11 +45,14 @@ struct TetCommand {
 void add_options(CLI::App* app, TetCommand& command) {
   add_file(app, "IN", command.input, "FILE", "closed surface or tetrahedral mesh")->required();
   add_file(app, "-o", command.output, "FILE", "mesh to write: .mesh, .msh or .vtu")->required()->group("Output");
-  add_file(app, "--boundary", command.boundary, "FILE", "also write the boundary's triangles: .off, .obj, .ply\nor .stl")
+  add_file(app, "--boundary", command.boundary, "FILE",
+           "also write the boundary's triangles: .off, .obj, .ply\nor .stl")
       ->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the result, cut open")->group("Output");
   app->add_option("-n", command.options.vertices, "vertices of the result, about; at least 8")
-      ->type_name("N")->check(whole_number(8, kMostSeeds))->group("Seeds");
+      ->type_name("N")
+      ->check(whole_number(8, kMostSeeds))
+      ->group("Seeds");
   add_file(app, "--seeds", command.seeds, "FILE.xyz",
            "start from these points (\"x y z\" lines) inside the\n"
            "solid; -n is then not needed")
@@ -70,7 +73,9 @@ void add_options(CLI::App* app, TetCommand& command) {
   app->add_option("--gradation", command.options.sizing.field.gradation,
                   "edge lengths grow by at most so much per length into\n"
                   "the solid; default 0.2. Not for uniform density")
-      ->type_name("G")->check(number_below(10))->group("Size");
+      ->type_name("G")
+      ->check(number_below(10))
+      ->group("Size");
   add_edge_bounds(app, command.options.sizing.field);
   add_features(app, command.options.features,
                "sharp edges to keep: auto (default), none, or all with a\n"
@@ -81,11 +86,15 @@ void add_options(CLI::App* app, TetCommand& command) {
   app->add_option("--min-angle", command.options.min_angle,
                   "degrees that all angles of the boundary's triangles\n"
                   "should exceed; 0: as they are; default 40")
-      ->type_name("A")->check(number_below(60))->group("Optimisation");
+      ->type_name("A")
+      ->check(number_below(60))
+      ->group("Optimisation");
   app->add_option("--min-dihedral", command.options.min_dihedral,
                   "degrees that all dihedral angles should exceed; 0: keep\n"
                   "slivers; default 30")
-      ->type_name("A")->check(number_below(55))->group("Optimisation");
+      ->type_name("A")
+      ->check(number_below(55))
+      ->group("Optimisation");
   add_iterations(app, command.options.iterations, "steps, of which each phase may make a share; default 100");
   add_tolerance(app, command.options.tolerance,
                 "end a phase when the energy falls by less than this\n"
@@ -128,7 +137,8 @@ Input read_input(const std::string& path, const Context& context) {
 
 Json input_json(const Input& input) {
   if (!input.solid) return cli::input_json(input.surface);
-  return {{"vertices", input.tets.vertices.size()}, {"faces", boundary_facets(input.tets.tets).size()},
+  return {{"vertices", input.tets.vertices.size()},
+          {"faces", boundary_facets(input.tets.tets).size()},
           {"tets", input.tets.tets.size()}};
 }
 
@@ -149,8 +159,9 @@ SizeSamples read_sizes(const std::string& word) {
 TetOptions tet_options(const TetCommand& command, const Input& input) {
   TetOptions options = command.options;
   if (!command.attribute.empty())
-    options.sizing.field.attribute = is_tet_format(command.input) ? read_tet_attribute(command.input, command.attribute)
-                                                                  : read_vertex_attribute(command.input, command.attribute);
+    options.sizing.field.attribute = is_tet_format(command.input)
+                                         ? read_tet_attribute(command.input, command.attribute)
+                                         : read_vertex_attribute(command.input, command.attribute);
   if (!command.sizes.empty()) options.sizing.sizes = read_sizes(command.sizes);
   if (!command.feature_file.empty()) {
     TriangleMesh surface = input.surface;
@@ -187,12 +198,20 @@ struct Measures {
 
 Json improved_json(const TetImproveReport& improved) {
   const auto shapes = [](const TetShapes& s) -> Json {
-    return {{"dihedral_min", s.dihedral_min}, {"dihedral_max", s.dihedral_max}, {"radius_ratio_min", s.radius_ratio_min},
-            {"radius_ratio_mean", s.radius_ratio_mean}, {"below_goal", s.below}};
+    return {{"dihedral_min", s.dihedral_min},
+            {"dihedral_max", s.dihedral_max},
+            {"radius_ratio_min", s.radius_ratio_min},
+            {"radius_ratio_mean", s.radius_ratio_mean},
+            {"below_goal", s.below}};
   };
-  return {{"rounds", improved.rounds}, {"edge_removals", improved.edge_removals}, {"face_removals", improved.face_removals},
-          {"contractions", improved.contractions}, {"insertions", improved.insertions}, {"moves", improved.moves},
-          {"before", shapes(improved.before)}, {"after", shapes(improved.after)}};
+  return {{"rounds", improved.rounds},
+          {"edge_removals", improved.edge_removals},
+          {"face_removals", improved.face_removals},
+          {"contractions", improved.contractions},
+          {"insertions", improved.insertions},
+          {"moves", improved.moves},
+          {"before", shapes(improved.before)},
+          {"after", shapes(improved.after)}};
 }
 
 Json tet_report(Console& console, const TetCommand& command, const TetResult& result, const Measures& measures,
@@ -219,9 +238,10 @@ Json tet_report(Console& console, const TetCommand& command, const TetResult& re
   report["topology"]["matches_input"] = same_topology(measures.topology.boundary, result.input_topology);
   report["topology"]["ball_property"] = result.boundary.ball_property;
   report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
-  report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length},
-                      {"boundary_vertices", result.boundary_vertices}};
-  report["conform"] = {{"delaunay", result.delaunay}, {"steiner_points", result.steiner_points},
+  report["sizing"] = {
+      {"wanted", result.wanted}, {"edge_length", result.edge_length}, {"boundary_vertices", result.boundary_vertices}};
+  report["conform"] = {{"delaunay", result.delaunay},
+                       {"steiner_points", result.steiner_points},
                        {"refused_sites", result.refused_sites}};
   if (command.options.min_dihedral > 0) report["improved"] = improved_json(result.improved);
   return report;
@@ -244,21 +264,24 @@ void print_summary(Console& console, const TetCommand& command, const TetResult&
                    const Json& input, const Json& seconds) {
   const TetQualityReport& q = measures.tets;
   console.print(fmt::format("input      {}: {}", command.input, size_of(input)));
-  console.print(fmt::format("output     {}: {}", command.output,
-                            size_of(size_json(result.mesh))));
-  console.print(fmt::format("quality    dihedral angles {:.2f} to {:.2f} degrees; radius ratio {:.4f} on average, {:.4f} at least",
-                            q.dihedral_min, q.dihedral_max, q.radius_ratio_mean, q.radius_ratio_min));
+  console.print(fmt::format("output     {}: {}", command.output, size_of(size_json(result.mesh))));
+  console.print(fmt::format(
+      "quality    dihedral angles {:.2f} to {:.2f} degrees; radius ratio {:.4f} on average, {:.4f} at least",
+      q.dihedral_min, q.dihedral_max, q.radius_ratio_mean, q.radius_ratio_min));
   console.print(fmt::format("boundary   {} in {}; theta_min {:.2f} degrees, q_min {:.4f}, q_ave {:.4f}",
                             counted(result.boundary_vertices, "vertex", "vertices"),
                             counted(result.mesh.boundary.size(), "triangle", "triangles"), measures.boundary.theta_min,
                             measures.boundary.q_min, measures.boundary.q_ave));
   const bool same = same_topology(measures.topology.boundary, result.input_topology);
-  console.print(fmt::format("topology   {}{}", describe(measures.topology.boundary), same ? "; as the input" : "; NOT as the input"));
-  console.print(fmt::format("volume     {:.6g}, {:+.3g} % of the input's", q.volume, 100 * (q.volume / result.volume - 1)));
+  console.print(fmt::format("topology   {}{}", describe(measures.topology.boundary),
+                            same ? "; as the input" : "; NOT as the input"));
+  console.print(
+      fmt::format("volume     {:.6g}, {:+.3g} % of the input's", q.volume, 100 * (q.volume / result.volume - 1)));
   const FeatureResult& features = result.boundary.features;
   if (features.curves > 0)
     console.print(fmt::format("features   {} of {} kept, {}", features.curves - features.broken,
-                              counted(features.curves, "curve", "curves"), counted(features.corners, "corner", "corners")));
+                              counted(features.curves, "curve", "curves"),
+                              counted(features.corners, "corner", "corners")));
   print_device(console, result.device);
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose)
@@ -275,8 +298,10 @@ void warn_of(Console& console, const TetCommand& command, const TetResult& resul
     console.warn(fmt::format("the boundary's topology ({}) is not the input's ({}); ask for more vertices",
                              describe(measures.topology.boundary), describe(result.input_topology)));
   if (command.options.min_dihedral > kPoorDihedral && measures.tets.dihedral_min < kPoorDihedral)
-    console.warn(fmt::format("a dihedral angle is {:.2f} degrees only: the boundary has acute edges or parts thinner than its "
-                             "edges; ask for more vertices", measures.tets.dihedral_min));
+    console.warn(
+        fmt::format("a dihedral angle is {:.2f} degrees only: the boundary has acute edges or parts thinner than its "
+                    "edges; ask for more vertices",
+                    measures.tets.dihedral_min));
   const std::size_t count = result.mesh.vertices.size();
   if (std::max(count, result.wanted) - std::min(count, result.wanted) > result.wanted / 20)
     console.warn(fmt::format("{} instead of {}: {}", counted(count, "vertex", "vertices"), result.wanted,
@@ -287,7 +312,9 @@ void warn_of(Console& console, const TetCommand& command, const TetResult& resul
 void run(const TetCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{command.output, kTetFormats}, {command.boundary, kMeshFormats}, {command.preview, {".png"}},
+  check_outputs({{command.output, kTetFormats},
+                 {command.boundary, kMeshFormats},
+                 {command.preview, {".png"}},
                  report_output(report_path)},
                 {command.input, command.seeds, command.feature_file, split_sizes(command.sizes).first});
   const ThreadLimit limit(command.common.threads);
@@ -346,15 +373,15 @@ void run(const TetCommand& command) {
 
 Command add_tet(CLI::App& program) {
   const auto command = std::make_shared<TetCommand>();
-  CLI::App* app = add_command(
-      program, "tet", "Make a high-quality tetrahedral mesh of a solid.",
-      "bisector tet IN -o OUT -n N|--edge-length L [options]",
-      "Examples:\n"
-      "  bisector tet bunny.off -o out.msh -n 10000\n"
-      "  bisector tet part.stl -o out.vtu --edge-length 0.5 --report out.json\n"
-      "  bisector tet coarse.mesh -o fine.mesh -n 50000 --sizes sizes.vtu:h\n\n"
-      "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, .vtk, .vtu). Ctrl-C stops the run;\n"
-      "nothing is written.");
+  CLI::App* app = add_command(program, "tet", "Make a high-quality tetrahedral mesh of a solid.",
+                              "bisector tet IN -o OUT -n N|--edge-length L [options]",
+                              "Examples:\n"
+                              "  bisector tet bunny.off -o out.msh -n 10000\n"
+                              "  bisector tet part.stl -o out.vtu --edge-length 0.5 --report out.json\n"
+                              "  bisector tet coarse.mesh -o fine.mesh -n 50000 --sizes sizes.vtu:h\n\n"
+                              "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, "
+                              ".vtk, .vtu). Ctrl-C stops the run;\n"
+                              "nothing is written.");
   add_options(app, *command);
   return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }

@@ -7,17 +7,17 @@
 #include <vector>
 
 #include "bisector/io.h"
-#include "core/geometry.h"
 #include "bisector/tree.h"
-#include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "tree/coverage.h"
 #include "commands.h"
 #include "console.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "options.h"
 #include "outputs.h"
 #include "report.h"
 #include "summary.h"
+#include "tree/coverage.h"
 #include "words.h"
 
 namespace bisector::cli {
@@ -33,26 +33,36 @@ struct TreeCommand {
 void add_options(CLI::App* app, TreeCommand& command) {
   add_file(app, "POINTS", command.input, "FILE", "points of a tree's surface")->required();
   add_file(app, "-o", command.output, "FILE", "surfaces to write: .obj, .ply, .off, .stl, or as B-splines\n.igs")
-      ->required()->group("Output");
-  add_file(app, "--skeleton", command.skeleton, "FILE.ply", "also write the branches' axes with radii")->group("Output");
+      ->required()
+      ->group("Output");
+  add_file(app, "--skeleton", command.skeleton, "FILE.ply", "also write the branches' axes with radii")
+      ->group("Output");
   add_file(app, "--labels", command.labels, "FILE.ply", "also write the points with the branch that each is of")
       ->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw points and surfaces side by side")->group("Output");
   add_words(app, "--unit", command.unit, kUnitWords, "of the points, for .igs: mm, cm, m (default) or in")
       ->group("Output");
-  app->add_option("--ground", command.options.ground, "leave out points with z below this")->type_name("Z")->group("Scan");
+  app->add_option("--ground", command.options.ground, "leave out points with z below this")
+      ->type_name("Z")
+      ->group("Scan");
   add_words(app, "--components", command.options.components, kComponentWords,
             "parts of the scan that are apart: bridge (join them over\n"
             "their gaps; default) or separate (a tree each)")
       ->group("Scan");
   app->add_option("--clusters", command.options.clusters, "at most so many; default: as many as it takes")
-      ->type_name("N")->check(whole_number(1, kMostSeeds))->group("Clusters");
+      ->type_name("N")
+      ->check(whole_number(1, kMostSeeds))
+      ->group("Clusters");
   app->add_option("--delta", command.options.delta,
                   "split clusters whose points are farther, rms, from a\n"
                   "cylinder, in the largest extent; default 0.004")
-      ->type_name("D")->check(number_above_zero())->group("Clusters");
+      ->type_name("D")
+      ->check(number_above_zero())
+      ->group("Clusters");
   app->add_option("--max-cluster-points", command.options.max_cluster_points, "split clusters of more points too")
-      ->type_name("M")->check(whole_number(24, kMostSeeds))->group("Clusters");
+      ->type_name("M")
+      ->check(whole_number(24, kMostSeeds))
+      ->group("Clusters");
   add_common_options(app, command.common,
                      "write a JSON report with branches, volume, distances of\n"
                      "the points and timings; - for stdout");
@@ -121,9 +131,8 @@ Json tree_report(const std::vector<Vec3>& points, const TreeResult& tree, const 
                      {"height", measures.height},
                      {"noise", tree.noise}};
   report["clusters"] = {{"count", tree.clusters}, {"cylinders", tree.fixed_clusters}};
-  report["tree"] = {{"trunks", measures.trunks},       {"branches", tree.branches.size()},
-                    {"order", measures.order},         {"nodes", tree.skeleton.size()},
-                    {"length", measures.length},       {"volume", measures.volume},
+  report["tree"] = {{"trunks", measures.trunks},     {"branches", tree.branches.size()}, {"order", measures.order},
+                    {"nodes", tree.skeleton.size()}, {"length", measures.length},        {"volume", measures.volume},
                     {"area", measures.area}};
   report["coverage"] = {{"within_1_radius", share_within_radii(measures.coverage, 1)},
                         {"within_2_radii", share_within_radii(measures.coverage, 2)},
@@ -148,20 +157,22 @@ void warn_of_points(Console& console, const TreeResult& tree, const Measures& me
   if (others > 0) console.warn(fmt::format("{} belong to no branch", counted(others, "point", "points")));
 }
 
-void print_summary(Console& console, const TreeCommand& command, const std::vector<Vec3>& points, const TreeResult& tree,
-                   const Measures& measures, const Json& seconds) {
-  console.print(fmt::format("input      {}: {} in {}{}", command.input, counted(points.size(), "point", "points"),
-                            counted(tree.components, "component", "components"),
-                            tree.ground_points > 0 ? fmt::format("; {} below the ground left out", tree.ground_points) : ""));
-  console.print(fmt::format("clusters   {}, {} of them cylinders; noise {:.3g}", tree.clusters, tree.fixed_clusters,
-                            tree.noise));
-  console.print(fmt::format("tree       {} of order 0 to {}; {} in all", counted(tree.branches.size(), "branch", "branches"),
-                            measures.order, fmt::format("length {:.4g}, volume {:.4g}, area {:.4g}", measures.length,
-                                                        measures.volume, measures.area)));
-  console.print(fmt::format("points     {:.1f} % within 1 % of the height of the surface, {:.1f} % within a radius, {:.1f} % "
-                            "within two",
-                            100 * share_of_height(measures), 100 * share_within_radii(measures.coverage, 1),
-                            100 * share_within_radii(measures.coverage, 2)));
+void print_summary(Console& console, const TreeCommand& command, const std::vector<Vec3>& points,
+                   const TreeResult& tree, const Measures& measures, const Json& seconds) {
+  console.print(
+      fmt::format("input      {}: {} in {}{}", command.input, counted(points.size(), "point", "points"),
+                  counted(tree.components, "component", "components"),
+                  tree.ground_points > 0 ? fmt::format("; {} below the ground left out", tree.ground_points) : ""));
+  console.print(
+      fmt::format("clusters   {}, {} of them cylinders; noise {:.3g}", tree.clusters, tree.fixed_clusters, tree.noise));
+  console.print(fmt::format(
+      "tree       {} of order 0 to {}; {} in all", counted(tree.branches.size(), "branch", "branches"), measures.order,
+      fmt::format("length {:.4g}, volume {:.4g}, area {:.4g}", measures.length, measures.volume, measures.area)));
+  console.print(
+      fmt::format("points     {:.1f} % within 1 % of the height of the surface, {:.1f} % within a radius, {:.1f} % "
+                  "within two",
+                  100 * share_of_height(measures), 100 * share_within_radii(measures.coverage, 1),
+                  100 * share_within_radii(measures.coverage, 2)));
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose) print_seconds(console, seconds);
   console.print_written({command.output, command.skeleton, command.labels, command.preview, command.common.report});
@@ -170,8 +181,11 @@ void print_summary(Console& console, const TreeCommand& command, const std::vect
 void run(const TreeCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{command.output, kTreeFormats}, {command.skeleton, {".ply"}}, {command.labels, {".ply"}},
-                 {command.preview, {".png"}}, report_output(report_path)},
+  check_outputs({{command.output, kTreeFormats},
+                 {command.skeleton, {".ply"}},
+                 {command.labels, {".ply"}},
+                 {command.preview, {".png"}},
+                 report_output(report_path)},
                 {command.input});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");

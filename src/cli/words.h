@@ -13,14 +13,15 @@ inline constexpr auto kPrecisionWords = word_table<Precision>(
     {{Precision::automatic, "auto"}, {Precision::single, "single"}, {Precision::double_, "double"}});
 
 // "auto" is "nearest", by which reports call it.
-inline constexpr auto kNeighbourWords = word_table<NeighbourSource>(
-    {{NeighbourSource::nearest, "nearest"}, {NeighbourSource::delaunay, "delaunay"}, {NeighbourSource::nearest, "auto"}});
+inline constexpr auto kNeighbourWords = word_table<NeighbourSource>({{NeighbourSource::nearest, "nearest"},
+                                                                     {NeighbourSource::delaunay, "delaunay"},
+                                                                     {NeighbourSource::nearest, "auto"}});
 
 inline constexpr auto kTopologyWords = word_table<TopologyControl>(
     {{TopologyControl::enforce, "enforce"}, {TopologyControl::check, "check"}, {TopologyControl::off, "off"}});
 
-inline constexpr auto kEnergyWords = word_table<Energy>(
-    {{Energy::automatic, "auto"}, {Energy::restricted, "rcvt"}, {Energy::constrained, "ccvt"}});
+inline constexpr auto kEnergyWords =
+    word_table<Energy>({{Energy::automatic, "auto"}, {Energy::restricted, "rcvt"}, {Energy::constrained, "ccvt"}});
 
 inline constexpr auto kSurfaceWords = word_table<SegmentSurfaces>(
     {{SegmentSurfaces::planes, "planes"}, {SegmentSurfaces::quadrics, "quadrics"}, {SegmentSurfaces::all, "all"}});
@@ -31,9 +32,7 @@ inline constexpr auto kStartWords = word_table<SegmentStart>(
 inline constexpr auto kComponentWords =
     word_table<TreeComponents>({{TreeComponents::bridge, "bridge"}, {TreeComponents::separate, "separate"}});
 
-inline constexpr auto kUnitWords = word_table<IgesUnit>({{IgesUnit::millimetre, "mm"},
-                                                         {IgesUnit::centimetre, "cm"},
-                                                         {IgesUnit::metre, "m"},
-                                                         {IgesUnit::inch, "in"}});
+inline constexpr auto kUnitWords = word_table<IgesUnit>(
+    {{IgesUnit::millimetre, "mm"}, {IgesUnit::centimetre, "cm"}, {IgesUnit::metre, "m"}, {IgesUnit::inch, "in"}});
 
 }  // namespace bisector::cli

@@ -138,9 +138,14 @@ Json timeless(Json report) {
 }
 
 TEST_F(Cli, HelpAndVersion) {
-  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"--help"}, {"remesh", "--help"}, {"tet", "--help"}, {"rvd", "--help"},
-           {"segment", "--help"}, {"quality", "-h"}, {"check", "--help"}, {"--version"}}) {
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{{"--help"},
+                                                                                         {"remesh", "--help"},
+                                                                                         {"tet", "--help"},
+                                                                                         {"rvd", "--help"},
+                                                                                         {"segment", "--help"},
+                                                                                         {"quality", "-h"},
+                                                                                         {"check", "--help"},
+                                                                                         {"--version"}}) {
     const Result result = run(arguments);
     EXPECT_EQ(result.code, 0);
     EXPECT_NE(result.out.find(arguments.size() > 1 ? arguments[0] : "isector"), std::string::npos);
@@ -221,7 +226,8 @@ TEST_F(Cli, BadInputAndOutput) {
     expect_failure(1, {"rvd", sphere, "-n", "10", "--device", device}, device);
     expect_failure(1, {"check", "--device", device, "--report", in("r.json")}, device);
   }
-  expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", "cpu", "--precision", "single"}, "--precision");
+  expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", "cpu", "--precision", "single"},
+                 "--precision");
   expect_failure(1, {"rvd", sphere, "-n", "10", "--device", "cpu", "--precision", "single"}, "--precision");
   expect_failure(1, {"check", "--device", "cpu", "--precision", "single"}, "--precision");
   expect_failure(1, {"quality", in("missing.off")}, "missing.off");
@@ -272,9 +278,9 @@ TEST_F(Cli, RemeshWritesWhatItSays) {
     EXPECT_GE(report["seconds"].value(key, -1.0), 0) << key;
   for (const char* key : {"pairs", "uncertain", "wider", "double", "cpu"})
     EXPECT_TRUE(report["certification"].contains(key)) << key;
-  for (const char* key : {"q_min", "q_ave", "theta_min", "theta_min_ave", "theta_below_30", "theta_max", "q_min_free",
-                          "theta_min_free", "theta_max_free", "valence6", "distance_mean", "distance_rms", "distance_max",
-                          "self_intersections"})
+  for (const char* key :
+       {"q_min", "q_ave", "theta_min", "theta_min_ave", "theta_below_30", "theta_max", "q_min_free", "theta_min_free",
+        "theta_max_free", "valence6", "distance_mean", "distance_rms", "distance_max", "self_intersections"})
     EXPECT_TRUE(report["quality"].contains(key)) << key;
   EXPECT_EQ(report["topology"]["manifold"], true);
   EXPECT_EQ(report["topology"]["closed"], true);
@@ -325,7 +331,8 @@ TEST_F(Cli, OutputDoesNotDependOnThreads) {
 TEST_F(Cli, RandomSeedChoosesTheStart) {
   const auto energy = [&](const char* seed) {
     return report_of({"remesh", in("sphere.off"), "-o", in("out.off"), "-n", "50", "--random-seed", seed,
-                      "--iterations", "2", "--report", "-"})["energy"].get<double>();
+                      "--iterations", "2", "--report", "-"})["energy"]
+        .get<double>();
   };
   EXPECT_EQ(energy("1"), energy("1"));
   EXPECT_NE(energy("1"), energy("2"));
@@ -593,8 +600,8 @@ TEST_F(CliRemesh, ValuesOutOfRange) {
   refused("--min-angle", {"-1", "60", "nan", "x", ""});
   refused("--weld", {"-1", "inf", "nan", "x", ""});
   refused("--features", {"0", "180", "-30", "nan", "all", "30deg", ""});
-  refused("--density", {"size", "lfs:", "lfs:0", "lfs:9", "lfs:nan", "curvature:x", "uniform:2", "attribute",
-                        "attribute:", ""});
+  refused("--density",
+          {"size", "lfs:", "lfs:0", "lfs:9", "lfs:nan", "curvature:x", "uniform:2", "attribute", "attribute:", ""});
   for (const char* option : {"--feature-file", "--feature-output"}) refused(option, {""});
 }
 
@@ -642,7 +649,8 @@ TEST_F(CliRemesh, WhatTheInputDoesNotAllow) {
 
 TEST_F(CliRemesh, FeaturesOfABoxGoThroughAFile) {
   write_mesh(in("box.off"), test::box(2));
-  const Json first = remesh("box.off", {"-n", "150", "--features", "30", "--feature-output", in("edges.txt")}, "out.off");
+  const Json first =
+      remesh("box.off", {"-n", "150", "--features", "30", "--feature-output", in("edges.txt")}, "out.off");
   EXPECT_EQ(first["features"]["curves"], 12);
   EXPECT_EQ(first["features"]["corners"], 8);
   EXPECT_EQ(first["features"]["broken"], 0);
@@ -709,8 +717,8 @@ TEST_F(CliRemesh, EdgesFollowAnAttribute) {
 }
 
 TEST_F(CliRemesh, DensityFollowsTheShape) {
-  // An ellipsoid of radii 3, 1 and 1: at its tips the curvature is 3 and the local feature size 1/3, about its waist both
-  // are 1.
+  // An ellipsoid of radii 3, 1 and 1: at its tips the curvature is 3 and the local feature size 1/3, about its waist
+  // both are 1.
   TriangleMesh ellipsoid = test::icosphere(4);
   for (Vec3& v : ellipsoid.vertices) v.x *= 3;
   write_mesh(in("ellipsoid.off"), ellipsoid);
@@ -773,7 +781,8 @@ TEST_F(CliRemesh, LabelsStay) {
   EXPECT_EQ(ply.feature_edges, obj.feature_edges);
 
   // Formats without labels say so, and borders between labels are no features where none are wanted.
-  const std::vector<std::string> words{"remesh", in("plane.ply"), "-o", in("out.off"), "-n", "120", "--iterations", "5"};
+  const std::vector<std::string> words{"remesh", in("plane.ply"), "-o",           in("out.off"),
+                                       "-n",     "120",           "--iterations", "5"};
   const Result lost = run(words);
   EXPECT_EQ(lost.code, 0);
   EXPECT_TRUE(lost.err.starts_with("bisector: warning: ")) << lost.err;
@@ -1023,22 +1032,41 @@ TEST_F(CliTet, ReportHasWhatIsDocumented) {
     const Json::json_pointer pointer(key);
     return report.contains(pointer) ? report.at(pointer) : Json();
   };
-  for (const char* key :
-       {"/input/tets", "/output/tets", "/output/vertices", "/output/faces", "/background/tets", "/iterations",
-        "/evaluations", "/certification/pairs", "/sizing/wanted", "/sizing/boundary_vertices",
-        "/conform/steiner_points", "/conform/refused_sites", "/improved/rounds", "/improved/edge_removals",
-        "/improved/face_removals", "/improved/contractions", "/improved/insertions", "/improved/moves",
-        "/improved/before/below_goal", "/improved/after/below_goal", "/quality/inverted", "/quality/zero_volume",
-        "/topology/tet_components", "/topology/unused_vertices", "/features/curves", "/features/broken"}) {
+  for (const char* key : {"/input/tets",
+                          "/output/tets",
+                          "/output/vertices",
+                          "/output/faces",
+                          "/background/tets",
+                          "/iterations",
+                          "/evaluations",
+                          "/certification/pairs",
+                          "/sizing/wanted",
+                          "/sizing/boundary_vertices",
+                          "/conform/steiner_points",
+                          "/conform/refused_sites",
+                          "/improved/rounds",
+                          "/improved/edge_removals",
+                          "/improved/face_removals",
+                          "/improved/contractions",
+                          "/improved/insertions",
+                          "/improved/moves",
+                          "/improved/before/below_goal",
+                          "/improved/after/below_goal",
+                          "/quality/inverted",
+                          "/quality/zero_volume",
+                          "/topology/tet_components",
+                          "/topology/unused_vertices",
+                          "/features/curves",
+                          "/features/broken"}) {
     ASSERT_TRUE(at(key).is_number_integer()) << key;
     EXPECT_GE(at(key).get<long>(), 0) << key;
   }
   for (const char* key :
        {"/energy", "/gradient_norm", "/sizing/edge_length", "/quality/volume", "/quality/volume_input",
         "/quality/dihedral_min", "/quality/dihedral_max", "/quality/radius_ratio_mean", "/quality/theta_min",
-        "/quality/distance_rms", "/improved/before/dihedral_min", "/improved/after/radius_ratio_mean",
-        "/seconds/total", "/seconds/background", "/seconds/boundary", "/seconds/improve", "/seconds/extract",
-        "/seconds/tet", "/seconds/io"}) {
+        "/quality/distance_rms", "/improved/before/dihedral_min", "/improved/after/radius_ratio_mean", "/seconds/total",
+        "/seconds/background", "/seconds/boundary", "/seconds/improve", "/seconds/extract", "/seconds/tet",
+        "/seconds/io"}) {
     ASSERT_TRUE(at(key).is_number()) << key;
     EXPECT_GE(at(key).get<double>(), 0) << key;
   }
@@ -1270,7 +1298,8 @@ class CliSegment : public Cli {
 };
 
 TEST_F(CliSegment, FindsTheSidesOfABox) {
-  const Result result = run(segment({"--proxies", "6", "--report", in("r.json"), "--preview", in("out.png"), "--verbose"}));
+  const Result result =
+      run(segment({"--proxies", "6", "--report", in("r.json"), "--preview", in("out.png"), "--verbose"}));
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   EXPECT_NE(result.out.find("6 planes"), std::string::npos);
@@ -1294,11 +1323,12 @@ TEST_F(CliSegment, FindsTheSidesOfABox) {
   EXPECT_EQ(report["input"]["faces"], 192);
   EXPECT_EQ(report["output"]["faces"], 192);
   EXPECT_FALSE(report.contains("quality"));
-  for (const char* key : {"total", "start", "lloyd", "improve", "classify", "smooth", "project", "segment", "quality",
-                          "preview", "io"})
+  for (const char* key :
+       {"total", "start", "lloyd", "improve", "classify", "smooth", "project", "segment", "quality", "preview", "io"})
     EXPECT_GE(report["seconds"].value(key, -1.0), 0) << key;
   const Json& segmentation = report["segmentation"];
-  for (const char* key : {"iterations", "insertions", "merges", "teleportations", "deletions", "evaluations", "energies"})
+  for (const char* key :
+       {"iterations", "insertions", "merges", "teleportations", "deletions", "evaluations", "energies"})
     EXPECT_TRUE(segmentation.contains(key)) << key;
   EXPECT_NEAR(segmentation["border_before"].get<double>(), 12, 1e-12);
   EXPECT_NEAR(segmentation["border_after"].get<double>(), 12, 1e-12);
@@ -1347,8 +1377,8 @@ TEST_F(CliSegment, ProjectsOntoTheSurfaces) {
   test::SplitMix64 random(1);
   for (Vec3& v : ball.vertices) v *= random.range(0.999, 1.001);
   write_mesh(in("ball.ply"), ball);
-  const Json report = report_of({"segment", in("ball.ply"), "-o", in("out.ply"), "--proxies", "1", "--project",
-                                 "--report", "-", "--quiet"});
+  const Json report = report_of(
+      {"segment", in("ball.ply"), "-o", in("out.ply"), "--proxies", "1", "--project", "--report", "-", "--quiet"});
   const Json& region = report["segmentation"]["regions"][0];
   ASSERT_EQ(region["type"], "sphere");
   EXPECT_NEAR(region["radius"].get<double>(), 1, 1e-3);
@@ -1375,9 +1405,9 @@ TEST_F(CliSegment, OutputDoesNotDependOnThreads) {
   std::vector<std::string> files;
   std::vector<Json> reports;
   for (const char* threads : {"1", "2"}) {
-    reports.push_back(timeless(report_of({"segment", in("sphere.off"), "-o", in("out.ply"), "--proxies", "5", "--surfaces",
-                                          "quadrics", "--start", "insertion", "--threads", threads, "--report", "-",
-                                          "--preview", in("out.png"), "--project"})));
+    reports.push_back(timeless(report_of({"segment", in("sphere.off"), "-o", in("out.ply"), "--proxies", "5",
+                                          "--surfaces", "quadrics", "--start", "insertion", "--threads", threads,
+                                          "--report", "-", "--preview", in("out.png"), "--project"})));
     files.push_back(read_text(in("out.ply")) + read_text(in("out.png")));
   }
   EXPECT_EQ(reports[0], reports[1]);
@@ -1469,8 +1499,8 @@ TEST_F(Cli, DeviceGivesTheCpusDiagram) {
   std::vector<Json> reports;
   std::vector<std::string> pairs;
   for (const std::string& word : {std::string("cpu"), device}) {
-    reports.push_back(report_of({"rvd", in("sphere.off"), "-n", "300", "--device", word, "--pairs", in("pairs"),
-                                 "--report", "-"}));
+    reports.push_back(
+        report_of({"rvd", in("sphere.off"), "-n", "300", "--device", word, "--pairs", in("pairs"), "--report", "-"}));
     pairs.push_back(read_text(in("pairs")));
   }
   EXPECT_NE(reports[1]["device"]["kind"], "cpu");
@@ -1485,7 +1515,8 @@ TEST_F(Cli, ADamagedPipelineCacheDoesNoHarm) {
   if (device.empty()) GTEST_SKIP() << "no Vulkan device";
   const Variable cache("BISECTOR_CACHE", in("cache"));
   const auto pairs = [&] {
-    const Result result = run({"rvd", in("sphere.off"), "-n", "50", "--device", device, "--pairs", in("pairs"), "--quiet"});
+    const Result result =
+        run({"rvd", in("sphere.off"), "-n", "50", "--device", device, "--pairs", in("pairs"), "--quiet"});
     EXPECT_EQ(result.code, 0) << result.err;
     EXPECT_EQ(result.err, "");
     return read_text(in("pairs"));
@@ -1589,15 +1620,16 @@ class CliTree : public Cli {
   CliTree() {
     points_ = test::make_tree({.points = 6'000, .boughs = 3, .random_seed = 1}).points;
     std::string text = "# a tree\n";
-    for (const Vec3& p : points_) text += std::to_string(p.x) + ' ' + std::to_string(p.y) + ' ' + std::to_string(p.z) + " 9 9\n";
+    for (const Vec3& p : points_)
+      text += std::to_string(p.x) + ' ' + std::to_string(p.y) + ' ' + std::to_string(p.z) + " 9 9\n";
     write_text("tree.xyz", text);
   }
   std::vector<Vec3> points_;
 };
 
 TEST_F(CliTree, WritesWhatItSays) {
-  const Result result = run({"tree", in("tree.xyz"), "-o", in("out.obj"), "--skeleton", in("s.ply"), "--labels", in("l.ply"),
-                             "--preview", in("p.png"), "--report", in("r.json")});
+  const Result result = run({"tree", in("tree.xyz"), "-o", in("out.obj"), "--skeleton", in("s.ply"), "--labels",
+                             in("l.ply"), "--preview", in("p.png"), "--report", in("r.json")});
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_NE(result.out.find("points"), std::string::npos);
   const Json report = Json::parse(read_text(in("r.json")));
@@ -1619,7 +1651,8 @@ TEST_F(CliTree, WritesWhatItSays) {
   EXPECT_EQ(points, points_.size());
   EXPECT_GT(report["coverage"]["within_1_percent_of_height"], 0.9);
   EXPECT_GE(report["coverage"]["within_2_radii"], report["coverage"]["within_1_radius"].get<double>());
-  for (const char* phase : {"graph", "clusters", "skeleton", "refine", "surfaces", "tree", "mesh", "quality", "io", "total"})
+  for (const char* phase :
+       {"graph", "clusters", "skeleton", "refine", "surfaces", "tree", "mesh", "quality", "io", "total"})
     EXPECT_GE(report["seconds"][phase], 0) << phase;
   const TriangleMesh mesh = read_mesh(in("out.obj"));
   EXPECT_EQ(std::set<std::int32_t>(mesh.labels.begin(), mesh.labels.end()).size(), branches);
@@ -1643,7 +1676,10 @@ TEST_F(CliTree, LeavesOutTheGround) {
     high = std::max(high, p.z);
   }
   const double ground = low + 0.1 * (high - low);
-  ASSERT_EQ(run({"tree", in("tree.xyz"), "-o", in("t.obj"), "--ground", std::to_string(ground), "--report", in("r.json"), "--quiet"}).code, 0);
+  ASSERT_EQ(run({"tree", in("tree.xyz"), "-o", in("t.obj"), "--ground", std::to_string(ground), "--report",
+                 in("r.json"), "--quiet"})
+                .code,
+            0);
   EXPECT_GT(Json::parse(read_text(in("r.json")))["input"]["ground_points"], 0);
 }
 
