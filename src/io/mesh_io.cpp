@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -115,9 +116,37 @@ namespace {
 
 // --- files ---
 
-[[noreturn]] void fail_extension(const std::string& path, const std::string& extension) {
-  if (extension.empty()) fail(path, "no file name extension; use .off, .obj, .ply or .stl");
-  fail(path, "unknown mesh format '" + printable(extension) + "'; use .off, .obj, .ply or .stl");
+struct MeshFormat {
+  std::string_view extension;
+  Soup (*read)(const std::string& path, std::string_view bytes);
+  std::string (*bytes_of)(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups);
+};
+
+constexpr MeshFormat kFormats[] = {
+    {".off", read_off, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_off(mesh); }},
+    {".obj", read_obj,
+     [](const std::string&, const TriangleMesh& mesh, const GroupNames& groups) { return format_obj(mesh, groups); }},
+    {".ply", read_ply, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_ply(mesh); }},
+    {".stl", read_stl,
+     [](const std::string& path, const TriangleMesh& mesh, const GroupNames&) { return format_stl(path, mesh); }},
+};
+
+// "use .off, .obj, .ply or .stl"
+std::string known_extensions() {
+  std::string list = "use ";
+  for (std::size_t k = 0; k < std::size(kFormats); ++k) {
+    if (k > 0) list += k + 1 < std::size(kFormats) ? ", " : " or ";
+    list += kFormats[k].extension;
+  }
+  return list;
+}
+
+const MeshFormat& format_of(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  for (const MeshFormat& format : kFormats)
+    if (format.extension == extension) return format;
+  if (extension.empty()) fail(path, "no file name extension; " + known_extensions());
+  fail(path, "unknown mesh format '" + printable(extension) + "'; " + known_extensions());
 }
 
 // --- from what a file holds to triangles ---
@@ -234,19 +263,12 @@ void check_face(const std::string& path, std::size_t face, const Index* begin, c
 }  // namespace
 
 TriangleMesh read_mesh(const std::string& path, const Context& context) {
-  const std::string extension = lower_extension(path);
-  Soup (*read)(const std::string&, std::string_view) = extension == ".off"   ? read_off
-                                                       : extension == ".obj" ? read_obj
-                                                       : extension == ".ply" ? read_ply
-                                                       : extension == ".stl" ? read_stl
-                                                                             : nullptr;
-  if (!read) fail_extension(path, extension);
+  const MeshFormat& format = format_of(path);
   const std::string bytes = read_bytes(path);
-  return to_triangles(path, read(path, bytes), context);
+  return to_triangles(path, format.read(path, bytes), context);
 }
 
 void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups) {
-  const std::string extension = lower_extension(path);
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
     check_face(path, i, mesh.triangles[i].data(), mesh.triangles[i].data() + 3, mesh.vertices.size());
@@ -259,11 +281,8 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNa
     if (std::max(e[0], e[1]) >= mesh.vertices.size())
       fail(path, fmt::format("feature edge {} {} is out of range, the mesh has {} vertices; nothing was written", e[0],
                              e[1], mesh.vertices.size()));
-  if (extension == ".off") write_file(path, format_off(mesh));
-  else if (extension == ".obj") write_file(path, format_obj(mesh, groups));
-  else if (extension == ".ply") write_file(path, format_ply(mesh));
-  else if (extension == ".stl") write_file(path, format_stl(path, mesh));
-  else fail_extension(path, extension);
+  const MeshFormat& format = format_of(path);
+  write_file(path, format.bytes_of(path, mesh, groups));
 }
 
 void write_polygons(const std::string& path, const PolygonMesh& mesh) {
