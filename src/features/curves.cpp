@@ -58,8 +58,8 @@ double FeatureCurves::nearest(Index curve, const Vec3& p, double from, double re
   const double whole = length(curve);
   const std::size_t count = segments(curve), first = segment_at(curve, from);
   double best = norm2(point(curve, from) - p), position = from;
-  // Looks for a nearer point on the part of segment k that is at most `reach` away from `from`; `shift` is the length of the
-  // curve, or its negative, where the way there leads across the start of a closed curve.
+  // Looks for a nearer point on the part of segment k that is at most `reach` away from `from`; `shift` is the length
+  // of the curve, or its negative, where the way there leads across the start of a closed curve.
   const auto try_segment = [&](std::size_t k, double shift) {
     const double length_k = starts[k + 1] - starts[k];
     if (!(length_k > 0)) return;

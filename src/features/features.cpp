@@ -26,8 +26,8 @@ constexpr std::size_t kNoEdge = static_cast<std::size_t>(-1);
 
 // An edge of a larger dihedral deviation may be a crease without the support of others, in radians.
 constexpr double kSeedAngle = 40 * kRadiansPerDegree;
-// A triangle with both a height below the first, in diagonals of the bounding box, and a height over longest edge below the
-// second has no normal of its own: the rounding of a file's coordinates may have turned it.
+// A triangle with both a height below the first, in diagonals of the bounding box, and a height over longest edge below
+// the second has no normal of its own: the rounding of a file's coordinates may have turned it.
 constexpr double kSliverHeight = 1e-4;
 constexpr double kSliverAspect = 0.02;
 // Triangles without normal that are looked through, one after the other, before the search for a normal is given up.
@@ -133,8 +133,8 @@ class Folds {
     return norm(p - nearest_on_segment(p, point(a), point(b)));
   }
 
-  // The largest turn of the normal about `axis` from a triangle to its neighbours, other than across `from`. Edges that may
-  // be creases themselves are not counted: small polyhedra have no others.
+  // The largest turn of the normal about `axis` from a triangle to its neighbours, other than across `from`. Edges that
+  // may be creases themselves are not counted: small polyhedra have no others.
   double bend_beside(std::size_t triangle, std::size_t from, const Vec3& axis) const {
     double largest = 0;
     for (std::size_t h = 3 * triangle; h < 3 * triangle + 3; ++h) {
@@ -186,20 +186,22 @@ constexpr double kTailAngle = 10 * kRadiansPerDegree;  // whose angle, in radian
 constexpr double kTailFall = 0.3;                      // and at least this part of the angle of the edge before,
 constexpr double kTailTurn = 40 * kRadiansPerDegree;   // which turns from that edge by less than this, in radians,
 constexpr double kTailBend = 0.8;  // and beside which the surface bends by at most this part of the edge's angle;
-constexpr double kEven = 0.8;      // that is not asked of an edge of more than this part of the angle of the edge before.
+constexpr double kEven = 0.8;      // that is not asked of an edge of more than this part of the angle of the one before.
 
 // Connected creases are kept if their mean angle exceeds the first (radians) by the second times their disorder.
 constexpr double kPlainFold = 30 * kRadiansPerDegree;
 constexpr double kDisorderWeight = 5;
-// So many inner vertices tell whether a chain is folded evenly; its disorder is then at least this part of that around it.
+// So many inner vertices tell whether a chain is folded evenly; its disorder is then at least this part of that around
+// it.
 constexpr std::size_t kEnoughVertices = 12;
 constexpr double kLeastDisorder = 0.4;
 
-// Creases that touch no other feature must be as long as so many mean edges around them, unless they have many edges, ...
+// Creases that touch no other feature must be as long as so many mean edges around them, unless they have many edges,
+// ...
 constexpr double kLeastLength = 5;
 constexpr std::size_t kManyEdges = 12;
-// ... and those of few edges need area beside them, in squares of their extent, unless so many triangles are there or the
-// surface around them is flat (radians): the faces of a plate or a bar may be thin.
+// ... and those of few edges need area beside them, in squares of their extent, unless so many triangles are there or
+// the surface around them is flat (radians): the faces of a plate or a bar may be thin.
 constexpr std::size_t kFewEdges = 60;
 constexpr double kLeastArea = 0.02;
 constexpr std::size_t kManyTriangles = 500;
@@ -268,9 +270,10 @@ class CreaseFinder {
     }
   }
 
-  // Whether most of the crease parts areas that matter. Noise folds single triangles over, and the creases around these cut
-  // off next to nothing.
-  bool parts_large_areas(const std::vector<std::size_t>& component, const std::vector<Index>& vertices, double length) const {
+  // Whether most of the crease parts areas that matter. Noise folds single triangles over, and the creases around these
+  // cut off next to nothing.
+  bool parts_large_areas(const std::vector<std::size_t>& component, const std::vector<Index>& vertices,
+                         double length) const {
     const auto farthest = [&](Index from) {
       return *std::max_element(vertices.begin(), vertices.end(), [&](Index a, Index b) {
         return norm2(folds_.point(a) - folds_.point(from)) < norm2(folds_.point(b) - folds_.point(from));
@@ -288,8 +291,8 @@ class CreaseFinder {
     return narrow < 0.5 * length;
   }
 
-  // Whether the triangles that are reached from one without crossing creases make a large area, with lengths multiplied by
-  // `scale`.
+  // Whether the triangles that are reached from one without crossing creases make a large area, with lengths multiplied
+  // by `scale`.
   bool reaches_large_area(std::size_t triangle, double scale) const {
     std::vector<std::size_t> part{triangle};
     double area = 0;
@@ -341,8 +344,8 @@ class CreaseFinder {
     return *middle;
   }
 
-  // Creases of machined parts have about the same angle all along, or lie between faces that are hardly folded. Ridges of a
-  // scan have neither, so that the smaller of both measures of disorder tells them apart.
+  // Creases of machined parts have about the same angle all along, or lie between faces that are hardly folded. Ridges
+  // of a scan have neither, so that the smaller of both measures of disorder tells them apart.
   bool is_sound(const std::vector<std::size_t>& component) const {
     std::vector<Index> vertices;
     double length = 0, fold = 0;
@@ -363,7 +366,8 @@ class CreaseFinder {
         !parts_large_areas(component, vertices, length))
       return false;
     if (around.inner_count >= kEnoughVertices)
-      disorder = std::clamp(around.change_sum / static_cast<double>(around.inner_count), kLeastDisorder * disorder, disorder);
+      disorder =
+          std::clamp(around.change_sum / static_cast<double>(around.inner_count), kLeastDisorder * disorder, disorder);
     return fold > length * (kPlainFold + kDisorderWeight * disorder);
   }
 
@@ -380,8 +384,9 @@ constexpr double kTiny = 0.2;
 constexpr int kNearBy = 3;
 // The two edges at a corner themselves turn by at least this part of the corner angle.
 constexpr double kOwnTurn = 0.7;
-// The angles around a cone's tip are short of a full turn by more than the first (radians), those around its neighbours by less
-// than the given part of that, and the surface folds by less than the last (radians) at the edges opposite the tip.
+// The angles around a cone's tip are short of a full turn by more than the first (radians), those around its neighbours
+// by less than the given part of that, and the surface folds by less than the last (radians) at the edges opposite the
+// tip.
 constexpr double kTipDeficit = 54 * kRadiansPerDegree;
 constexpr double kTipContrast = 0.25;
 constexpr double kTipFold = 15 * kRadiansPerDegree;
@@ -538,8 +543,8 @@ class GraphBuilder {
       if (wins[i]) corner_[sharp[i]] = 1;
   }
 
-  // Marks the tips of cones: the angles around a tip are far short of a full turn, those around its neighbours are not, and
-  // the surface goes on smoothly from the triangles at the tip.
+  // Marks the tips of cones: the angles around a tip are far short of a full turn, those around its neighbours are not,
+  // and the surface goes on smoothly from the triangles at the tip.
   void find_tips(const std::vector<Triangle>& triangles) {
     std::vector<double> deficit(at_vertex_.rows(), 2 * std::numbers::pi);
     for (const Triangle& t : triangles)

@@ -20,8 +20,8 @@ namespace {
 
 constexpr std::size_t kSamples = 400;         // points at which the roughness is measured
 constexpr std::size_t kMostTriangles = 1000;  // looked at around one point, which bounds the time on fine meshes
-// A linear fit has three unknowns for each coordinate of the normal: so many triangles of equal area must be there to tell noise
-// from what the surface bends.
+// A linear fit has three unknowns for each coordinate of the normal: so many triangles of equal area must be there to
+// tell noise from what the surface bends.
 constexpr double kFewestTriangles = 6;
 constexpr double kNoisy = 12;     // degrees of roughness beyond which normals may be noise
 constexpr double kAsRough = 0.7;  // part of the roughness at twice the length that counts as equally rough

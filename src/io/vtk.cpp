@@ -112,6 +112,14 @@ std::vector<double> attribute_of(const std::string& path, VtkGrid grid, const st
   return std::move(found->second);
 }
 
+// Numbers that should be integers; -1, which no index is, for those beyond 2^53.
+std::vector<std::int64_t> integers(const std::vector<double>& values) {
+  std::vector<std::int64_t> result;
+  result.reserve(values.size());
+  for (const double x : values) result.push_back(std::abs(x) < 0x1p53 ? static_cast<std::int64_t>(x) : -1);
+  return result;
+}
+
 // --- legacy files ---
 
 bool same_word(std::string_view a, std::string_view upper) {
@@ -230,13 +238,6 @@ class LegacyReader {
       in_.fail("the type '" + printable(type) + "' is not read; save as double or int");
     in_.binary = false;
     return values;
-  }
-
-  static std::vector<std::int64_t> integers(const std::vector<double>& values) {
-    std::vector<std::int64_t> result;
-    result.reserve(values.size());
-    for (const double x : values) result.push_back(std::abs(x) < 0x1p53 ? static_cast<std::int64_t>(x) : -1);
-    return result;
   }
 
   // Returns the number of cells.
@@ -410,7 +411,7 @@ class VtuReader {
 
   VtkGrid read() {
     find_appended();
-    enum class In { none, points, cells, point_data, cell_data } where = In::none;
+    Section section = Section::none;
     bool grid = false, piece = false;
     Tag tag;
     while (next_tag(tag)) {
@@ -424,35 +425,18 @@ class VtuReader {
         points_ = number(tag, "NumberOfPoints");
         cells_ = number(tag, "NumberOfCells");
       } else if (tag.name == "Points")
-        where = In::points;
+        section = Section::points;
       else if (tag.name == "Cells")
-        where = In::cells;
+        section = Section::cells;
       else if (tag.name == "PointData")
-        where = In::point_data;
+        section = Section::point_data;
       else if (tag.name == "CellData")
-        where = In::cell_data;
-      else if (tag.name == "/Points" || tag.name == "/Cells" || tag.name == "/PointData" || tag.name == "/CellData")
-        where = In::none;
-      else if (tag.name == "/Piece")
-        where = In::none;
-      else if (tag.name == "DataArray" && where != In::none) {
-        const std::string name(tag["Name"]);
-        const std::size_t components = tag["NumberOfComponents"].empty() ? 1 : number(tag, "NumberOfComponents");
-        if (where == In::points) {
-          take_points(read_array(tag, 3, points_));
-        } else if (where == In::cells && name == "types") {
-          grid_.types = integers(read_array(tag, 1, cells_));
-        } else if (where == In::cells && name == "offsets") {
-          grid_.offsets = integers(read_array(tag, 1, cells_));
-          grid_.offsets.insert(grid_.offsets.begin(), 0);
-        } else if (where == In::cells && name == "connectivity") {
-          grid_.connectivity = integers(read_array(tag, 1, std::nullopt));
-        } else if (where == In::point_data && components <= 1) {
-          grid_.point_data[name] = read_array(tag, 1, points_);
-        } else if (where == In::cell_data && components <= 1) {
-          grid_.cell_data[name] = read_array(tag, 1, cells_);
-        }
-      }
+        section = Section::cell_data;
+      else if (tag.name == "/Points" || tag.name == "/Cells" || tag.name == "/PointData" || tag.name == "/CellData" ||
+               tag.name == "/Piece")
+        section = Section::none;
+      else if (tag.name == "DataArray" && section != Section::none)
+        take_array(tag, section);
     }
     if (!grid) fail(path_, "there is no UnstructuredGrid; save as an unstructured grid (.vtu)");
     if (!piece || grid_.points.empty() || grid_.types.empty())
@@ -461,6 +445,28 @@ class VtuReader {
   }
 
  private:
+  enum class Section { none, points, cells, point_data, cell_data };
+
+  // Reads an array of a section into the grid; what is not known is passed over.
+  void take_array(const Tag& tag, Section section) {
+    const std::string name(tag["Name"]);
+    const std::size_t components = tag["NumberOfComponents"].empty() ? 1 : number(tag, "NumberOfComponents");
+    if (section == Section::points) {
+      take_points(read_array(tag, 3, points_));
+    } else if (section == Section::cells && name == "types") {
+      grid_.types = integers(read_array(tag, 1, cells_));
+    } else if (section == Section::cells && name == "offsets") {
+      grid_.offsets = integers(read_array(tag, 1, cells_));
+      grid_.offsets.insert(grid_.offsets.begin(), 0);
+    } else if (section == Section::cells && name == "connectivity") {
+      grid_.connectivity = integers(read_array(tag, 1, std::nullopt));
+    } else if (section == Section::point_data && components <= 1) {
+      grid_.point_data[name] = read_array(tag, 1, points_);
+    } else if (section == Section::cell_data && components <= 1) {
+      grid_.cell_data[name] = read_array(tag, 1, cells_);
+    }
+  }
+
   // Raw data may hold anything, so tags are looked for before them only.
   void find_appended() {
     const std::size_t start = bytes_.find("<AppendedData");
@@ -630,13 +636,6 @@ class VtuReader {
       for (int k = 0; k < 3; ++k)
         if (const char* flaw = coordinate_flaw(grid_.points[i][k])) fail(path_, fmt::format("vertex {}: {}", i, flaw));
     }
-  }
-
-  static std::vector<std::int64_t> integers(const std::vector<double>& values) {
-    std::vector<std::int64_t> result;
-    result.reserve(values.size());
-    for (const double x : values) result.push_back(std::abs(x) < 0x1p53 ? static_cast<std::int64_t>(x) : -1);
-    return result;
   }
 
   const std::string& path_;

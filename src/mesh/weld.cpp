@@ -287,7 +287,8 @@ class EdgeSplitter {
     return false;
   }
 
-  // Splits a triangle by fans, edge after edge from the given one on.
+  // Splits a triangle at the vertices put on its edges, one edge after the other from the given one on: the parts at an
+  // edge make a fan around the corner opposite.
   static void emit(const Triangle& t, std::size_t edge, const std::vector<Inserted>& all, std::vector<Triangle>& out) {
     for (std::size_t k = edge; k < 3; ++k) {
       const Index a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
@@ -344,6 +345,33 @@ void keep_edges_of(const Work& work, std::vector<Edge>& edges) {
   edges = std::move(kept);
 }
 
+// The welded mesh. `name` tells for each vertex of the input which one it has become, and then the index of that one
+// among those that are left.
+TriangleMesh collect(const TriangleMesh& mesh, Work work, std::vector<Edge> feature_edges, std::vector<Index>& name) {
+  TriangleMesh welded;
+  std::vector<Index> place(mesh.vertices.size(), kNone);
+  for (std::size_t v = 0; v < name.size(); ++v)
+    if (name[v] == v) {
+      place[v] = static_cast<Index>(welded.vertices.size());
+      welded.vertices.push_back(mesh.vertices[v]);
+    }
+  for (Index& v : name) v = place[v];
+  work.rename(place);
+  for (Edge& e : feature_edges)
+    for (Index& v : e) v = place[v];
+
+  bool same_faces = work.origin.size() == mesh.triangles.size();
+  for (std::size_t t = 0; same_faces && t < work.origin.size(); ++t) same_faces = work.origin[t] == t;
+  for (const Index t : work.origin) {
+    if (!mesh.labels.empty()) welded.labels.push_back(mesh.labels[t]);
+    if (!mesh.face_of_triangle.empty()) welded.face_of_triangle.push_back(mesh.face_of_triangle[t]);
+    else if (!same_faces) welded.face_of_triangle.push_back(t);
+  }
+  welded.triangles = std::move(work.triangles);
+  welded.feature_edges = std::move(feature_edges);
+  return welded;
+}
+
 }  // namespace
 
 WeldResult weld(const TriangleMesh& mesh, double tolerance) {
@@ -375,28 +403,9 @@ WeldResult weld(const TriangleMesh& mesh, double tolerance) {
   std::vector<Edge> feature_edges = rename_feature_edges(mesh, name, splits);
   keep_edges_of(work, feature_edges);
 
-  std::vector<Index> place(mesh.vertices.size(), kNone);
-  for (std::size_t v = 0; v < name.size(); ++v)
-    if (name[v] == v) {
-      place[v] = static_cast<Index>(result.mesh.vertices.size());
-      result.mesh.vertices.push_back(mesh.vertices[v]);
-    }
-  for (Index& v : name) v = place[v];
+  result.mesh = collect(mesh, std::move(work), std::move(feature_edges), name);
   result.merged_vertices = mesh.vertices.size() - result.mesh.vertices.size();
-  work.rename(place);
-  for (Edge& e : feature_edges)
-    for (Index& v : e) v = place[v];
-
-  bool same_faces = work.origin.size() == mesh.triangles.size();
-  for (std::size_t t = 0; same_faces && t < work.origin.size(); ++t) same_faces = work.origin[t] == t;
-  for (const Index t : work.origin) {
-    if (!mesh.labels.empty()) result.mesh.labels.push_back(mesh.labels[t]);
-    if (!mesh.face_of_triangle.empty()) result.mesh.face_of_triangle.push_back(mesh.face_of_triangle[t]);
-    else if (!same_faces) result.mesh.face_of_triangle.push_back(t);
-  }
-  result.border_after = count_border(edge_table(work.triangles, result.mesh.vertices.size()));
-  result.mesh.triangles = std::move(work.triangles);
-  result.mesh.feature_edges = std::move(feature_edges);
+  result.border_after = count_border(edge_table(result.mesh.triangles, result.mesh.vertices.size()));
   result.vertex_of = std::move(name);
   return result;
 }

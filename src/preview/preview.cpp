@@ -16,17 +16,30 @@
 namespace bisector {
 namespace {
 
-constexpr int kSub = 3;                   // samples per pixel and axis
-constexpr int kBand = 16;                 // pixel rows that are drawn together
-constexpr int kMargin = 2;                // sample rows that a band sees of its neighbours, for outlines
-constexpr double kMargins = 0.06;         // of the picture, around the model
+constexpr int kSamples = 3;               // per pixel and axis
+constexpr int kBandRows = 16;             // pixel rows that are drawn together
+constexpr int kBandMargin = 2;            // sample rows that a band sees of its neighbours, for outlines
+constexpr double kPictureMargin = 0.06;   // around the model, on each side, of the picture's size
 constexpr double kCameraDistance = 4;     // in radii of the bounding sphere
-constexpr double kCrease = 0.766;         // cosine of 40 degrees: sharper edges are not smoothed
+constexpr double kCreaseCosine = 0.766;   // of 40 degrees between normals: sharper edges are not smoothed
 constexpr std::size_t kLargestFan = 64;   // faces at a vertex that smoothing looks at
-constexpr double kLine = 0.42;            // half the width of an edge, in pixels
+constexpr int kLargestPicture = 16384;    // pixels of width and height
+
+// Edges are drawn half as wide as this, in pixels. They are at their darkest, as a part of pure ink, where the
+// polygon's inner circle is at least as large as the last radius, in pixels, and fade to nothing at the first, where
+// they would cover it.
+constexpr double kHalfLine = 0.42;
+constexpr double kEdgeInk = 0.78, kOutlineInk = 0.8;
+constexpr double kNoEdgesRadius = 0.25, kFullEdgesRadius = 2;
+
+// Weights of the light that comes from everywhere, from above, from the camera and from the key light, and of the key
+// light's reflection, which is the sharper the higher the exponent.
+constexpr double kAmbient = 0.14, kSky = 0.16, kHead = 0.32, kKey = 0.54, kGloss = 0.06, kGlossExponent = 40;
 
 using Colour = std::array<unsigned char, 3>;
-constexpr Colour kNeutral{188, 211, 236};
+constexpr Colour kNeutral{188, 211, 236};  // of polygons without a colour of their own
+constexpr Colour kInk{34, 44, 66};         // of edges and outlines
+constexpr Colour kTop{250, 251, 252}, kBottom{226, 231, 238};  // of the background
 
 // Light is added up linearly; files hold sRGB.
 struct Rgb {
@@ -90,8 +103,8 @@ Camera aim(const std::vector<Vec3>& vertices, const Csr<Index>& polygons, const 
     lo_y = k ? std::min(lo_y, p.y) : p.y;
     hi_y = k ? std::max(hi_y, p.y) : p.y;
   }
-  const double width = kSub * options.width, height = kSub * options.height;
-  const double scale = (1 - 2 * kMargins) *
+  const double width = kSamples * options.width, height = kSamples * options.height;
+  const double scale = (1 - 2 * kPictureMargin) *
                        std::min(width / std::max(hi_x - lo_x, 1e-9), height / std::max(hi_y - lo_y, 1e-9));
   camera.points.resize(vertices.size());
   parallel_each(vertices.size(), [&](std::size_t v) {
@@ -124,7 +137,7 @@ std::vector<Vec3> corner_normals(const std::vector<Vec3>& vertices, const Csr<In
       if (faces.size(v) <= kLargestFan) {
         sum = {};
         for (const Index* g = faces.begin(v); g != faces.end(v); ++g)
-          if (dot(flat[*g], flat[f]) > kCrease) sum += area[*g];
+          if (dot(flat[*g], flat[f]) > kCreaseCosine) sum += area[*g];
       }
       normals[k] = unit(sum);
     }
@@ -146,10 +159,10 @@ class Lights {
     if (behind) n = -n;
     const double head = dot(n, back_), key = std::max(0.0, dot(n, key_));
     const double sky = 0.5 + 0.5 * n.y;
-    const double gloss = std::pow(std::max(0.0, dot(n, half_)), 40);
-    const double light = 0.14 + 0.16 * sky + 0.32 * head + 0.54 * key;
+    const double gloss = std::pow(std::max(0.0, dot(n, half_)), kGlossExponent);
+    const double light = kAmbient + kSky * sky + kHead * head + kKey * key;
     const Rgb paint = behind ? base * Rgb{0.75f, 0.55f, 0.45f} : base;
-    return static_cast<float>(light) * paint + static_cast<float>(0.06 * gloss) * Rgb{1, 1, 1};
+    return static_cast<float>(light) * paint + static_cast<float>(kGloss * gloss) * Rgb{1, 1, 1};
   }
 
  private:
@@ -189,14 +202,14 @@ double edge_strength(const Scene& scene, std::size_t polygon) {
     perimeter += std::sqrt((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y));
   }
   const double inradius = perimeter > 0 ? std::abs(twice_area) / perimeter : 0;
-  return 0.78 * std::clamp((inradius / kSub - 0.25) / 1.75, 0.0, 1.0);
+  return kEdgeInk * std::clamp((inradius / kSamples - kNoEdgesRadius) / (kFullEdgesRadius - kNoEdgesRadius), 0.0, 1.0);
 }
 
 // The rows [begin, end) of samples.
 class Band {
  public:
   Band(const Scene& scene, int begin, int end)
-      : scene_(scene), begin_(begin), end_(end), width_(kSub * scene.options.width),
+      : scene_(scene), begin_(begin), end_(end), width_(kSamples * scene.options.width),
         samples_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(end - begin)) {}
 
   void draw(const Piece& piece);
@@ -239,9 +252,9 @@ void Band::draw(const Piece& piece) {
   if (lo_x > hi_x || lo_y > hi_y) return;
 
   const Colour colour = scene_.colour(piece.polygon);
-  const Rgb paint = to_linear(colour), ink = to_linear(Colour{34, 44, 66});
+  const Rgb paint = to_linear(colour), ink = to_linear(kInk);
   const double strength = scene_.options.edges ? edge_strength(scene_, piece.polygon) : 0;
-  // A little is added on each side, so that no crack shows between polygons.
+  // Points a little outside, by this barycentric coordinate, count as inside, so that no crack shows between polygons.
   constexpr double kInside = -1e-7;
   for (int y = lo_y; y <= hi_y; ++y)
     for (int x = lo_x; x <= hi_x; ++x) {
@@ -258,7 +271,7 @@ void Band::draw(const Piece& piece) {
       sample.light = scene_.lights.shade(
           paint, u * scene_.normals[corner[0]] + v * scene_.normals[corner[1]] + w * scene_.normals[corner[2]]);
       if (strength > 0) {
-        const double cover = std::clamp(kSub * kLine + 0.5 - edge_distance(piece.polygon, px, py), 0.0, 1.0);
+        const double cover = std::clamp(kSamples * kHalfLine + 0.5 - edge_distance(piece.polygon, px, py), 0.0, 1.0);
         sample.light = mix(sample.light, ink, static_cast<float>(strength * cover));
       }
     }
@@ -266,7 +279,7 @@ void Band::draw(const Piece& piece) {
 
 void Band::draw_outlines() {
   std::vector<std::size_t> dark;
-  const Rgb ink = to_linear(Colour{34, 44, 66});
+  const Rgb ink = to_linear(kInk);
   for (int y = begin_; y < end_; ++y)
     for (int x = 0; x < width_; ++x) {
       const Sample& sample = at(x, y);
@@ -280,12 +293,12 @@ void Band::draw_outlines() {
         }
       if (border) dark.push_back(index(x, y));
     }
-  for (const std::size_t k : dark) samples_[k].light = mix(samples_[k].light, ink, 0.8f);
+  for (const std::size_t k : dark) samples_[k].light = mix(samples_[k].light, ink, static_cast<float>(kOutlineInk));
 }
 
 // At a height of 0 (top) to 1.
 Rgb background(double height) {
-  return mix(to_linear(Colour{250, 251, 252}), to_linear(Colour{226, 231, 238}), static_cast<float>(height));
+  return mix(to_linear(kTop), to_linear(kBottom), static_cast<float>(height));
 }
 
 // The pieces that touch each band of rows.
@@ -294,11 +307,11 @@ Csr<Index> sort_into_bands(const Scene& scene, std::size_t bands) {
     const std::size_t first = scene.polygons.offsets[piece.polygon];
     const double a = scene.point(first).y, b = scene.point(first + piece.corner).y,
                  c = scene.point(first + piece.corner + 1).y;
-    const double rows = kSub * kBand;
+    const double rows = kSamples * kBandRows;
     const auto band = [&](double y) {
       return static_cast<std::size_t>(std::clamp(std::floor(y / rows), 0.0, static_cast<double>(bands - 1)));
     };
-    return std::pair(band(std::min({a, b, c}) - kMargin - 1), band(std::max({a, b, c}) + kMargin + 1));
+    return std::pair(band(std::min({a, b, c}) - kBandMargin - 1), band(std::max({a, b, c}) + kBandMargin + 1));
   };
   return group_into_rows<Index>(bands, [&](const auto& put) {
     for (std::size_t k = 0; k < scene.pieces.size(); ++k)
@@ -317,23 +330,24 @@ std::vector<unsigned char> render(const Scene& scene) {
   const int width = scene.options.width, height = scene.options.height;
   const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
   std::vector<unsigned char> pixels(3 * columns * rows);
-  const auto bands = static_cast<std::size_t>((height + kBand - 1) / kBand);
+  const auto bands = static_cast<std::size_t>((height + kBandRows - 1) / kBandRows);
   const Csr<Index> pieces = sort_into_bands(scene, bands);
   parallel_each(bands, [&](std::size_t b) {
-    const int top = static_cast<int>(b) * kBand, bottom = std::min(height, top + kBand);
-    Band band(scene, std::max(0, kSub * top - kMargin), std::min(kSub * height, kSub * bottom + kMargin));
+    const int top = static_cast<int>(b) * kBandRows, bottom = std::min(height, top + kBandRows);
+    Band band(scene, std::max(0, kSamples * top - kBandMargin),
+              std::min(kSamples * height, kSamples * bottom + kBandMargin));
     for (const Index* piece = pieces.begin(b); piece != pieces.end(b); ++piece) band.draw(scene.pieces[*piece]);
     if (scene.options.outlines) band.draw_outlines();
     for (int y = top; y < bottom; ++y) {
       const Rgb sky = background((y + 0.5) / height);
       for (int x = 0; x < width; ++x) {
         Rgb sum;
-        for (int sy = 0; sy < kSub; ++sy)
-          for (int sx = 0; sx < kSub; ++sx) {
-            const Sample& sample = band.at(kSub * x + sx, kSub * y + sy);
+        for (int sy = 0; sy < kSamples; ++sy)
+          for (int sx = 0; sx < kSamples; ++sx) {
+            const Sample& sample = band.at(kSamples * x + sx, kSamples * y + sy);
             sum += sample.nearness > 0 ? sample.light : sky;
           }
-        const Rgb mean = (1.0f / (kSub * kSub)) * sum;
+        const Rgb mean = (1.0f / (kSamples * kSamples)) * sum;
         unsigned char* pixel = &pixels[3 * (static_cast<std::size_t>(y) * columns + static_cast<std::size_t>(x))];
         pixel[0] = to_srgb(mean.r);
         pixel[1] = to_srgb(mean.g);
@@ -363,8 +377,7 @@ std::string encode_png(const std::vector<unsigned char>& pixels, int width, int 
 
 void write_preview(const std::string& path, const std::vector<Vec3>& vertices, const Csr<Index>& polygons,
                    const PreviewOptions& options) {
-  constexpr int kLargest = 16384;
-  if (options.width < 1 || options.height < 1 || options.width > kLargest || options.height > kLargest)
+  if (options.width < 1 || options.height < 1 || options.width > kLargestPicture || options.height > kLargestPicture)
     throw Error(path + ": a picture is 1 to 16384 pixels wide and high; choose another size");
   const Camera camera = aim(vertices, polygons, options);
   const Scene scene{polygons, options, camera, corner_normals(vertices, polygons), split_into_pieces(polygons),
