@@ -13,6 +13,7 @@
 #include "tree/branches.h"
 #include "tree/clusters.h"
 #include "tree/level_sections.h"
+#include "tree/loft.h"
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
 #include "tree/refine.h"

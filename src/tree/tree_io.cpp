@@ -12,6 +12,7 @@
 #include "io/bytes.h"
 #include "io/mesh_formats.h"
 #include "preview/preview.h"
+#include "tree/iges.h"
 
 namespace bisector {
 namespace {
