@@ -290,40 +290,4 @@ CvtGradient complete(CvtRun& run, bool constrained) {
   return gradient;
 }
 
-struct StateRun {
-  StateRun(Backend& backend, CvtState& given, const OptimiseOptions& options, OptimiseTotals& sums, const Context& context)
-      : state(given), totals(sums), run(backend, options.curves ? *options.curves : none, context) {
-    run.totals = totals;
-    run.seeds = PlacedSeeds(state.seeds, state.places);
-    run.normals_ = state.normals;
-  }
-  void finish() {
-    state.seeds = run.seeds.positions();
-    state.places = run.seeds.places();
-    state.moments = run.diagram().moments;
-    state.normals = run.normals_;
-    state.energy = run.energy;
-    state.gradient_norm = run.gradient_norm;
-    static_cast<RunTotals&>(totals) = run.totals;
-  }
-  FeatureCurves none;
-  CvtState& state;
-  OptimiseTotals& totals;
-  CvtRun run;
-};
-
-void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
-              const Context& context) {
-  StateRun holder(backend, state, options, totals, context);
-  optimise(holder.run, options);
-  holder.finish();
-}
-
-void complete(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals) {
-  const Context context;
-  StateRun holder(backend, state, options, totals, context);
-  complete(holder.run, options.constrained);
-  holder.finish();
-}
-
 }  // namespace bisector

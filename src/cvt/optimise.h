@@ -14,7 +14,6 @@ struct OptimiseOptions {
   bool constrained = false;    // CCVT: seeds stay on the surface, gradients in its tangent planes
   std::string phase;           // for progress
   double done = 0, share = 1;  // of the whole run: fraction before this optimisation, and its own
-  const FeatureCurves* curves = nullptr;  // for a CvtState
 };
 
 // Moves run.seeds downhill along their places. Afterwards run.energy and run.gradient_norm are theirs. Seeds on the surface or
@@ -30,19 +29,5 @@ struct CvtGradient {
 
 // The gradient at the seeds as they are. Sets run.energy and run.gradient_norm. `constrained` as in OptimiseOptions.
 CvtGradient complete(CvtRun& run, bool constrained);
-
-// What tetmesh/ still holds in place of a run.
-struct OptimiseTotals : RunTotals {};
-struct CvtState {
-  std::vector<Vec3> seeds;
-  std::vector<SeedPlace> places;
-  CellMoments moments;
-  std::vector<Vec3> normals;
-  double energy = 0;
-  double gradient_norm = 0;
-};
-void optimise(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals,
-              const Context& context);
-void complete(Backend& backend, CvtState& state, const OptimiseOptions& options, OptimiseTotals& totals);
 
 }  // namespace bisector

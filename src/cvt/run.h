@@ -64,7 +64,6 @@ class CvtRun {
  private:
   friend class Descent;
   friend struct CvtGradient complete(CvtRun& run, bool constrained);
-  friend struct StateRun;
 
   Backend* backend_;
   const FeatureCurves& curves_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "bisector/error.h"
@@ -55,11 +56,11 @@ struct Split {
   std::vector<Vec3> on_boundary, inside;
 };
 
-Split split_at_boundary(SolidBackend& solid, const std::vector<Vec3>& free) {
-  CellMoments moments;
-  solid.evaluate(free, moments);
+Split split_at_boundary(CvtRun& sites) {
+  const CellMoments& moments = sites.diagram().moments;
+  const std::vector<Vec3>& free = sites.seeds.positions();
   std::vector<Vec3> feet = free, normals;
-  project_to_cells(solid.surface(), moments.triangles, {}, feet, normals);
+  project_to_cells(sites.surface(), moments.triangles, {}, feet, normals);
   Split split;
   for (std::size_t i = 0; i < free.size(); ++i) {
     if (moments.triangles.size(i) == 0) split.inside.push_back(free[i]);
@@ -77,7 +78,7 @@ RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<S
   options.tolerance = run.options.tolerance;
   options.topology = final_pass ? TopologyControl::enforce : TopologyControl::off;
   options.min_angle = final_pass ? run.options.min_angle : 0;
-  Context quiet = run.context;
+  Context quiet = run.sites.context();
   quiet.progress = nullptr;
   RemeshResult result = remesh(run.boundary, run.features, options, quiet);
   run.seconds_boundary += watch.seconds();
@@ -86,14 +87,16 @@ RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<S
 
 // Sites inside whose cells have come to the boundary join it while that has fewer than `room`; where the solid is thin,
 // all of them. True if any did.
-bool join_boundary(CvtState& state, double room, bool thin) {
-  const auto held = std::count_if(state.places.begin(), state.places.end(),
-                                  [](const SeedPlace& place) { return place.kind != Kind::interior; });
+bool join_boundary(CvtRun& sites, double room, bool thin) {
+  const std::vector<Index> at_boundary = inner_sites_at_boundary(sites);
+  const std::span<SeedPlace> places = sites.seeds.edit_places();
+  const auto held =
+      std::count_if(places.begin(), places.end(), [](const SeedPlace& place) { return place.kind != Kind::interior; });
   double left = room - static_cast<double>(held);
   bool any = false;
-  for (const Index i : inner_sites_at_boundary(state)) {
+  for (const Index i : at_boundary) {
     if (left-- < 1 && !thin) break;
-    state.places[i] = {};
+    places[i] = {};
     any = true;
   }
   return any;
@@ -101,35 +104,30 @@ bool join_boundary(CvtState& state, double room, bool thin) {
 
 }  // namespace
 
-JointSites joint_phase(TetRun& run, const std::vector<Vec3>& free, const BoundaryShare& share) {
-  Split split = split_at_boundary(run.solid, free);
+JointReport joint_phase(TetRun& run, const BoundaryShare& share) {
+  Split split = split_at_boundary(run.sites);
   // With no more sites on the boundary than that, tetrahedra inside and at the boundary are alike, and something is
   // left inside.
   const double room = boundary_vertices(run.solid.surface(), run.sized) + share.surplus;
   const auto met = static_cast<double>(split.on_boundary.size());
-  JointSites joint;
-  joint.met_boundary = split.on_boundary.size();
-  joint.thin = share.thin || met > kThin * room;
+  const JointReport report{split.on_boundary.size(), share.thin || met > kThin * room};
   if (run.options.seeds.empty() && met > room)
     split.on_boundary =
         thinned(split.on_boundary, std::max(kFewestOnBoundary, static_cast<std::size_t>(std::llround(room))));
-  joint.state = with_boundary(remesh_boundary(run, std::move(split.on_boundary), {}, false), split.inside);
+  run.sites.seeds = with_boundary(remesh_boundary(run, std::move(split.on_boundary), {}, false), split.inside);
   for (int round = 0; round < kJointRounds; ++round) {
-    optimise_sites(run, run.solid, joint.state, "with the boundary", kJointShare / kJointRounds, true);
-    if (round + 1 < kJointRounds && !join_boundary(joint.state, room, joint.thin) && round > 0) break;
+    optimise_sites(run, "with the boundary", kJointShare / kJointRounds, true);
+    if (round + 1 < kJointRounds && !join_boundary(run.sites, room, report.thin) && round > 0) break;
   }
-  return joint;
+  return report;
 }
 
-RemeshResult finish_boundary(TetRun& run, const CvtState& sites) {
-  std::vector<Vec3> seeds;
-  std::vector<SeedPlace> places;
-  for (std::size_t i = 0; i < sites.seeds.size(); ++i) {
-    if (sites.places[i].kind == Kind::interior) continue;
-    seeds.push_back(sites.seeds[i]);
-    places.push_back(sites.places[i]);
-  }
-  RemeshResult surface = remesh_boundary(run, std::move(seeds), std::move(places), true);
+RemeshResult finish_boundary(TetRun& run) {
+  PlacedSeeds on_boundary = run.sites.seeds;
+  std::vector<char> inside(on_boundary.size(), 0);
+  for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = on_boundary.kind(i) == Kind::interior;
+  on_boundary.remove(inside);
+  RemeshResult surface = remesh_boundary(run, on_boundary.positions(), on_boundary.places(), true);
   std::size_t crossings = count_self_intersections(surface.mesh);
   // Where sheets meet at a small angle, another pass may mend what one leaves, with more vertices.
   if (crossings > 0 || !surface.topology.closed || !surface.topology.manifold) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "tetmesh/tet_run.h"
 
@@ -15,19 +14,18 @@ struct BoundaryShare {
   bool thin = false;   // the solid is thin beside the cells: what comes to the boundary finds no other place
 };
 
-struct JointSites {
-  CvtState state;             // sites on the boundary and inside
+struct JointReport {
   std::size_t met_boundary = 0;  // free sites whose cells met the boundary
-  bool thin = false;          // as asked for, or because nearly all cells met the boundary
+  bool thin = false;             // as asked for, or because nearly all cells met the boundary
 };
 
 // From free sites to sites on the boundary and inside. Of those whose cells meet the boundary at most as many are put
 // there as its edge lengths ask for, and the surplus; the others are left out, for match_count of the last phase to
 // replace them inside.
-JointSites joint_phase(TetRun& run, const std::vector<Vec3>& free, const BoundaryShare& share);
+JointReport joint_phase(TetRun& run, const BoundaryShare& share);
 
 // The finished boundary of the result: a remesh of the solid's boundary from those of the sites that are on it. Throws
 // Error if it does not bound a solid.
-RemeshResult finish_boundary(TetRun& run, const CvtState& sites);
+RemeshResult finish_boundary(TetRun& run);
 
 }  // namespace bisector

@@ -17,43 +17,34 @@ constexpr double kFinestShare = 0.2;   // on the finest of several levels, which
 // Seeds of a CVT are as dense as this power of the density, 3 / (3 + 2) in space.
 constexpr double kSeedExponent = 0.6;
 
-// The sites of the next finer level, as far as the middles of edges and the corners of cells give as many.
-std::vector<Vec3> refined(SolidBackend& backend, const std::vector<Vec3>& seeds, std::size_t count) {
-  CellMoments moments;
-  RestrictedPolygons polygons;
-  ClippedPolyhedra polyhedra;
-  backend.evaluate(seeds, moments, polygons, polyhedra);
-  return refine_sites(polyhedra, moments, seeds, count);
-}
-
 // Random sites up to `count`: all of them at first, and some where the solid is thin, whose cells have few neighbours.
-void fill_up(const Solid& solid, std::size_t count, std::uint64_t random_seed, std::vector<Vec3>& seeds) {
-  if (seeds.size() >= count) return;
+void fill_up(const Solid& solid, std::size_t count, std::uint64_t random_seed, std::vector<Vec3>& sites) {
+  if (sites.size() >= count) return;
   std::vector<double> weight = solid.density;
   for (double& rho : weight) rho = std::pow(rho, kSeedExponent);
-  const std::vector<Vec3> more = sample_solid(solid.mesh, count - seeds.size(), random_seed, weight);
-  seeds.insert(seeds.end(), more.begin(), more.end());
+  const std::vector<Vec3> more = sample_solid(solid.mesh, count - sites.size(), random_seed, weight);
+  sites.insert(sites.end(), more.begin(), more.end());
 }
 
 }  // namespace
 
-std::vector<Vec3> free_phase(TetRun& run, StandIns& stand_ins) {
+void free_phase(TetRun& run, StandIns& stand_ins) {
   const TetOptions& options = run.options;
   const std::vector<std::size_t> counts =
       options.seeds.empty() ? tet_level_counts(run.wanted) : std::vector<std::size_t>{options.seeds.size()};
-  std::vector<Vec3> seeds = options.seeds;
+  std::vector<Vec3> sites = options.seeds;
   for (std::size_t level = 0; level < counts.size(); ++level) {
     SolidBackend* const stand_in = stand_ins.choose(counts[level], counts.back(), run.solid);
-    SolidBackend& backend = stand_in ? *stand_in : run.solid;
-    if (level > 0) seeds = refined(backend, seeds, counts[level]);
-    fill_up(backend.solid(), counts[level], options.random_seed + level, seeds);
-    CvtState state = inner_sites(std::move(seeds));
+    SolidBackend& solid = stand_in ? *stand_in : run.solid;
+    run.sites.change_backend(solid);
+    if (level > 0) sites = refine_sites(run.sites.diagram(Want::polyhedra), run.sites.seeds.positions(), counts[level]);
+    fill_up(solid.solid(), counts[level], options.random_seed + level, sites);
+    run.sites.seeds = PlacedSeeds(std::move(sites), {SeedPlace::Kind::interior});
     const bool finest = level > 0 && level + 1 == counts.size();
-    optimise_sites(run, backend, state, counts.size() > 1 ? fmt::format("free, level {}/{}", level + 1, counts.size()) : "free",
+    optimise_sites(run, counts.size() > 1 ? fmt::format("free, level {}/{}", level + 1, counts.size()) : "free",
                    finest ? kFinestShare : kLevelShare, false);
-    seeds = std::move(state.seeds);
   }
-  return seeds;
+  run.sites.change_backend(run.solid);
 }
 
 }  // namespace bisector

@@ -36,8 +36,9 @@ std::vector<std::size_t> tet_level_counts(std::size_t count) {
   return counts;
 }
 
-std::vector<Vec3> far_corners(const ClippedPolyhedra& polyhedra, const CellMoments& moments, const std::vector<Vec3>& seeds,
-                              std::size_t count) {
+std::vector<Vec3> far_corners(const Diagram& diagram, const std::vector<Vec3>& seeds, std::size_t count) {
+  const ClippedPolyhedra& polyhedra = diagram.polyhedra;
+  const std::vector<Moments>& cells = diagram.moments.cells;
   std::vector<double> squared(seeds.size(), -1);
   std::vector<Vec3> corner(seeds.size());
   for (std::size_t k = 0; k < polyhedra.pairs.size(); ++k) {
@@ -53,7 +54,7 @@ std::vector<Vec3> far_corners(const ClippedPolyhedra& polyhedra, const CellMomen
   std::vector<Index> order(seeds.size());
   std::iota(order.begin(), order.end(), Index{0});
   std::stable_sort(order.begin(), order.end(),
-                   [&](Index a, Index b) { return moments.cells[a].second > moments.cells[b].second; });
+                   [&](Index a, Index b) { return cells[a].second > cells[b].second; });
   const std::vector<std::array<Index, 2>> edges = dual_edges(polyhedra);
   const Csr<Index> around = group_into_rows<Index>(seeds.size(), [&](const auto& put) {
     for (const auto& [a, b] : edges) {
@@ -79,10 +80,9 @@ std::vector<Vec3> far_corners(const ClippedPolyhedra& polyhedra, const CellMomen
   return points;
 }
 
-std::vector<Vec3> refine_sites(const ClippedPolyhedra& polyhedra, const CellMoments& moments, const std::vector<Vec3>& seeds,
-                               std::size_t count) {
+std::vector<Vec3> refine_sites(const Diagram& diagram, const std::vector<Vec3>& seeds, std::size_t count) {
   std::vector<Vec3> finer = seeds;
-  std::vector<std::array<Index, 2>> edges = dual_edges(polyhedra);
+  std::vector<std::array<Index, 2>> edges = dual_edges(diagram.polyhedra);
   const std::size_t room = count > finer.size() ? count - finer.size() : 0;
   if (edges.size() > room) {
     std::stable_sort(edges.begin(), edges.end(), [&](const std::array<Index, 2>& e, const std::array<Index, 2>& f) {
@@ -92,7 +92,7 @@ std::vector<Vec3> refine_sites(const ClippedPolyhedra& polyhedra, const CellMome
   }
   for (const auto& [a, b] : edges) finer.push_back(0.5 * (seeds[a] + seeds[b]));
   if (finer.size() < count) {
-    const std::vector<Vec3> more = far_corners(polyhedra, moments, seeds, count - finer.size());
+    const std::vector<Vec3> more = far_corners(diagram, seeds, count - finer.size());
     finer.insert(finer.end(), more.begin(), more.end());
   }
   return finer;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/geometry.h"
-#include "voronoi/clipped.h"
+#include "voronoi/diagram.h"
 
 namespace bisector {
 
@@ -20,11 +20,9 @@ std::vector<std::size_t> tet_level_counts(std::size_t count);
 
 // The seeds and the middles of their dual edges, those of the longest edges if that is too many for `count`; if it is
 // too few, also corners of cells that are far from their seeds, cells of the highest energy first.
-std::vector<Vec3> refine_sites(const ClippedPolyhedra& polyhedra, const CellMoments& moments, const std::vector<Vec3>& seeds,
-                               std::size_t count);
+std::vector<Vec3> refine_sites(const Diagram& diagram, const std::vector<Vec3>& seeds, std::size_t count);
 
 // Up to `count` points to insert, as above, no two from neighbouring cells before every cell had its turn.
-std::vector<Vec3> far_corners(const ClippedPolyhedra& polyhedra, const CellMoments& moments, const std::vector<Vec3>& seeds,
-                              std::size_t count);
+std::vector<Vec3> far_corners(const Diagram& diagram, const std::vector<Vec3>& seeds, std::size_t count);
 
 }  // namespace bisector

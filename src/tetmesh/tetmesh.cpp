@@ -46,44 +46,41 @@ void check_options(const TetOptions& options) {
     throw Error(fmt::format("a tetrahedral mesh needs at least {} vertices; ask for more", kFewest));
 }
 
-// Sites in a solid with those of its finished boundary.
-struct PlacedSites {
+// The finished boundary, whose vertices are the first of the run's sites.
+struct FinishedBoundary {
   RemeshResult surface;
-  CvtState state;  // the surface's vertices, then the sites inside
-  std::size_t met_boundary = 0;
-  bool thin = false;
-
-  std::size_t count() const { return state.seeds.size(); }
+  JointReport joint;
 };
 
-PlacedSites place_sites(TetRun& run, const std::vector<Vec3>& free, const BoundaryShare& share) {
-  PlacedSites placed;
-  const JointSites joint = joint_phase(run, free, share);
-  placed.met_boundary = joint.met_boundary;
-  placed.thin = joint.thin;
-  placed.surface = finish_boundary(run, joint.state);
-  placed.state = inner_phase(run, placed.surface, inner_seeds(joint.state));
-  return placed;
+// From free sites to those of the finished boundary and inside it.
+FinishedBoundary place_sites(TetRun& run, const BoundaryShare& share) {
+  FinishedBoundary finished;
+  finished.joint = joint_phase(run, share);
+  finished.surface = finish_boundary(run);
+  inner_phase(run, finished.surface);
+  return finished;
 }
 
-PlacedSites place_enough_sites(TetRun& run, StandIns& stand_ins) {
-  const std::vector<Vec3> free = free_phase(run, stand_ins);
+// If that leaves too few sites, there is no room inside for what the boundary did not take: it is done again from the free
+// sites, and the boundary takes more.
+FinishedBoundary place_enough_sites(TetRun& run) {
+  const PlacedSeeds free = run.sites.seeds;
   const double done = run.done;
-  PlacedSites placed = place_sites(run, free, {});
-  if (static_cast<double>(placed.count()) >= kEnough * static_cast<double>(run.wanted) || placed.thin) return placed;
-  // There is no room inside for what the boundary did not take.
-  const double surplus = static_cast<double>(run.wanted) - static_cast<double>(placed.count());
+  FinishedBoundary finished = place_sites(run, {});
+  const auto count = static_cast<double>(run.sites.seeds.size()), wanted = static_cast<double>(run.wanted);
+  if (count >= kEnough * wanted || finished.joint.thin) return finished;
+  run.sites.seeds = free;
   run.done = done;
-  return place_sites(run, free, {surplus, true});
+  return place_sites(run, {wanted - count, true});
 }
 
-void extract(const TetRun& run, const PlacedSites& placed, TetResult& result) {
+void extract(const CvtRun& sites, const TriangleMesh& boundary, TetResult& result) {
   const Stopwatch watch;
-  const std::size_t count = placed.surface.mesh.vertices.size();
-  const std::vector<Vec3>& seeds = placed.state.seeds;
+  const std::size_t count = boundary.vertices.size();
+  const std::vector<Vec3>& seeds = sites.seeds.positions();
   const std::vector<Vec3> inside(seeds.begin() + static_cast<std::ptrdiff_t>(count), seeds.end());
-  run.context.report({"extracting", 0, 1, placed.state.energy, placed.state.gradient_norm, kPlaced});
-  ConformingTets tets = conforming_tets(placed.surface.mesh, inside, {}, run.context);
+  sites.context().report({"extracting", 0, 1, sites.energy, sites.gradient_norm, kPlaced});
+  ConformingTets tets = conforming_tets(boundary, inside, {}, sites.context());
   result.mesh = std::move(tets.mesh);
   result.delaunay = tets.delaunay;
   result.steiner_points = tets.steiner_points;
@@ -92,26 +89,23 @@ void extract(const TetRun& run, const PlacedSites& placed, TetResult& result) {
   result.seconds.extract = watch.seconds();
 }
 
-void remove_slivers(const TetRun& run, const CvtState& state, TetResult& result) {
+void remove_slivers(const CvtRun& sites, double min_dihedral, TetResult& result) {
   const Stopwatch watch;
-  if (run.options.min_dihedral > 0) {
+  if (min_dihedral > 0) {
     TetImproveOptions improve;
-    improve.insert_below = run.options.min_dihedral;
-    improve.goal = run.options.min_dihedral + kGoalBeyond;
-    run.context.report({"improving", 0, 1, state.energy, state.gradient_norm, kExtracted});
-    TetImproveResult improved = improve_tets(result.mesh, improve, run.context);
+    improve.insert_below = min_dihedral;
+    improve.goal = min_dihedral + kGoalBeyond;
+    sites.context().report({"improving", 0, 1, sites.energy, sites.gradient_norm, kExtracted});
+    TetImproveResult improved = improve_tets(result.mesh, improve, sites.context());
     result.mesh = std::move(improved.mesh);
     result.improved = std::move(improved.report);
   }
   result.seconds.improve = watch.seconds();
 }
 
-std::size_t count_untiled(SolidBackend& backend, const std::vector<Vec3>& seeds) {
-  CellMoments moments;
-  RestrictedPolygons polygons;
-  ClippedPolyhedra polyhedra;
-  backend.evaluate(seeds, moments, polygons, polyhedra);
-  return count_untiled(backend.solid(), polyhedra) + count_untiled(backend.surface(), polygons);
+std::size_t count_untiled(TetRun& run) {
+  const Diagram& diagram = run.sites.diagram(Want::polygons | Want::polyhedra);
+  return count_untiled(run.solid.solid(), diagram.polyhedra) + count_untiled(run.solid.surface(), diagram.polygons);
 }
 
 TetResult mesh_sized(TetRun& run, StandIns& stand_ins) {
@@ -121,22 +115,24 @@ TetResult mesh_sized(TetRun& run, StandIns& stand_ins) {
   result.volume = run.solid.solid().volume;
   const TriangleMesh& surface = run.solid.surface().mesh;
   result.input_topology = analyse_topology(surface.triangles, surface.vertices.size());
-  PlacedSites placed = place_enough_sites(run, stand_ins);
-  extract(run, placed, result);
-  remove_slivers(run, placed.state, result);
-  result.untiled = count_untiled(run.solid, placed.state.seeds);
-  result.boundary = std::move(placed.surface);
+  free_phase(run, stand_ins);
+  FinishedBoundary finished = place_enough_sites(run);
+  extract(run.sites, finished.surface.mesh, result);
+  remove_slivers(run.sites, run.options.min_dihedral, result);
+  result.certification = run.sites.certification();
+  result.untiled = count_untiled(run);
+  result.boundary = std::move(finished.surface);
   result.boundary.mesh = {};
-  result.boundary_sites = placed.met_boundary;
-  result.iterations = run.totals.iterations;
-  result.evaluations = run.totals.evaluations;
-  result.energy = placed.state.energy;
-  result.gradient_norm = placed.state.gradient_norm;
-  result.certification = placed.state.moments.certification;
+  result.boundary_sites = finished.joint.met_boundary;
+  const RunTotals& totals = run.sites.totals;
+  result.iterations = totals.iterations;
+  result.evaluations = totals.evaluations;
+  result.energy = run.sites.energy;
+  result.gradient_norm = run.sites.gradient_norm;
   result.device = run.solid.description();
   result.seconds.boundary = run.seconds_boundary;
-  result.seconds.lbfgs = run.totals.seconds_lbfgs;
-  result.seconds.diagrams = run.totals.seconds;
+  result.seconds.lbfgs = totals.seconds_lbfgs;
+  result.seconds.diagrams = totals.seconds;
   return result;
 }
 
@@ -221,7 +217,7 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   StandIns stand_ins(mesh, surface, *boundary_backend, features, options, context);
   const FeatureCurves curves(features, solid.mesh.vertices);
   const std::size_t wanted = options.seeds.empty() ? sized.vertices : options.seeds.size();
-  TetRun run{*backend, *boundary_backend, features, curves, sized, options, context, wanted};
+  TetRun run{CvtRun(*backend, curves, context), *backend, *boundary_backend, features, sized, options, wanted};
   TetResult result = mesh_sized(run, stand_ins);
   set_regions(sized.mesh, result.mesh);
   result.background_tets = sized.mesh.tets.size();
