@@ -57,7 +57,7 @@ void run(Options options) {
       const ThreadLimit limit(options.remesh.threads);
       const Surface surface(mesh);
       const auto backend = make_device_backend(surface, options.device, NeighbourSource::nearest);
-      s.last = remesh(*backend, {}, options.remesh);
+      s.last = remesh(*backend, {}, plan_of(options.remesh));
       s.total.push_back(watch.seconds());
       const double after = delaunay_seconds(seeds);
       const DiagramSeconds& phases = s.last.seconds.diagrams;

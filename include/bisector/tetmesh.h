@@ -12,7 +12,7 @@
 #include "bisector/features.h"
 #include "bisector/mesh.h"
 #include "bisector/quality.h"
-#include "remesh/remesh.h"
+#include "bisector/remesh.h"
 
 namespace bisector {
 

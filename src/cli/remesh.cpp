@@ -15,7 +15,7 @@
 #include "inputs.h"
 #include "options.h"
 #include "outputs.h"
-#include "remesh/remesh.h"
+#include "bisector/remesh.h"
 #include "report.h"
 #include "summary.h"
 #include "words.h"

@@ -9,7 +9,7 @@
 #include "core/geometry.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "remesh/remesh.h"
+#include "bisector/remesh.h"
 
 namespace bisector::cli {
 

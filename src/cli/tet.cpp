@@ -23,6 +23,7 @@
 #include "mesh/tet_topology.h"
 #include "options.h"
 #include "outputs.h"
+#include "remesh/topology_control.h"
 #include "report.h"
 #include "summary.h"
 

@@ -5,7 +5,7 @@
 #include "bisector/segment.h"
 #include "bisector/tree.h"
 #include "core/words.h"
-#include "remesh/remesh.h"
+#include "bisector/remesh.h"
 
 namespace bisector::cli {
 

@@ -16,20 +16,23 @@ namespace {
 
 using Kind = SeedPlace::Kind;
 
-constexpr int kRelocatingRounds = 3;  // the first, which keep to the number of seeds that a curve should have
-constexpr int kMovingRounds = 8;      // with an optimisation after each
-constexpr int kInsertingRounds = 20;  // after these
-constexpr int kClearingRounds = 4, kClearingSteps = 15;
-constexpr std::size_t kMostAdded = 100;  // and a quarter of the seeds
+// Rounds of mending. The first keep to the number of seeds that a curve should have; all of kMovingRounds end with an
+// optimisation, of kFirstSteps in the first to kLastSteps in the last; kInsertingRounds follow in which nothing moves.
+constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
 constexpr int kFirstSteps = 20, kLastSteps = 4;
-constexpr double kRoomToSnap = 0.4;   // length of curve that a cell must hold to be snapped to it, in edges
-constexpr double kSmallest = 0.05;    // length of curve, in edges, that is worth a seed
-constexpr double kTiniest = 0.002;    // the same in the last rounds
-constexpr double kShortLink = 0.5;    // edges along a curve that are shorter are not divided
-constexpr double kAcute = 0.8;        // gap of two curves from the same corner, in edges, that calls for protection
-constexpr double kLeastStep = 0.3;    // between shells, in edges
+// Rounds of clearing curves at the end of a level, and steps after each.
+constexpr int kClearingRounds = 4, kClearingSteps = 15;
+// Seeds that recovery may add, beside a quarter of those there are.
+constexpr std::size_t kMostAdded = 100;
+// Lengths of curve, in edges: what a cell must hold to be snapped to it; what is worth a seed, and in the last rounds;
+// and links along a curve that are shorter are not divided.
+constexpr double kRoomToSnap = 0.4, kSmallest = 0.05, kTiniest = 0.002, kShortLink = 0.5;
+// Two curves from the same corner need protection where they are nearer than this, in edges; the shells of protecting seeds
+// are at least kLeastStep edges apart, and so many at most.
+constexpr double kAcute = 0.8, kLeastStep = 0.3;
 constexpr std::size_t kMostShells = 1000;
-constexpr double kPush = 0.3;         // of its distance, for cells that hold less
+// A cell that holds less is pushed away from the curve by this share of its seed's distance.
+constexpr double kPush = 0.3;
 
 struct Fault {
   Index curve;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bisector/context.h"
+#include "bisector/remesh.h"
 #include "core/geometry.h"
 
 namespace bisector {
@@ -21,18 +22,6 @@ struct FitOptions {
   // triangles near its smallest.
   std::optional<double> min_angle, min_quality;
   double done = 0, share = 1;      // for progress: fraction of the whole run before the fit, and its own
-};
-
-struct FitReport {
-  // Root mean squares over area, in percent of the diagonal of the reference's bounding box, as the fit's own samples
-  // see them: after the fit a little less than what others measure. The sum of the two squares never rises.
-  struct Distance {
-    double to_reference = 0, from_reference = 0;
-  };
-  Distance before, after;
-  int iterations = 0;         // steps taken
-  std::size_t damped = 0;     // vertices that the quality of a triangle held back in the last step
-  std::size_t restored = 0;   // vertices put back because triangles would have intersected
 };
 
 // Minimises the two-sided mean squared distance between mesh and reference over the vertices, by alternation: fixed

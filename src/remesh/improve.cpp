@@ -17,20 +17,29 @@ namespace {
 
 using Kind = SeedPlace::Kind;
 
+// Rounds of changes, in each of the two aims: better triangles, and the number of seeds that is wanted.
 constexpr int kBatches = 10;
-constexpr int kSweeps = 3, kMoreSweeps = 6;  // of a patch: of all trials, and of the best
-constexpr int kSmoothingSweeps = 6;          // of the whole
-constexpr double kHold = 20;                 // of seeds, where all are relaxed: what keeps cells of equal size
-constexpr std::size_t kRings = 2;            // of free seeds around the middle of a patch
-constexpr double kPoor = 1.5;                // cost of a seed's triangles beside the average that makes it poor
-constexpr std::size_t kPoorTried = 30;       // such seeds are tried: this many, and one in kPoorShare
-constexpr std::size_t kPoorShare = 30;
-constexpr double kIrregular = 10;            // average costs, for each triangle at a seed beyond or short of six
-constexpr double kHope = 4;                  // average costs that a trial may be worse by after the first sweeps
-constexpr double kPrice = 20;                // average costs that the right count may take, per seed
-constexpr std::size_t kFlips = 2;            // tried per patch
-constexpr std::size_t kTriesToRestore = 8;   // patches per seed that is missing or too many
-constexpr double kDrift = 0.005;             // of the count, that it may be off on the way
+// Sweeps of relaxation over a patch for every trial, and again for the best trial.
+constexpr int kSweeps = 3, kMoreSweeps = 6;
+// Sweeps over all seeds, and the weight that then holds each seed near its place, which keeps cells of equal size.
+constexpr int kSmoothingSweeps = 6;
+constexpr double kTether = 20;
+// A patch reaches so many edges from its middle.
+constexpr std::size_t kRings = 2;
+// A seed is poor if its triangles cost this many times the average. Of poor seeds that meet the goal kPoorTried are tried, and one
+// in kPoorShare of all.
+constexpr double kPoor = 1.5;
+constexpr std::size_t kPoorTried = 30, kPoorShare = 30;
+// In average costs of a triangle: the price of each triangle at a seed beyond or short of six; by how much a trial may be
+// worse after the first sweeps; and what the right number of seeds may cost, per seed.
+constexpr double kIrregular = 10, kTrialSlack = 4, kPrice = 20;
+// Edge flips that are tried per patch.
+constexpr std::size_t kFlips = 2;
+// Patches that are tried for each seed that is missing or too many, and the share of the number of seeds by which it may be
+// off on the way.
+constexpr std::size_t kTriesToRestore = 8;
+constexpr double kDrift = 0.005;
+// Diagrams that are computed to find out which changes hold together.
 constexpr int kReverts = 4;
 
 enum class Star : unsigned char { disk, fan, other };
@@ -68,7 +77,7 @@ Csr<Index> stars_of(const Dual& dual, std::size_t seeds) {
 }
 
 // The neighbours of a seed, each once, and whether its triangles make a disk around it or a fan.
-Star look_around(const Dual& dual, const Csr<Index>& stars, Index v, std::vector<Index>& ring) {
+Star ring_and_kind(const Dual& dual, const Csr<Index>& stars, Index v, std::vector<Index>& ring) {
   ring.clear();
   std::vector<std::array<Index, 2>> links;
   bool simple = stars.size(v) > 0;
@@ -201,7 +210,7 @@ void Improver::measure(Snapshot& s) {
   s.stars = stars_of(dual, n);
   s.kinds.resize(n);
   std::vector<std::vector<Index>> rings(n);
-  parallel_each(n, [&](std::size_t v) { s.kinds[v] = look_around(dual, s.stars, static_cast<Index>(v), rings[v]); });
+  parallel_each(n, [&](std::size_t v) { s.kinds[v] = ring_and_kind(dual, s.stars, static_cast<Index>(v), rings[v]); });
   s.rings = {};
   for (const std::vector<Index>& ring : rings) {
     s.rings.values.insert(s.rings.values.end(), ring.begin(), ring.end());
@@ -297,7 +306,7 @@ Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::siz
   change.footprint = seeds_around(middle);
   const ImprovePatch start = patch_of(change.footprint, map);
   const double before = start.cost(now_.average, irregular_price());
-  double least = aim == Aim::better ? before + kHope * now_.average : std::numeric_limits<double>::infinity();
+  double least = aim == Aim::better ? before + kTrialSlack * now_.average : std::numeric_limits<double>::infinity();
   std::optional<ImprovePatch> best;
   const auto attempt = [&](const auto& operation) {
     ImprovePatch patch = start;
@@ -556,7 +565,7 @@ void Improver::smooth() {
   for (int sweep = 0; sweep < kSmoothingSweeps; ++sweep) {
     run_.context().check();
     for (const std::vector<Index>& seeds : classes)
-      parallel_each(seeds.size(), [&](std::size_t k) { all.relax(seeds[k], kHold); }, 256);
+      parallel_each(seeds.size(), [&](std::size_t k) { all.relax(seeds[k], kTether); }, 256);
   }
 
   std::vector<char> back(n, 0);

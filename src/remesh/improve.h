@@ -6,6 +6,7 @@
 // none of them is worse than the worst before unless it meets the goal, and topology and feature curves are as before.
 #pragma once
 
+#include "bisector/remesh.h"
 #include "cvt/optimise.h"
 #include "remesh/feature_trace.h"
 
@@ -15,13 +16,6 @@ struct ImproveOptions {
   // Degrees. The goal, which is not reached everywhere. The largest angle leaves room for right-angled corners of features.
   double min_angle = 40, max_angle = 91;
   std::size_t vertices = 0;  // wanted; 0: as many as there are
-};
-
-struct ImproveReport {
-  std::size_t trials = 0;                 // changes that were tried on a patch
-  std::size_t made = 0;                   // that stayed, of a patch each
-  std::size_t inserted = 0, removed = 0;  // seeds, by those
-  std::size_t missed = 0;                 // triangles of the result with an angle beyond the goal
 };
 
 // The seeds must lie on the surface, and `trace` must be that of run.curves(); afterwards run.energy and run.gradient_norm are

@@ -10,6 +10,7 @@
 #include "bisector/repair.h"
 #include "features/normals.h"
 #include "mesh/topology.h"
+#include "remesh/sizing.h"
 
 namespace bisector {
 namespace {

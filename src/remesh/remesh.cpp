@@ -17,8 +17,11 @@
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
 #include "remesh/feature_recovery.h"
+#include "remesh/fit.h"
+#include "remesh/improve.h"
 #include "remesh/prepare.h"
 #include "remesh/sheets.h"
+#include "remesh/topology_control.h"
 #include "voronoi/dual.h"
 #include "voronoi/tiling.h"
 
@@ -40,29 +43,30 @@ double steps_share(std::size_t level, std::size_t levels) {
 
 int share_of(int iterations, double share) { return static_cast<int>(std::ceil(iterations * share)); }
 
-void check_options(const RemeshOptions& options) {
-  if (!options.places.empty() && options.places.size() != options.seeds.size())
-    throw Error(fmt::format("there are {} places for {} seeds; give one for each", options.places.size(), options.seeds.size()));
-  if (!options.seeds.empty()) {
-    if (options.seeds.size() < 4) throw Error("a remeshed surface needs at least 4 seeds; give more");
-    return;
-  }
-  if ((options.vertices > 0) == (options.edge_length > 0))
-    throw Error("ask for a number of vertices or for an edge length, and not for both");
-  if (options.edge_length == 0 && options.vertices < 4)
+void check_plan(const RemeshPlan& plan) {
+  if (!plan.places.empty() && plan.places.size() != plan.seeds.size())
+    throw Error(
+        fmt::format("there are {} places for {} seeds; give one for each", plan.places.size(), plan.seeds.size()));
+  if (!plan.seeds.empty() && plan.seeds.size() < 4) throw Error("a remeshed surface needs at least 4 seeds; give more");
+  if (plan.seeds.empty() && plan.vertices < 4)
     throw Error("a remeshed surface needs at least 4 vertices; ask for more");
+}
+
+void check_options(const RemeshOptions& options) {
+  if (options.seeds.empty() && (options.vertices > 0) == (options.edge_length > 0))
+    throw Error("ask for a number of vertices or for an edge length, and not for both");
+  if (options.edge_length == 0 || !options.seeds.empty()) check_plan(plan_of(options));
 }
 
 // Seeds level by level, coarse to fine, those on features moving along them from the first; then what makes a good mesh of
 // their dual.
 class Pipeline {
  public:
-  Pipeline(Backend& backend, const FeatureGraph& features, const RemeshOptions& options, const Context& context)
-      : surface_(backend.surface()), options_(options), curves_(features, surface_.mesh.vertices),
+  Pipeline(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context)
+      : surface_(backend.surface()), plan_(plan), curves_(features, surface_.mesh.vertices),
         measure_(surface_, curves_), trace_(surface_, curves_),
-        wanted_(options.seeds.empty() ? options.vertices : options.seeds.size()),
-        constrained_(options.energy != Energy::restricted), run_(backend, curves_, context) {
-    step_.tolerance = options.tolerance;
+        wanted_(plan.seeds.empty() ? plan.vertices : plan.seeds.size()), run_(backend, curves_, context) {
+    step_.tolerance = plan.tolerance;
     step_.share = 0;
   }
 
@@ -93,12 +97,11 @@ class Pipeline {
   void fit();
 
   const Surface& surface_;
-  const RemeshOptions& options_;
+  const RemeshPlan& plan_;
   const FeatureCurves curves_;
   const CurveMeasure measure_;
   const FeatureTrace trace_;
   const std::size_t wanted_;
-  const bool constrained_;
   CvtRun run_;
   OptimiseOptions step_;
   FeatureReport features_;
@@ -108,9 +111,9 @@ class Pipeline {
 
 // The coarsest level must have seeds left beside its features.
 std::vector<std::size_t> Pipeline::choose_levels() const {
-  if (!options_.seeds.empty()) return {wanted_};
+  if (!plan_.seeds.empty()) return {wanted_};
   std::vector<std::size_t> counts =
-      level_counts(wanted_, result_.input_topology.euler, result_.input_topology.components, options_.levels);
+      level_counts(wanted_, result_.input_topology.euler, result_.input_topology.components, plan_.levels);
   const auto crowded = [&](std::size_t count) {
     return 2 * seeds_on_features(curves_, measure_, measure_.scale(count)).size() > count;
   };
@@ -138,30 +141,30 @@ void Pipeline::to_next_level(std::size_t count) {
 
 void Pipeline::optimise_levels() {
   const std::vector<std::size_t> counts = choose_levels();
-  if (!options_.places.empty()) {
-    run_.seeds = PlacedSeeds(options_.seeds, options_.places);
+  if (!plan_.places.empty()) {
+    run_.seeds = PlacedSeeds(plan_.seeds, plan_.places);
   } else {
-    run_.seeds = PlacedSeeds(options_.seeds.empty() ? initial_seeds(surface_, counts.front(), options_.random_seed)
-                                                    : options_.seeds);
+    run_.seeds = PlacedSeeds(plan_.seeds.empty() ? initial_seeds(surface_, counts.front(), plan_.random_seed)
+                                                    : plan_.seeds);
     place_on_features(counts.front());
   }
 
   // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
-  double total = constrained_ ? kConstrainedShare * cost(counts.back()) : 0;
+  double total = plan_.constrained ? kConstrainedShare * cost(counts.back()) : 0;
   for (std::size_t level = 0; level < counts.size(); ++level) total += steps_share(level, counts.size()) * cost(counts[level]);
   for (std::size_t level = 0; level < counts.size(); ++level) {
     step_.phase = counts.size() > 1 ? fmt::format("level {}/{}", level + 1, counts.size()) : "optimising";
     const double share = steps_share(level, counts.size());
-    step_.iterations = share_of(options_.iterations, share);
+    step_.iterations = share_of(plan_.iterations, share);
     step_.done += std::exchange(step_.share, share * cost(counts[level]) / total);
     optimise(run_, step_);
     if (run_.has_features()) clear_features(run_, trace_, measure_, step_);
     if (level + 1 < counts.size()) to_next_level(counts[level + 1]);
   }
-  if (constrained_) {
+  if (plan_.constrained) {
     step_.constrained = true;
     step_.phase = "on the surface";
-    step_.iterations = share_of(options_.iterations, kConstrainedShare);
+    step_.iterations = share_of(plan_.iterations, kConstrainedShare);
     step_.done += std::exchange(step_.share, kConstrainedShare * cost(counts.back()) / total);
     optimise(run_, step_);
   }
@@ -171,7 +174,7 @@ void Pipeline::optimise_levels() {
 
 // Folds of a rough surface give cells pieces that leave no trace in the dual.
 bool Pipeline::dual_suffices() {
-  if (constrained_) return false;
+  if (plan_.constrained) return false;
   std::vector<Triangle> dual = run_.diagram(Want::polygons | Want::dual).dual.triangles;
   orient(dual, run_.seeds.size());
   return same_topology(analyse_topology(dual, run_.seeds.size()), result_.input_topology);
@@ -211,7 +214,7 @@ void Pipeline::mend_features() {
 void Pipeline::mend_features_and_topology() {
   for (int round = 0; round < kMendingRounds; ++round) {
     if (run_.has_features()) mend_features();
-    if (options_.topology != TopologyControl::enforce || dual_suffices()) return;
+    if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
     topology_ = enforce_topology(run_, result_.input_topology, step_);
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
@@ -243,10 +246,10 @@ void Pipeline::improve_quality() {
   const Stopwatch watch;
   const bool held = !topology_.sheets.empty() && divide_sheets().ball.holds;
   const PlacedSeeds before = run_.seeds;
-  result_.improved = improve(run_, trace_, {options_.min_angle, kMaxAngle, wanted_});
+  result_.improved = improve(run_, trace_, {plan_.min_angle, kMaxAngle, wanted_});
   if (held && !divide_sheets().ball.holds) {
     run_.seeds = before;
-    complete(run_, constrained_);
+    complete(run_, plan_.constrained);
     result_.improved = {};
   }
   result_.seconds.improve = watch.seconds();
@@ -301,7 +304,7 @@ void Pipeline::fit() {
   for (const auto& edge : result_.mesh.feature_edges)
     for (Index v : edge) fit.fixed[v] = 1;
   const QualityReport quality = measure_quality(result_.mesh);
-  fit.min_angle = std::min(quality.theta_min, options_.min_angle);
+  fit.min_angle = std::min(quality.theta_min, plan_.min_angle);
   fit.min_quality = std::min(quality.q_min, kFitQuality);
   result_.fitted = fit_to_surface(surface_.mesh, result_.mesh, fit, run_.context());
   result_.seconds.fit = watch.seconds();
@@ -313,10 +316,10 @@ RemeshResult Pipeline::run() {
   result_.input_topology = analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size());
   optimise_levels();
   mend_features_and_topology();
-  if (run_.has_features()) complete(run_, constrained_);
-  if (options_.min_angle > 0 && constrained_) improve_quality();
+  if (run_.has_features()) complete(run_, plan_.constrained);
+  if (plan_.min_angle > 0 && plan_.constrained) improve_quality();
   extract();
-  if (options_.fit) fit();
+  if (plan_.fit) fit();
   result_.iterations = run_.totals.iterations;
   result_.evaluations = run_.totals.evaluations;
   result_.energy = run_.energy;
@@ -331,20 +334,34 @@ RemeshResult Pipeline::run() {
 
 }  // namespace
 
+RemeshPlan plan_of(const RemeshOptions& options) {
+  RemeshPlan plan;
+  plan.vertices = options.vertices;
+  plan.seeds = options.seeds;
+  plan.random_seed = options.random_seed;
+  plan.iterations = options.iterations;
+  plan.tolerance = options.tolerance;
+  plan.levels = options.levels;
+  plan.constrained = options.energy != Energy::restricted;
+  plan.topology = options.topology;
+  plan.min_angle = options.min_angle;
+  plan.fit = options.fit;
+  return plan;
+}
+
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
   const Stopwatch watch;
   check_options(options);
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   PreparedInput prepared = prepare(input, options, context);
-  RemeshOptions counted = options;
-  counted.vertices = prepared.vertices;
-  counted.edge_length = 0;
-  if (prepared.noisy) counted.energy = Energy::restricted;
+  RemeshPlan plan = plan_of(options);
+  plan.vertices = prepared.vertices;
+  if (prepared.noisy) plan.constrained = false;
   const Surface surface(std::move(prepared.mesh), std::move(prepared.density));
   const double preparing = watch.seconds();
   const std::unique_ptr<Backend> backend = make_backend(surface, options.compute, context);
-  RemeshResult result = remesh(*backend, prepared.features, counted, context);
+  RemeshResult result = remesh(*backend, prepared.features, plan, context);
   result.welded = std::move(prepared.welded);
   result.edge_length = prepared.unit_edge;
   result.noisy = prepared.noisy;
@@ -353,11 +370,9 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   return result;
 }
 
-RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshOptions& options, const Context& context) {
-  check_options(options);
-  std::optional<ThreadLimit> limit;
-  if (options.threads) limit.emplace(options.threads);
-  return Pipeline(backend, features, options, context).run();
+RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context) {
+  check_plan(plan);
+  return Pipeline(backend, features, plan, context).run();
 }
 
 }  // namespace bisector

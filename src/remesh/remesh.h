@@ -1,112 +1,34 @@
-// Isotropic surface remeshing by centroidal Voronoi tessellation (thesis, chapter 4).
+// Remeshing the surface of a backend (bisector/remesh.h is what users call).
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <optional>
-#include <string>
 #include <vector>
 
-#include "bisector/context.h"
-#include "bisector/features.h"
-#include "bisector/quality.h"
-#include "bisector/repair.h"
-#include "compute/compute.h"
-#include "core/geometry.h"
-#include "mesh/topology.h"
-#include "remesh/fit.h"
-#include "remesh/improve.h"
-#include "remesh/sizing.h"
-#include "remesh/topology_control.h"
-#include "voronoi/restricted.h"
+#include "backend/backend.h"
+#include "bisector/remesh.h"
 
 namespace bisector {
 
-enum class TopologyControl {
-  enforce,  // move seeds to where the dual is not the surface's topologically, or add some, and optimise again
-  check,    // report only
-  off,
-};
-
-enum class Energy {
-  automatic,    // constrained, but restricted where the input's normals are noise (mesh/normals.h); creases are then not
-                // looked for, and a dual that is a manifold like the input is not asked for the ball property
-  constrained,  // seeds end on the surface (CCVT)
-  restricted,   // seeds may leave the surface (RCVT), but for those on features
-};
-
-struct RemeshOptions {
-  // One of these three. Counts are at least 4; edge_length is the wanted mean, in the mesh's unit.
-  std::size_t vertices = 0;
-  double edge_length = 0;
-  std::vector<Vec3> seeds;                 // start from these, in one level; topology control may add as many as it takes
-  // Of each seed, for the overload with a backend: those on features are there already. Empty: features get seeds of their own.
+// What remeshing takes once the domain is made: surface, density and features are given beside it.
+struct RemeshPlan {
+  std::size_t vertices = 0;   // wanted; not heeded if there are seeds
+  std::vector<Vec3> seeds;    // start from these, in one level; topology control may add as many as it takes
+  // Of each seed; those on features are there already. Empty: features get seeds of their own.
   std::vector<SeedPlace> places = {};
-
-  SizingOptions sizing;
-  FeatureOptions features;
   std::uint64_t random_seed = 1;
-  int iterations = 100;                    // at most, per level; fewer on the coarsest and the finest of several
-  double tolerance = 1e-6;                 // a level ends when the energy falls by less than this share per step
-  int levels = 0;                          // of the multilevel start; 0: as many as the count allows, at most 3
-  Energy energy = Energy::automatic;
+  int iterations = 100;       // as in RemeshOptions, like those that follow
+  double tolerance = 1e-6;
+  int levels = 0;
+  bool constrained = true;    // seeds end on the surface (CCVT)
   TopologyControl topology = TopologyControl::enforce;
-  double min_angle = 40;                   // degrees; goal of the final pass (improve.h), 0: none
-  bool fit = false;                        // move the result's vertices off the surface, nearer to it on both sides (fit.h)
-  // Length within which borders are joined (weld.h). Without a value vertices of borders at the same point are joined, if that
-  // closes borders and makes no edge non-manifold.
-  std::optional<double> weld;
-  ComputeOptions compute;
-  unsigned threads = 0;                    // 0: all cores
+  double min_angle = 40;
+  bool fit = false;
 };
 
-struct RemeshSeconds {
-  double total = 0, prepare = 0, lbfgs = 0, features = 0, topology = 0, improve = 0, fit = 0, extract = 0;
-  DiagramSeconds diagrams;        // of the optimiser, summed over its evaluations
-};
+// What of the options is left then. Energy::automatic means constrained.
+RemeshPlan plan_of(const RemeshOptions& options);
 
-struct FeatureResult {
-  std::size_t curves = 0, corners = 0;  // of the input
-  std::size_t broken = 0;               // curves that are not chains of edges of the result
-  std::size_t seeds = 0;                // of the result, on features
-  FeatureDistance distance;             // of the result's feature edges and the input's, before a fit
-};
-
-struct RemeshResult {
-  // The restricted Delaunay triangulation of the seeds that own a cell. Its feature_edges are the edges along the input's
-  // features; labels are those of the input's triangles in which its dual vertices lie.
-  TriangleMesh mesh;
-  std::vector<SeedPlace> places;  // of mesh's vertices
-  MeshTopology topology;          // of mesh
-  MeshTopology input_topology;    // after welding and orienting
-  bool topology_matches = false;  // manifold, oriented, closed and of Euler characteristic and components as the input
-  bool ball_property = false;     // of the final diagram
-  std::size_t divided = 0;        // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
-  std::vector<TopologyFault> faults;  // where it fails; indices are those of mesh's vertices, kNone if none
-  FeatureResult features;
-  bool noisy = false;             // the input's normals were taken for noise
-  WeldResult welded;              // without the mesh
-  std::size_t wanted = 0;         // vertices
-  double edge_length = 0;         // aimed at where the density is 1
-  ImproveReport improved;
-  FitReport fitted;
-  int iterations = 0;             // accepted steps, all levels
-  int evaluations = 0;
-  double energy = 0;              // CVT energy of the final seeds
-  double gradient_norm = 0;       // Euclidean norm over all seeds (tangential where constrained)
-  Certification certification;    // of the final diagram
-  std::size_t untiled = 0;        // triangles that fail the tiling check of the final diagram: 0, or the run is wrong
-  BackendDescription device;      // that computed the final diagram
-  RemeshSeconds seconds;
-};
-
-// Remeshes a surface. Throws Error on input without area, on options that contradict each other or the input, and on
-// fewer than 4 vertices; DeviceError if the device asked for is missing or fails; and Cancelled.
-RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context = {});
-
-// The same of a backend's surface and density, with the features given and no heed to options.compute, .sizing, .weld and
-// .features; options.edge_length must be 0, and Energy::automatic means constrained.
-RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshOptions& options,
-                    const Context& context = {});
+// Throws as the public remesh(): for fewer than 4 vertices, a number of places other than that of seeds, DeviceError, Cancelled.
+RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context = {});
 
 }  // namespace bisector

@@ -7,30 +7,11 @@
 #include <array>
 #include <vector>
 
+#include "bisector/remesh.h"
 #include "core/geometry.h"
 #include "features/edge_splits.h"
 
 namespace bisector {
-
-enum class DensityKind {
-  uniform,
-  lfs,        // rho = lfs^-exponent (mesh/local_feature_size.h)
-  curvature,  // rho = |kappa_max|^exponent (mesh/curvature.h)
-  attribute,  // rho as given
-};
-
-struct SizingOptions {
-  DensityKind kind = DensityKind::uniform;
-  double exponent = 0;            // 0: 2 for lfs, 1 for curvature
-  std::vector<double> attribute;  // rho, one positive value per vertex; its scale does not matter
-  // |h(x) - h(y)| <= gradation |x - y|; 0: no bound. The default lets rho, which is linear between vertices, about
-  // double from one vertex of the result to the next: (1 + 0.2)^4 = 2.07. Mesh generators for the finite element method
-  // bound the growth of neighbouring elements likewise (Persson 2006, "Mesh size functions for implicit geometries and
-  // PDE-based gradient limiting").
-  double gradation = 0.2;
-  double min_edge = 0, max_edge = 0;        // bounds of h, in the mesh's unit; 0: none
-  std::vector<std::array<Index, 2>> sharp;  // edges that have no curvature (FeatureGraph::edges)
-};
 
 // What is wanted: exactly one of them positive.
 struct SizingTarget {

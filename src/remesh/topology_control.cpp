@@ -19,23 +19,26 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-constexpr int kGrowingRounds = 12, kRefiningRounds = 80;
-constexpr int kFarRounds = 3;            // every third round of refining inserts far points
-constexpr std::size_t kDivergence = 2;   // times the failures at first
+// Rounds of inserting seeds: with an optimisation of so many steps after each (thesis 4.4.4), while more than one cell in
+// kTooFew fails; then without. Every kFarRounds-th round of the latter inserts far points.
+constexpr int kGrowingRounds = 12, kGrowingSteps = 30, kRefiningRounds = 80, kFarRounds = 3;
+constexpr std::size_t kTooFew = 8;
+// Refining has no end if there are so many times the failures of the beginning, and kMostAdded more.
+constexpr std::size_t kDivergence = 2;
+// Trials of removing seeds elsewhere, and the share of the seeds (one in so many) beyond which that is not tried.
 constexpr int kTrims = 8;
-constexpr int kGrowingSteps = 30;        // thesis 4.4.4
-constexpr int kPolishingSteps = 20;
-constexpr int kSmoothingSteps = 20;
-constexpr int kRetreats = 12;            // per step of smoothing
-constexpr std::size_t kCoarse = 8;       // of so many cells one may fail; more say that there are too few seeds
-constexpr std::size_t kMostTrimmed = 8;  // of so many seeds one
-constexpr std::size_t kMostAdded = 100;  // and a quarter of the seeds, if they are many
-// A surface may need more than were asked for: so many are allowed to grow to, and in the end.
-constexpr std::size_t kGrown = 300, kAnyway = 5000;
+constexpr std::size_t kMostTrimmed = 8;
+// Steps of the optimiser and of Lloyd once the property holds, and how often a step is shortened for it.
+constexpr int kPolishingSteps = 20, kSmoothingSteps = 20, kRetreats = 12;
+// Seeds that may be added: a quarter of them and kMostAdded. A surface may need more than were asked for: so many are
+// allowed to grow to, and in the end.
+constexpr std::size_t kMostAdded = 100, kGrown = 300, kAnyway = 5000;
 // Of a cell's radius: sheets nearer to each other get a vertex each. More of them if fewer do not help.
 constexpr double kCrossing = 0.01, kTouching = 0.1;
-constexpr double kApart = 2;             // squared distance of points inserted together, over that to the seeds there are
-constexpr double kTurned = -0.2;         // cosine of the angle at which a surface faces away
+// Squared distance of points inserted together, over that to the seeds there are.
+constexpr double kApart = 2;
+// Cosine of the angle at which a surface faces away.
+constexpr double kTurned = -0.2;
 
 // A point to insert, and the square of its distance to the nearest seed.
 struct Candidate {
@@ -283,7 +286,7 @@ class Control {
   }
 
   // Whether so many cells fail that they are not to be mended one by one.
-  bool too_few_seeds() const { return kCoarse * outcome_.ball.cells.size() > run_.seeds.size(); }
+  bool too_few_seeds() const { return kTooFew * outcome_.ball.cells.size() > run_.seeds.size(); }
 
   bool insert(bool far) {
     std::vector<Vec3> points = Repair(run_.surface(), *polygons_, vertices_, far).points(outcome_.ball);
@@ -369,8 +372,8 @@ class Control {
     const std::size_t failures = outcome_.ball.failures();
     const std::size_t surplus = vertices_.size() - std::min(vertices_.size(), wanted_);
     const bool better = failures != fewest_ ? failures < fewest_ : failures == 0 && surplus < least_surplus_;
-    if (!best_coarse_ && (too_few_seeds() || !better)) return;
-    best_coarse_ = too_few_seeds();
+    if (!best_has_too_few_ && (too_few_seeds() || !better)) return;
+    best_has_too_few_ = too_few_seeds();
     fewest_ = failures;
     least_surplus_ = surplus;
     best_ = {run_.seeds, given_, gap_};
@@ -459,7 +462,7 @@ class Control {
   SavedSeeds best_;
   std::size_t fewest_ = 0;      // failures of the best seeds
   std::size_t least_surplus_ = 0;
-  bool best_coarse_ = true;     // too many cells of the best seeds fail
+  bool best_has_too_few_ = true;     // too many cells of the best seeds fail
 };
 
 }  // namespace

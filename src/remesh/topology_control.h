@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bisector/quality.h"
+#include "bisector/remesh.h"
 #include "cvt/optimise.h"
 #include "mesh/topology.h"
 #include "voronoi/ball_property.h"
@@ -18,12 +19,6 @@ TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual);
 // Whether `dual` is manifold, oriented, closed and of Euler characteristic and components as the input.
 bool same_topology(const MeshTopology& dual, const MeshTopology& input);
 
-// A cell, edge or vertex of the diagram that breaks the topological ball property.
-struct TopologyFault {
-  std::vector<Index> seeds;  // one, two or three
-  Vec3 position;             // of the first seed
-  std::string what;          // "2 components", "closed", ...
-};
 std::vector<TopologyFault> topology_faults(const BallReport& report, const std::vector<Vec3>& seeds);
 
 struct TopologyOutcome {

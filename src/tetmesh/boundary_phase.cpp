@@ -11,6 +11,7 @@
 #include "core/stopwatch.h"
 #include "cvt/constrain.h"
 #include "bisector/quality.h"
+#include "remesh/remesh.h"
 #include "spatial/hilbert.h"
 
 namespace bisector {
@@ -71,16 +72,16 @@ Split split_at_boundary(CvtRun& sites) {
 
 RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<SeedPlace> places, bool final_pass) {
   const Stopwatch watch;
-  RemeshOptions options;
-  options.seeds = std::move(seeds);
-  options.places = std::move(places);
-  options.iterations = final_pass ? kBoundarySteps : kLayoutSteps;
-  options.tolerance = run.options.tolerance;
-  options.topology = final_pass ? TopologyControl::enforce : TopologyControl::off;
-  options.min_angle = final_pass ? run.options.min_angle : 0;
+  RemeshPlan plan;
+  plan.seeds = std::move(seeds);
+  plan.places = std::move(places);
+  plan.iterations = final_pass ? kBoundarySteps : kLayoutSteps;
+  plan.tolerance = run.options.tolerance;
+  plan.topology = final_pass ? TopologyControl::enforce : TopologyControl::off;
+  plan.min_angle = final_pass ? run.options.min_angle : 0;
   Context quiet = run.sites.context();
   quiet.progress = nullptr;
-  RemeshResult result = remesh(run.boundary, run.features, options, quiet);
+  RemeshResult result = remesh(run.boundary, run.features, plan, quiet);
   run.seconds_boundary += watch.seconds();
   return result;
 }

@@ -6,6 +6,7 @@
 
 #include "bisector/error.h"
 #include "compute/compute.h"
+#include "remesh/remesh.h"
 #include "tetmesh/check_surface.h"
 #include "tetmesh/tet_sizing.h"
 #include "tetmesh/tetgen.h"
@@ -62,7 +63,7 @@ std::unique_ptr<StandIns::Domain> StandIns::make_sized(std::size_t count) const 
 // The inside of a remeshed boundary. There is none where that does not bound a solid, or without TetGen.
 std::unique_ptr<StandIns::Domain> StandIns::make_coarse(std::size_t vertices) const {
   if (find_tetgen().empty() || kFewerTriangles * vertices > surface_.triangles.size()) return nullptr;
-  RemeshOptions remeshing;
+  RemeshPlan remeshing;
   remeshing.vertices = std::max(vertices, kFewestVertices);
   remeshing.iterations = kSurfaceSteps;
   remeshing.topology = TopologyControl::check;

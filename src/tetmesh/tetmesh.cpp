@@ -13,6 +13,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "mesh/tet_topology.h"
+#include "mesh/topology.h"
 #include "remesh/prepare.h"
 #include "tetmesh/boundary_phase.h"
 #include "tetmesh/check_surface.h"

@@ -315,10 +315,10 @@ TEST_F(LostInARun, GivesTheCpusMesh) {
   options.vertices = 250;
   options.iterations = 8;
   CpuBackend cpu(surface, NeighbourSource::nearest);
-  const RemeshResult expected = remesh(cpu, {}, options);
+  const RemeshResult expected = remesh(cpu, {}, plan_of(options));
   const auto run = [&](const Context& context) {
     FallbackBackend backend(device_backend(surface, with_precision(Precision::double_)), NeighbourSource::nearest, context);
-    return remesh(backend, {}, options, context);
+    return remesh(backend, {}, plan_of(options), context);
   };
   std::vector<std::string> warnings;
   host::inject_fault(Fault::none, 0);

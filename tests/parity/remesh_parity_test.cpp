@@ -13,6 +13,7 @@
 
 #include "backend/cpu_backend.h"
 #include "remesh/prepare.h"
+#include "remesh/topology_control.h"
 #include "remesh/remesh.h"
 #include "voronoi/ball_property.h"
 #include "voronoi/dual.h"
@@ -66,7 +67,7 @@ struct PreparedCase {
   explicit PreparedCase(const RemeshCase& problem)
       : PreparedCase(prepared(problem), problem.vertices) {}
 
-  RemeshResult run_on(Backend& backend) const { return remesh(backend, features, options); }
+  RemeshResult run_on(Backend& backend) const { return remesh(backend, features, plan_of(options)); }
 
   Surface surface;
   FeatureGraph features;

@@ -385,7 +385,7 @@ TEST(Sizing, IsWhatTheRemesherGives) {
     CpuBackend backend(surface, NeighbourSource::nearest);
     RemeshOptions remeshing;
     remeshing.vertices = sized.sizing.vertices;
-    const RemeshResult result = remesh(backend, {}, remeshing);
+    const RemeshResult result = remesh(backend, {}, plan_of(remeshing));
     EXPECT_NEAR(measure_quality(result.mesh).edge_ave, 0.1, 0.003);
     // Locally, too: each edge beside what is wanted at the input's vertex that is nearest to its middle.
     double fine = 0, coarse = 0, fine_count = 0, coarse_count = 0;

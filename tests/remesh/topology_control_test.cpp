@@ -524,7 +524,7 @@ TEST(TopologyControlTest, ADensityThatShunsThinPartsDoesNotUndoIt) {
   CpuBackend backend(surface, NeighbourSource::nearest);
   RemeshOptions options;
   options.vertices = 200;
-  expect_mended(lens, remesh(backend, {}, options));
+  expect_mended(lens, remesh(backend, {}, plan_of(options)));
 }
 
 TEST(TopologyControlTest, CheckReportsAndChangesNothing) {
