@@ -5,22 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "voronoi/error_bounds.h"
+
 namespace bisector {
 namespace {
 
-constexpr double kUnit = 0x1p-53;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Lines that meet at a smaller angle (sine, squared) have their vertex computed exactly, and below the second in two steps.
-constexpr double kSteep = 1e-12, kShallow = 1e-8;
-// No product of coordinates this small is told from 0, for the bounds below do not cover underflow.
-constexpr double kTiny = 1e-300;
-
-
-typedef std::int32_t FourMask __attribute__((vector_size(4 * sizeof(float))));
-
-constexpr std::size_t kScreens = 512;
-
-double max_coordinate(const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
+constexpr std::size_t kScreens = 512;  // kept, each for the last cell whose slot leads to it
 
 }  // namespace
 
@@ -36,7 +27,7 @@ Clipper::Clipper() : lines_(16), screens_(kScreens) {
 
 void Clipper::reset(const SortedSeeds& seeds) {
   seeds_ = &seeds;
-  scale_ = seeds.extent > 0 ? std::ldexp(1.0, -std::ilogb(seeds.extent)) : 1;
+  scale_ = screen_scale(seeds.extent);
   for (Screen& screen : screens_) screen.list = nullptr;
 }
 
@@ -64,7 +55,7 @@ void Clipper::start(Index slot) {
   line_count_ = 3;
   polygon_.reserve(3);
   polygon_.size = 0;
-  for (unsigned k = 0; k < 3; ++k) polygon_.push(k) = {local_[k], 8 * kUnit * largest_};
+  for (unsigned k = 0; k < 3; ++k) polygon_.push(k) = {local_[k], kCornerSlack * largest_};
 }
 
 void Clipper::take(Index slot) { start(slot); }
@@ -82,20 +73,19 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
     for (; k < screened; k += 4) {
       if (k == 4 * screen.built) build_block(screen, list, k / 4);
       if (!bounded_) bound_polygon();
-      const Block& block = screen.blocks[k / 4];
-      // Security radius: all of the polygon is nearer to this seed than to any other from here on.
-      if (2 * reach_scaled_ < block.half[0]) return true;
+      const ScreenBlock& block = screen.blocks[k / 4];
+      if (reach_.is_safe_from(block)) return true;
       const unsigned present = (1u << std::min<std::size_t>(4, count - k)) - 1;
-      for (unsigned lines = may_cut(block) & present; lines; lines &= lines - 1)
+      for (unsigned lines = lines_that_may_cut(block) & present; lines; lines &= lines - 1)
         if (!visit(list.begin[k + static_cast<unsigned>(std::countr_zero(lines))])) return false;
     }
     for (; k < count; ++k) {
       if (!bounded_) bound_polygon();
-      if (4 * reach_ < norm2(seeds_->x[list.begin[k]] - seeds_->x[slot]) * (1 - 1e-9)) return true;
+      if (reach_.is_safe_from(norm2(seeds_->x[list.begin[k]] - seeds_->x[slot]))) return true;
       if (!visit(list.begin[k])) return false;
     }
     if (!bounded_) bound_polygon();
-    if (list.radius == kInfinity || 4 * reach_ < list.radius * list.radius * (1 - 1e-9)) return true;
+    if (list.radius == kInfinity || reach_.is_safe_from(list.radius * list.radius)) return true;
     wider_ = true;
     list = neighbours.wider(slot, list);
   }
@@ -140,7 +130,7 @@ void Clipper::take(Index slot, const Index* labels, std::size_t count) {
   for (std::size_t k = 0; k < count; ++k) {
     const Line &before = lines_[polygon_.edges[previous(k)]], &after = lines_[polygon_.edges[k]];
     if (is_edge(before.slot) && is_edge(after.slot))
-      polygon_.corners[k] = {local_[after.slot & ~kEdgeLabel], 8 * kUnit * largest_};
+      polygon_.corners[k] = {local_[after.slot & ~kEdgeLabel], kCornerSlack * largest_};
     else
       add_corner(before, after, polygon_.corners[k]);
   }
@@ -157,7 +147,7 @@ bool Clipper::confirm(const Neighbours& neighbours, Index slot, const Index* lab
     if (is_edge(before.slot) && is_edge(after.slot)) {
       const unsigned corner = after.slot & ~kEdgeLabel;
       if ((before.slot & ~kEdgeLabel) != (corner + 2) % 3) return false;
-      polygon_.corners[k] = {local_[corner], 8 * kUnit * largest_};
+      polygon_.corners[k] = {local_[corner], kCornerSlack * largest_};
     } else if (!meet(before, after, polygon_.corners[k])) {
       return false;
     }
@@ -171,19 +161,19 @@ bool Clipper::confirm(const Neighbours& neighbours, Index slot, const Index* lab
   Screen& screen = screen_of(list);
   for (std::size_t k = 0; k < std::min(listed, 4 * kBlocks); k += 4) {
     if (k == 4 * screen.built) build_block(screen, list, k / 4);
-    const Block& block = screen.blocks[k / 4];
-    if (2 * reach_scaled_ < block.half[0]) return true;
+    const ScreenBlock& block = screen.blocks[k / 4];
+    if (reach_.is_safe_from(block)) return true;
     const unsigned present = (1u << std::min<std::size_t>(4, listed - k)) - 1;
-    for (unsigned lines = may_cut(block) & present; lines; lines &= lines - 1)
+    for (unsigned lines = lines_that_may_cut(block) & present; lines; lines &= lines - 1)
       if (!certainly_passes(list.begin[k + static_cast<unsigned>(std::countr_zero(lines))])) return false;
   }
-  return listed <= 4 * kBlocks && (list.radius == kInfinity || 4 * reach_ < list.radius * list.radius * (1 - 1e-9));
+  return listed <= 4 * kBlocks && (list.radius == kInfinity || reach_.is_safe_from(list.radius * list.radius));
 }
 
 bool Clipper::certainly_inside(std::size_t k, const Line& line) const {
   const Corner& corner = polygon_.corners[k];
-  const double error = corner.slack * (std::abs(line.m.x) + std::abs(line.m.y) + std::abs(line.m.z));
-  if (!is_edge(line.slot)) return dot(corner.at, line.m) + error < 0.5 * line.squared * (1 - 1e-12) - kTiny;
+  const double error = corner.slack * taxicab(line.m);
+  if (!is_edge(line.slot)) return dot(corner.at, line.m) + error < BisectorLimits(0.5 * line.squared).before;
   // A corner of the facet is on the inner side of the edge opposite; elsewhere the edge's normal points inwards if it
   // runs from its own corner.
   const Index before = label(previous(k)), after = label(k);
@@ -213,35 +203,25 @@ Clipper::Screen& Clipper::screen_of(const NeighbourList& list) {
   return screen;
 }
 
-// Half squares are rounded down by more than float's error, so a line that is held to pass does.
 void Clipper::build_block(Screen& screen, const NeighbourList& list, std::size_t index) const {
-  Block& block = screen.blocks[index];
+  ScreenBlock& block = screen.blocks[index];
   screen.built = index + 1;
   const Vec3 x = seeds_->x[slot_];
   for (std::size_t m = 0; m < 4; ++m) {
     const Index* j = list.begin + 4 * index + m;
-    const Vec3 d = j < list.end ? scale_ * (seeds_->x[*j] - x) : Vec3{};
-    block.x[m] = static_cast<float>(d.x);
-    block.y[m] = static_cast<float>(d.y);
-    block.z[m] = static_cast<float>(d.z);
-    block.half[m] = j < list.end ? static_cast<float>(0.5 * norm2(d) * (1 - 1e-5)) : std::numeric_limits<float>::infinity();
+    if (j >= list.end) {
+      block.set_none(m);
+      continue;
+    }
+    const Vec3 d = scale_ * (seeds_->x[*j] - x);
+    block.set(m, d, 0.5 * norm2(d));
   }
 }
 
-// With |d| < 2 r, r the polygon's reach, a product as coded is off by less than 2e-6 |d| r < 4e-6 r^2, and by less than
-// 4 r slack for the corner's own error. Lines with |d| >= 2 r do not cut at all. Whatever overflows or is not a number counts
-// as cutting.
-unsigned Clipper::may_cut(const Block& block) const {
-  const auto load = [](const float* p) { return *reinterpret_cast<const Four*>(p); };
-  const Four x = load(block.x), y = load(block.y), z = load(block.z);
-  const Four limit = load(block.half) - margin_scaled_;
-  FourMask below = ~FourMask{};
-  for (std::size_t k = 0; k < polygon_.size; ++k) {
-    const Splat& corner = splats_[k];
-    below &= x * corner.x + y * corner.y + z * corner.z < limit;
-  }
-  return (~static_cast<unsigned>(below[0]) & 1) | (~static_cast<unsigned>(below[1]) & 2) |
-         (~static_cast<unsigned>(below[2]) & 4) | (~static_cast<unsigned>(below[3]) & 8);
+unsigned Clipper::lines_that_may_cut(const ScreenBlock& block) const {
+  return may_cut(block, reach_.margin, [&](const auto& test) {
+    for (std::size_t k = 0; k < polygon_.size; ++k) test(splats_[k].x, splats_[k].y, splats_[k].z);
+  });
 }
 
 bool Clipper::visit(Index other) {
@@ -259,13 +239,13 @@ bool Clipper::bounded_by(Index other) const {
 
 void Clipper::cut(Index other, const Vec3& d, double squared) {
   const std::size_t n = polygon_.size;
-  const double taxicab = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
-  const double below = 0.5 * squared * (1 - 1e-12) - kTiny, above = 0.5 * squared * (1 + 1e-12) + kTiny;
+  const double one_norm = taxicab(d);
+  const BisectorLimits limits(0.5 * squared);
   if (sides_.size() < n) sides_.resize(2 * n);
   std::size_t outside = 0;
   for (std::size_t k = 0; k < n; ++k) {
-    const double along = dot(polygon_.corners[k].at, d), error = polygon_.corners[k].slack * taxicab;
-    int side = along + error < below ? 1 : along - error > above ? -1 : 0;
+    const double along = dot(polygon_.corners[k].at, d), error = polygon_.corners[k].slack * one_norm;
+    int side = along + error < limits.before ? 1 : along - error > limits.behind ? -1 : 0;
     if (side == 0) {
       uncertain_ = true;
       side = exact_side(frame(), exact(lines_[polygon_.edges[previous(k)]]), exact(lines_[polygon_.edges[k]]),
@@ -305,16 +285,12 @@ void Clipper::bound_polygon() {
     slack = std::max(slack, polygon_.corners[k].slack);
     squared = std::max(squared, norm2(polygon_.corners[k].at));
   }
-  // (r + e)^2 <= r^2 (1 + a) + e^2 (1 + 1/a), and no point of the facet is farther than its corners.
-  reach_ = std::min(facet_squared_, squared * (1 + 1e-6) + 4e6 * (slack * slack));
-  const double scaled = scale_ * scale_;
-  reach_scaled_ = static_cast<float>(reach_ * scaled * (1 + 1e-6));
-  margin_scaled_ = static_cast<float>((4e-6 * reach_ + 8 * std::sqrt(reach_) * slack) * scaled * (1 + 1e-6));
+  reach_ = Reach(squared, slack, facet_squared_, scale_);
   if (splats_.size() < polygon_.size) splats_.resize(2 * polygon_.size);
   for (std::size_t k = 0; k < polygon_.size; ++k) {
     const Vec3 p = scale_ * polygon_.corners[k].at;
     const float x = static_cast<float>(p.x), y = static_cast<float>(p.y), z = static_cast<float>(p.z);
-    splats_[k] = {Four{x, x, x, x}, Four{y, y, y, y}, Four{z, z, z, z}};
+    splats_[k] = {FourFloats{x, x, x, x}, FourFloats{y, y, y, y}, FourFloats{z, z, z, z}};
   }
 }
 
@@ -345,7 +321,7 @@ bool Clipper::meet(const Line& before, const Line& after, Corner& corner) const 
 void Clipper::add_corner(const Line& before, const Line& after, Corner& corner) const {
   if (meet(before, after, corner)) return;
   corner.at = exact_vertex(frame(), exact(before), exact(after));
-  corner.slack = 16 * kUnit * largest_;
+  corner.slack = kExactSlack * largest_;
 }
 
 double Clipper::density(std::size_t k) const {

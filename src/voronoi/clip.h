@@ -7,6 +7,7 @@
 #include "voronoi/exact.h"
 #include "voronoi/moments.h"
 #include "voronoi/neighbours.h"
+#include "voronoi/screen.h"
 #include "voronoi/surface.h"
 
 namespace bisector {
@@ -74,27 +75,22 @@ class Clipper {
     }
   };
 
-  // The first neighbours of a cell in single precision, four to a block, scaled into the range of float: a screen that lets
-  // pass all lines that could cut.
-  struct alignas(16) Block {
-    float x[4], y[4], z[4], half[4];
-  };
+  // The first neighbours of a cell, four to a block.
   static constexpr std::size_t kBlocks = 10;
   struct Screen {
     const Index* list = nullptr;
     std::size_t built = 0;
-    Block blocks[kBlocks];
+    ScreenBlock blocks[kBlocks];
   };
-  typedef float Four __attribute__((vector_size(4 * sizeof(float)), may_alias));
+  // A corner in single precision, each coordinate four times.
   struct Splat {
-    Four x, y, z;
+    FourFloats x, y, z;
   };
 
   void start(Index slot);
   Screen& screen_of(const NeighbourList& list);
   void build_block(Screen& screen, const NeighbourList& list, std::size_t block) const;
-  // Bit m is set if line m of the block may cut.
-  unsigned may_cut(const Block& block) const;
+  unsigned lines_that_may_cut(const ScreenBlock& block) const;
   void place_lines();
   unsigned add_line(Index other, const Vec3& towards, double squared);
   void set_labels(const Index* labels, std::size_t count);
@@ -127,16 +123,14 @@ class Clipper {
   double height_ = 0;         // of the facet's plane over the seed, along the normal
   Vec3 foot_;                 // of the seed on that plane
   double facet_squared_ = 0;  // upper bound of the squared distance of any point of the facet
-  double reach_ = 0;          // the same of the polygon
+  Reach reach_;               // of the polygon
   bool bounded_ = false;      // reach_ and splats_ are those of the polygon
   std::vector<Line> lines_;   // all that ever cut; the first three are the facet's edges
   std::size_t line_count_ = 0;
   Polygon polygon_, kept_;
   std::vector<Screen> screens_;   // direct-mapped by slot
   std::vector<Splat> splats_;     // the polygon's corners, scaled
-  double scale_ = 1;              // a power of two
-  float reach_scaled_ = 0;        // upper bound of reach_, scaled
-  float margin_scaled_ = 0;       // of the screen
+  double scale_ = 1;              // of the screen
   std::vector<signed char> sides_;
   std::vector<double> densities_;
   bool uncertain_ = false, wider_ = false;

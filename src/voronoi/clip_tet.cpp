@@ -7,20 +7,13 @@
 
 #include "core/parallel.h"
 #include "mesh/tet_adjacency.h"
+#include "voronoi/error_bounds.h"
 #include "voronoi/surface.h"
 
 namespace bisector {
 namespace {
 
-constexpr double kUnit = 0x1p-53;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Planes that meet at a smaller angle (sine, squared) have their vertex computed exactly, and below the second in two steps.
-constexpr double kSteep = 1e-12, kShallow = 1e-8;
-// No product of coordinates this small is told from 0, for the bounds below do not cover underflow.
-constexpr double kTiny = 1e-300;
-
-typedef float Four __attribute__((vector_size(4 * sizeof(float)), may_alias));
-typedef std::int32_t FourMask __attribute__((vector_size(4 * sizeof(float))));
 
 // Facets that meet in corner m, counter-clockwise seen from outside.
 constexpr Index kCornerFacets[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
@@ -28,9 +21,6 @@ constexpr Index kCornerFacets[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2
 constexpr unsigned char kOtherCorners[13][2] = {{}, {}, {}, {2, 3}, {}, {1, 3}, {0, 3}, {}, {}, {1, 2}, {0, 2}, {}, {0, 1}};
 constexpr unsigned char kBefore[3] = {2, 0, 1}, kAfter[3] = {1, 2, 0};
 constexpr Index kFirstSeedKey = 4;
-
-double max_coordinate(const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
-double taxicab(const Vec3& p) { return std::abs(p.x) + std::abs(p.y) + std::abs(p.z); }
 
 }  // namespace
 
@@ -85,7 +75,7 @@ TetClipper::TetClipper() : planes_(64), starting_(64), ending_(64) { reserve(64)
 void TetClipper::reset(const SortedSeeds& seeds, const Neighbours& neighbours) {
   seeds_ = &seeds;
   neighbours_ = &neighbours;
-  scale_ = seeds.extent > 0 ? std::ldexp(1.0, -std::ilogb(seeds.extent)) : 1;
+  scale_ = screen_scale(seeds.extent);
 }
 
 void TetClipper::begin(Index slot) {
@@ -104,27 +94,22 @@ void TetClipper::set_plane(Plane& plane, Index other) const {
   plane.slot = other;
 }
 
-// Loads neighbours up to `count`, by blocks of four. Half squares are rounded down by more than float's error, so a plane that is
-// held to pass does.
+// Loads neighbours up to `count`, by blocks of four.
 void TetClipper::load(std::size_t count) {
   const std::size_t listed = static_cast<std::size_t>(list_.end - list_.begin);
   if (listed_.size() < count + 4) listed_.resize(2 * (count + 4));
   if (blocks_.size() < count / 4 + 2) blocks_.resize(2 * (count / 4 + 2));
   for (; loaded_ < std::min(count, listed); loaded_ += 4) {
-    Block& block = blocks_[loaded_ / 4];
+    ScreenBlock& block = blocks_[loaded_ / 4];
     for (std::size_t m = 0; m < 4; ++m) {
       if (loaded_ + m >= listed) {
-        block.x[m] = block.y[m] = block.z[m] = 0;
-        block.half[m] = std::numeric_limits<float>::infinity();
+        block.set_none(m);
         continue;
       }
       const Index other = list_.begin[loaded_ + m];
       Plane& plane = listed_[loaded_ + m];
       set_plane(plane, other);
-      block.x[m] = static_cast<float>(scale_ * plane.n.x);
-      block.y[m] = static_cast<float>(scale_ * plane.n.y);
-      block.z[m] = static_cast<float>(scale_ * plane.n.z);
-      block.half[m] = static_cast<float>(scale_ * scale_ * plane.k * (1 - 1e-5));
+      block.set(m, scale_ * plane.n, scale_ * scale_ * plane.k);
     }
   }
 }
@@ -167,7 +152,7 @@ inline void TetClipper::start(const TetFrame& tet) {
   plane_count_ = 4;
   size_ = 4;
   for (Index m = 0; m < 4; ++m) {
-    set_vertex(vertices_[m], local_[m], 8 * kUnit * largest_);
+    set_vertex(vertices_[m], local_[m], kCornerSlack * largest_);
     for (std::size_t e = 0; e < 3; ++e) {
       vertices_[m].on[e] = kCornerFacets[m][e];
       vertices_[m].adjacent[e] = kCornerFacets[m][e];  // leaving a facet along the edge of the other two leads to the corner opposite it
@@ -193,7 +178,7 @@ void TetClipper::take(const TetFrame& tet, const std::vector<Index>& labels,
     Vertex& vertex = vertices_[v];
     for (std::size_t e = 0; e < 3; ++e) vertex.on[e] = planes[triples[v][e]];
     if (std::max({vertex.on[0], vertex.on[1], vertex.on[2]}) < 4)
-      set_vertex(vertex, local_[6 - vertex.on[0] - vertex.on[1] - vertex.on[2]], 8 * kUnit * largest_);
+      set_vertex(vertex, local_[6 - vertex.on[0] - vertex.on[1] - vertex.on[2]], kCornerSlack * largest_);
     else
       place(vertex);
   }
@@ -204,7 +189,7 @@ inline bool TetClipper::cut_by_block(std::size_t k, std::size_t count) {
   if (k >= loaded_) load(k + 4);
   if (!bounded_) bound();
   const unsigned present = (1u << std::min<std::size_t>(4, count - k)) - 1;
-  for (unsigned planes = may_cut(blocks_[k / 4]) & present; planes; planes &= planes - 1) {
+  for (unsigned planes = planes_that_may_cut(blocks_[k / 4]) & present; planes; planes &= planes - 1) {
     const std::size_t neighbour = k + static_cast<unsigned>(std::countr_zero(planes));
     if (wider_ && bounded_by(list_.begin[neighbour])) continue;
     if (!cut(neighbour)) return false;
@@ -219,12 +204,11 @@ bool TetClipper::clip(const TetFrame& tet) {
     for (std::size_t k = 0; k < count; k += 4) {
       if (k >= loaded_) load(k + 4);
       if (!bounded_) bound();
-      // Security radius: all of the polyhedron is nearer to this seed than to any other from here on.
-      if (2 * reach_scaled_ < blocks_[k / 4].half[0]) return true;
+      if (reach_.is_safe_from(blocks_[k / 4])) return true;
       if (!cut_by_block(k, count)) return false;
     }
     if (!bounded_) bound();
-    if (list_.radius == kInfinity || 4 * reach_ < list_.radius * list_.radius * (1 - 1e-9)) return true;
+    if (list_.radius == kInfinity || reach_.is_safe_from(list_.radius * list_.radius)) return true;
     wider_ = true;
     list_ = neighbours_->wider(slot_, list_);
     loaded_ = 0;
@@ -249,18 +233,10 @@ void TetClipper::narrow(const TetFrame& around) {
   loaded_ = 0;
 }
 
-// With |n| < 2 r, r the polyhedron's reach, a product as coded is off by less than 2e-6 |n| r < 4e-6 r^2, and by less than
-// 4 r slack for the vertex's own error. Planes with |n| >= 2 r do not cut at all. Whatever overflows or is not a number counts
-// as cutting.
-inline unsigned TetClipper::may_cut(const Block& block) const {
-  const auto load4 = [](const float* p) { return *reinterpret_cast<const Four*>(p); };
-  const Four x = load4(block.x), y = load4(block.y), z = load4(block.z);
-  const Four limit = load4(block.half) - margin_scaled_;
-  FourMask below = ~FourMask{};
-  for (const Vertex *v = vertices_.data(), *end = v + size_; v != end; ++v)
-    below &= x * v->scaled[0] + y * v->scaled[1] + z * v->scaled[2] < limit;
-  return (~static_cast<unsigned>(below[0]) & 1) | (~static_cast<unsigned>(below[1]) & 2) |
-         (~static_cast<unsigned>(below[2]) & 4) | (~static_cast<unsigned>(below[3]) & 8);
+inline unsigned TetClipper::planes_that_may_cut(const ScreenBlock& block) const {
+  return may_cut(block, reach_.margin, [&](const auto& test) {
+    for (const Vertex *v = vertices_.data(), *end = v + size_; v != end; ++v) test(v->scaled[0], v->scaled[1], v->scaled[2]);
+  });
 }
 
 inline void TetClipper::bound() {
@@ -270,11 +246,7 @@ inline void TetClipper::bound() {
     slack = std::max(slack, v->slack);
     squared = std::max(squared, norm2(v->at));
   }
-  // (r + e)^2 <= r^2 (1 + a) + e^2 (1 + 1/a), and no point of the tetrahedron is farther than its corners.
-  reach_ = std::min(tet_squared_, squared * (1 + 1e-6) + 4e6 * (slack * slack));
-  const double scaled = scale_ * scale_;
-  reach_scaled_ = static_cast<float>(reach_ * scaled * (1 + 1e-6));
-  margin_scaled_ = static_cast<float>((4e-6 * reach_ + 8 * std::sqrt(reach_) * slack) * scaled * (1 + 1e-6));
+  reach_ = Reach(squared, slack, tet_squared_, scale_);
 }
 
 bool TetClipper::bounded_by(Index slot) const {
@@ -287,7 +259,7 @@ bool TetClipper::bounded_by(Index slot) const {
 // Decides for every vertex on which side it is; lists those outside in removed_.
 inline std::size_t TetClipper::count_outside(const Plane& by) {
   const double one_norm = taxicab(by.n);
-  const double below = by.k * (1 - 1e-12) - kTiny, above = by.k * (1 + 1e-12) + kTiny;
+  const BisectorLimits limits(by.k);
   signed char* sides = sides_.data();
   Index* removed = removed_.data();
   std::size_t count = 0;
@@ -295,7 +267,7 @@ inline std::size_t TetClipper::count_outside(const Plane& by) {
   for (std::size_t v = 0; v < size_; ++v) {
     const Vertex& vertex = vertices_[v];
     const double along = dot(vertex.at, by.n), error = vertex.slack * one_norm;
-    const bool inside = along + error < below, outside = along - error > above;
+    const bool inside = along + error < limits.before, outside = along - error > limits.behind;
     certain &= inside | outside;
     sides[v] = static_cast<signed char>(inside - outside);
     removed[count] = static_cast<Index>(v);
@@ -451,7 +423,7 @@ inline void TetClipper::place_at_planes(Vertex& v, const Plane& a, const Plane& 
 }
 
 void TetClipper::place_exactly(Vertex& v, const Plane& a, const Plane& b, const Plane& c) {
-  set_vertex(v, exact_vertex(frame(), exact(a), exact(b), exact(c)), 16 * kUnit * largest_);
+  set_vertex(v, exact_vertex(frame(), exact(a), exact(b), exact(c)), kExactSlack * largest_);
 }
 
 ExactTetFrame TetClipper::frame() const {

@@ -10,6 +10,7 @@
 #include "voronoi/exact_tet.h"
 #include "voronoi/moments.h"
 #include "voronoi/neighbours.h"
+#include "voronoi/screen.h"
 #include "voronoi/solid.h"
 
 namespace bisector {
@@ -106,15 +107,11 @@ class TetClipper {
     Index u() const { return static_cast<Index>(planes); }
     Index v() const { return static_cast<Index>(planes >> 32); }
   };
-  // Four neighbours in single precision, scaled into the range of float: a screen that lets pass all planes that could cut.
-  struct alignas(16) Block {
-    float x[4], y[4], z[4], half[4];
-  };
 
   void start(const TetFrame& tet);
   void set_plane(Plane& plane, Index other) const;
   void load(std::size_t count);
-  unsigned may_cut(const Block& block) const;
+  unsigned planes_that_may_cut(const ScreenBlock& block) const;
   bool cut_by_block(std::size_t k, std::size_t count);
   void bound();
   bool bounded_by(Index slot) const;
@@ -135,7 +132,7 @@ class TetClipper {
 
   const SortedSeeds* seeds_ = nullptr;
   const Neighbours* neighbours_ = nullptr;
-  double scale_ = 1;             // a power of two
+  double scale_ = 1;             // of the screen
 
   // The cell: its neighbours in ascending distance, the first `loaded_` of them in `listed_` and `blocks_`.
   Index slot_ = 0;
@@ -144,7 +141,7 @@ class TetClipper {
   std::vector<Index> narrowed_;
   std::size_t loaded_ = 0;
   std::vector<Plane> listed_;
-  std::vector<Block> blocks_;
+  std::vector<ScreenBlock> blocks_;
 
   // The polyhedron: planes that ever cut it, the first four being the facets, and its vertices.
   const TetFrame* tet_ = nullptr;
@@ -157,8 +154,7 @@ class TetClipper {
   std::size_t size_ = 0;
 
   bool bounded_ = false;         // what follows is that of the polyhedron
-  double reach_ = 0;             // upper bound of its squared distance
-  float reach_scaled_ = 0, margin_scaled_ = 0;
+  Reach reach_;
 
   bool collected_ = false;       // what follows is that of the polyhedron
   std::vector<Index> bounding_;  // planes in order of their keys

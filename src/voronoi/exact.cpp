@@ -1,7 +1,6 @@
 #include "voronoi/exact.h"
 
-#include <algorithm>
-#include <cmath>
+#include <array>
 
 #include "voronoi/exact_arithmetic.h"
 
@@ -34,30 +33,19 @@ int exact_side(const ExactFrame& frame, const ExactLine& line_a, const ExactLine
   const Row lambda = cross(a, b);
   if (const int s = sign(dot(c, lambda))) return s;
 
-  struct Cofactor {
-    Index index;
-    Exact value;  // of w_index
-  };
   // det(c + e_c 1, a + e_a 1, b + e_b 1) with e_k = w_i - w_k: each seed's row contributes its cofactor to w_i.
-  std::array<Cofactor, 4> cofactors;
-  std::size_t n = 0;
-  Exact own = total(lambda);
-  cofactors[n++] = {line_c.index, -total(lambda)};
-  if (line_a.corner < 0) {
-    const Exact value = total(cross(b, c));
+  Cofactors<4> cofactors;
+  Exact own = 0;
+  const auto add = [&](const ExactLine& line, const Exact& value) {
+    if (line.corner >= 0) return;
     own = own + value;
-    cofactors[n++] = {line_a.index, -value};
-  }
-  if (line_b.corner < 0) {
-    const Exact value = total(cross(c, a));
-    own = own + value;
-    cofactors[n++] = {line_b.index, -value};
-  }
-  cofactors[n++] = {frame.index, own};
-  std::sort(cofactors.begin(), cofactors.begin() + n,
-            [](const Cofactor& p, const Cofactor& q) { return p.index < q.index; });
-  for (std::size_t k = 0; k < n; ++k)
-    if (const int s = sign(cofactors[k].value)) return s;
+    cofactors.add(line.index, -value);
+  };
+  add(line_c, total(lambda));
+  add(line_a, total(cross(b, c)));
+  add(line_b, total(cross(c, a)));
+  cofactors.add(frame.index, own);
+  if (const int s = cofactors.sign()) return s;
   return line_c.index < frame.index ? -1 : 1;  // unreachable for a vertex of a polygon: its denominator is not 0
 }
 
@@ -67,20 +55,9 @@ int exact_side(const Vec3& q, const Vec3& x_i, Index i, const Vec3& x_j, Index j
 }
 
 Vec3 exact_vertex(const ExactFrame& given, const ExactLine& given_a, const ExactLine& given_b) {
-  // Coordinates near 1, by a power of two, keep the degree 7 numerators within the range of double.
-  double largest = 0;
-  for (const Vec3& q : given.corners)
-    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::abs(q[k] - given.seed[k]));
-  const int exponent = std::ilogb(largest);
-  const auto scaled = [&](const Vec3& p) {
-    return Vec3{std::ldexp(p.x, -exponent), std::ldexp(p.y, -exponent), std::ldexp(p.z, -exponent)};
-  };
-  ExactFrame frame = given;
-  for (Vec3& q : frame.corners) q = scaled(q);
-  frame.seed = scaled(frame.seed);
-  ExactLine a = given_a, b = given_b;
-  a.seed = scaled(a.seed);
-  b.seed = scaled(b.seed);
+  const ExactScaling scaling(given.corners, given.seed);
+  const ExactFrame frame = scaling.scaled_frame(given);
+  const ExactLine a = scaling.scaled_bound(given_a), b = scaling.scaled_bound(given_b);
 
   const Row lambda = cross(row_of(frame, a), row_of(frame, b));
   const double denominator = CGAL::to_double(total(lambda));
@@ -88,7 +65,7 @@ Vec3 exact_vertex(const ExactFrame& given, const ExactLine& given_a, const Exact
   for (int k = 0; k < 3; ++k) {
     Exact numerator = 0;
     for (int m = 0; m < 3; ++m) numerator = numerator + lambda[m] * (Exact(frame.corners[m][k]) - Exact(frame.seed[k]));
-    local[k] = std::ldexp(CGAL::to_double(numerator) / denominator, exponent);
+    local[k] = scaling.restored(CGAL::to_double(numerator) / denominator);
   }
   return local;
 }

@@ -1,7 +1,6 @@
 #include "voronoi/exact_tet.h"
 
-#include <algorithm>
-#include <cmath>
+#include <array>
 #include <limits>
 
 #include "voronoi/exact_arithmetic.h"
@@ -62,49 +61,28 @@ int exact_side(const ExactTetFrame& frame, const ExactPlane& plane_a, const Exac
   if (const int s = sign(dot(d, lambda))) return s * basis.unit();
 
   // det(d + e_d 1, a + e_a 1, ...) with e_k = w_i - w_k: each seed's row contributes its cofactor to w_i.
-  struct Cofactor {
-    Index index;
-    Exact value;  // of w_index
-  };
-  std::array<Cofactor, 5> cofactors;  // in ascending index
-  std::size_t n = 0;
-  const auto insert = [&](Index index, const Exact& value) {
-    std::size_t k = n++;
-    for (; k > 0 && cofactors[k - 1].index > index; --k) cofactors[k] = cofactors[k - 1];
-    cofactors[k] = {index, value};
-  };
+  Cofactors<5> cofactors;
   const Row one = basis.constant();
   Exact own = 0;
   const auto add = [&](const ExactPlane& plane, const Exact& value) {
     if (!is_bisector(plane)) return;
     own = own + value;
-    insert(plane.index, -value);
+    cofactors.add(plane.index, -value);
   };
   add(plane_d, dot(one, lambda));
   add(plane_a, dot(d, cross(one, b, c)));
   add(plane_b, dot(d, cross(a, one, c)));
   add(plane_c, dot(d, cross(a, b, one)));
-  insert(frame.index, own);
-  for (std::size_t k = 0; k < n; ++k)
-    if (const int s = sign(cofactors[k].value)) return s * basis.unit();
+  cofactors.add(frame.index, own);
+  if (const int s = cofactors.sign()) return s * basis.unit();
   return plane_d.index < frame.index ? -1 : 1;  // unreachable for a vertex of a polyhedron: its denominator is not 0
 }
 
 Vec3 exact_vertex(const ExactTetFrame& given, const ExactPlane& given_a, const ExactPlane& given_b,
                   const ExactPlane& given_c) {
-  // Coordinates near 1, by a power of two, keep the numerators within the range of double.
-  double largest = 0;
-  for (const Vec3& q : given.corners)
-    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::abs(q[k] - given.seed[k]));
-  const int exponent = std::ilogb(largest);
-  const auto scaled = [&](const Vec3& p) {
-    return Vec3{std::ldexp(p.x, -exponent), std::ldexp(p.y, -exponent), std::ldexp(p.z, -exponent)};
-  };
-  ExactTetFrame frame = given;
-  for (Vec3& q : frame.corners) q = scaled(q);
-  frame.seed = scaled(frame.seed);
-  ExactPlane a = given_a, b = given_b, c = given_c;
-  for (ExactPlane* plane : {&a, &b, &c}) plane->seed = scaled(plane->seed);
+  const ExactScaling scaling(given.corners, given.seed);
+  const ExactTetFrame frame = scaling.scaled_frame(given);
+  const ExactPlane a = scaling.scaled_bound(given_a), b = scaling.scaled_bound(given_b), c = scaling.scaled_bound(given_c);
 
   const Basis basis{frame, is_bisector(a) && is_bisector(b) && is_bisector(c)};
   const Row lambda = cross(basis.row(a), basis.row(b), basis.row(c));
@@ -117,7 +95,7 @@ Vec3 exact_vertex(const ExactTetFrame& given, const ExactPlane& given_a, const E
     else
       for (std::size_t m = 0; m < 4; ++m)
         numerator = numerator + lambda[m] * (Exact(frame.corners[m][k]) - Exact(frame.seed[k]));
-    local[k] = std::ldexp(CGAL::to_double(numerator) / denominator, exponent);
+    local[k] = scaling.restored(CGAL::to_double(numerator) / denominator);
   }
   return local;
 }
