@@ -13,13 +13,12 @@
 #include <string>
 #include <vector>
 
-#include "backend/backend.h"
+#include "backend/cpu_backend.h"
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "io/files.h"
-#include "voronoi/restricted.h"
 #include "common.h"
 #include "delaunay_time.h"
 
@@ -44,6 +43,7 @@ struct Options {
 struct Run {
   double total = 0, gradient_norm = 0;
   Diagram diagram;
+  EvaluationReport report;
 };
 
 // From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which has
@@ -55,9 +55,9 @@ Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSo
   if (device && seeds.size() > 1) device->evaluate({seeds.begin(), seeds.end() - 1}, Want::moments, run.diagram);
   const Stopwatch watch;
   if (device) {
-    device->evaluate(seeds, Want::moments, run.diagram);
+    run.report = device->evaluate(seeds, Want::moments, run.diagram);
   } else {
-    RestrictedVoronoi(surface).evaluate(seeds, source, Want::moments, run.diagram);
+    run.report = CpuBackend(surface, source).evaluate(seeds, Want::moments, run.diagram);
   }
   std::vector<Vec3> gradient(seeds.size());
   parallel_each(seeds.size(), [&](std::size_t i) { gradient[i] = -2.0 * run.diagram.moments.cells[i].first; });
@@ -102,12 +102,13 @@ struct Series {
   unsigned threads = 1;
   double memory = 0;
   std::vector<double> total, neighbours, owners, clip, ratio;
-  CellMoments last;
+  double mass = 0, energy = 0;
+  EvaluationReport last;
   double gradient_norm = 0;
   std::unique_ptr<Backend> device;  // none: the CPU
 
   void add(Run run, double delaunay) {
-    const DiagramSeconds& phases = run.diagram.moments.seconds;
+    const DiagramSeconds& phases = run.report.seconds;
     total.push_back(run.total);
     neighbours.push_back(phases.delaunay + phases.neighbours);
     owners.push_back(phases.pairs);
@@ -115,12 +116,14 @@ struct Series {
     ratio.push_back(run.total / delaunay);
     if (gradient_norm != 0 && run.gradient_norm != gradient_norm) throw Error("the gradient differs from the last run's");
     gradient_norm = run.gradient_norm;
-    last = std::move(run.diagram.moments);
+    mass = run.diagram.moments.mass;
+    energy = run.diagram.moments.energy;
+    last = run.report;
   }
 };
 
 void require_same(const Series& a, const Series& b) {
-  if (a.last.mass != b.last.mass || a.last.energy != b.last.energy || a.gradient_norm != b.gradient_norm)
+  if (a.mass != b.mass || a.energy != b.energy || a.gradient_norm != b.gradient_norm)
     throw Error(fmt::format("{} with {} threads and {} with {} threads differ", a.source, a.threads, b.source, b.threads));
 }
 
@@ -144,7 +147,7 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
     require_same(s, series.front());
     // The first number of threads of the same source.
     const Series& base = *std::find_if(series.begin(), series.end(), [&](const Series& b) { return b.source == s.source; });
-    const CellMoments& m = s.last;
+    const EvaluationReport& m = s.last;
     table.rows.push_back({std::to_string(count), s.source, std::to_string(s.threads), milliseconds(median(s.total)),
                           milliseconds(median(s.neighbours)), milliseconds(median(s.owners)), milliseconds(median(s.clip)),
                           milliseconds(median(delaunay)), fmt::format("{:.2f}", median(s.ratio)),

@@ -35,7 +35,7 @@ void pack_meta(const Facet& f, const FacetSummary& summary, std::vector<Index>& 
     bits |= Index{f.origin[k]} << (2 + 2 * k);
     bits |= Index{f.rank[k]} << (8 + 2 * k);
   }
-  meta.insert(meta.end(), {summary.site[0], summary.site[1], summary.site[2], summary.triangle, bits});
+  meta.insert(meta.end(), {summary.vertex[0], summary.vertex[1], summary.vertex[2], summary.triangle, bits});
 }
 
 }  // namespace

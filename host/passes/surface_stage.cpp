@@ -18,7 +18,7 @@ SurfaceStage::SurfaceStage(SeedStage& seeds, const Surface& surface, const Rooms
   buffers_.facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, seeds.is_double());
   if (seeds.has_double_rung()) buffers_.double_facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, true);
   std::vector<Vec3> points;
-  for (const Index v : surface_.sites) points.push_back(surface_.mesh.vertices[v]);
+  for (const Index v : surface_.used_vertices) points.push_back(surface_.mesh.vertices[v]);
   sites_.set_points(seeds.commands, points, scale);
 }
 
@@ -43,7 +43,7 @@ void SurfaceStage::settle_owners(const Counters& counters) {
   if (!counters[kLostSites]) return;
   const std::vector<Index> lost = sites_.lost(seeds_.commands, counters[kLostSites]);
   std::vector<Vec3> points;
-  for (const Index site : lost) points.push_back(surface_.mesh.vertices[surface_.sites[site]]);
+  for (const Index site : lost) points.push_back(surface_.mesh.vertices[surface_.used_vertices[site]]);
   sites_.settle(seeds_.commands, lost, seeds_.exact.owners(points));
 }
 

@@ -25,7 +25,7 @@ class VulkanBackend : public Backend {
   double energy_noise() const override { return double_ ? 0 : 1e-7; }
 
  private:
-  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
 
   bool double_;
   SeedStage stage_;
@@ -45,12 +45,12 @@ VulkanBackend::VulkanBackend(const Surface& surface, std::unique_ptr<Device> dev
   stage_.commands.run();
 }
 
-void VulkanBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& diagram) {
+EvaluationReport VulkanBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& diagram) {
   CellMoments& moments = diagram.moments;
   if (!stage_.within_reach(given)) {
-    cpu_.evaluate(given, want, diagram);
-    moments.certification.cpu = moments.certification.pairs;
-    return;
+    EvaluationReport report = cpu_.evaluate(given, want, diagram);
+    report.certification.cpu = report.certification.pairs;
+    return report;
   }
   stage_.begin(given);
   const Clock::time_point searching = Clock::now();
@@ -79,13 +79,13 @@ void VulkanBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& 
   }
   stage_.set_step_masses(moments);
   certification.pairs = moments.triangles.values.size();
-  moments.certification = certification;
-  moments.seconds = {};
-  (stage_.delaunay() ? moments.seconds.delaunay : moments.seconds.neighbours) = stage_.lists_seconds();
-  moments.seconds.neighbours += searched;
-  moments.seconds.clip = seconds_since(clipping);
+  DiagramSeconds seconds;
+  (stage_.delaunay() ? seconds.delaunay : seconds.neighbours) = stage_.lists_seconds();
+  seconds.neighbours += searched;
+  seconds.clip = seconds_since(clipping);
   if (includes(want, Want::polygons)) pairs_.polygons(diagram.polygons);
-  moments.seconds.device = stage_.take_seconds();
+  seconds.device = stage_.take_seconds();
+  return {certification, seconds};
 }
 
 }  // namespace

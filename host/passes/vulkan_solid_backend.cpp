@@ -32,7 +32,7 @@ class VulkanSolidBackend : public SolidBackend {
   double energy_noise() const override { return double_ ? 0 : 1e-7; }
 
  private:
-  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
   void find_owners(const std::vector<Vec3>& seeds);
   PairJob job() {
     return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.scan, stage_.counters, store_, tets_};
@@ -95,12 +95,12 @@ void VulkanSolidBackend::find_owners(const std::vector<Vec3>& given) {
   corners_.settle(stage_.commands, lost, stage_.exact.owners(points));
 }
 
-void VulkanSolidBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& diagram) {
+EvaluationReport VulkanSolidBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& diagram) {
   CellMoments& moments = diagram.moments;
   if (!stage_.within_reach(given)) {
-    cpu_.evaluate(given, want, diagram);
-    moments.certification.cpu = moments.certification.pairs;
-    return;
+    EvaluationReport report = cpu_.evaluate(given, want, diagram);
+    report.certification.cpu = report.certification.pairs;
+    return report;
   }
   stage_.begin(given);
   const Clock::time_point searching = Clock::now();
@@ -132,14 +132,14 @@ void VulkanSolidBackend::compute(const std::vector<Vec3>& given, Want want, Diag
   certification.pairs = moments.triangles.values.size();
   moments.triangles = std::move(shell.triangles);
   stage_.set_step_masses(moments);
-  moments.certification = certification;
-  moments.seconds = {};
-  (stage_.delaunay() ? moments.seconds.delaunay : moments.seconds.neighbours) = stage_.lists_seconds();
-  moments.seconds.neighbours += searched;
-  moments.seconds.pairs = paired;
-  moments.seconds.clip = seconds_since(clipping);
+  DiagramSeconds seconds;
+  (stage_.delaunay() ? seconds.delaunay : seconds.neighbours) = stage_.lists_seconds();
+  seconds.neighbours += searched;
+  seconds.pairs = paired;
+  seconds.clip = seconds_since(clipping);
   if (includes(want, Want::polyhedra)) polyhedra_.run(pairs_, job(), tets_, stage_.exact, diagram.polyhedra);
-  moments.seconds.device = stage_.take_seconds();
+  seconds.device = stage_.take_seconds();
+  return {certification, seconds};
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "bisector/cells.h"
 #include "bisector/export.h"
 
 namespace bisector {
@@ -16,11 +17,6 @@ enum class Precision {
   automatic,  // double where the device computes in double, else single
   single,
   double_,
-};
-
-enum class NeighbourSource {
-  nearest,   // nearest seeds by distance, grown where they prove too few
-  delaunay,  // Delaunay 1-ring; falls back to `nearest` for seeds in a plane
 };
 
 // Which device is to compute.
@@ -84,15 +80,12 @@ struct BackendDescription {
 // Seconds on a device, from its own clock; all 0 where the CPU computed.
 struct DeviceSeconds {
   double transfer = 0, grid = 0, neighbours = 0, owners = 0, clip = 0, sort = 0, sum = 0;
-
-  DeviceSeconds& operator+=(const DeviceSeconds& b);
 };
 
+// Seconds of an evaluation: for the Delaunay triangulation or the nearest seeds, for who meets whom, and for clipping.
 struct DiagramSeconds {
   double delaunay = 0, neighbours = 0, pairs = 0, clip = 0;
   DeviceSeconds device;  // within those above
-
-  DiagramSeconds& operator+=(const DiagramSeconds& b);
 };
 
 // How the pairs of a diagram were certified.

@@ -8,17 +8,39 @@
 
 namespace bisector {
 
+DeviceSeconds& operator+=(DeviceSeconds& a, const DeviceSeconds& b) {
+  a.transfer += b.transfer;
+  a.grid += b.grid;
+  a.neighbours += b.neighbours;
+  a.owners += b.owners;
+  a.clip += b.clip;
+  a.sort += b.sort;
+  a.sum += b.sum;
+  return a;
+}
+
+DiagramSeconds& operator+=(DiagramSeconds& a, const DiagramSeconds& b) {
+  a.delaunay += b.delaunay;
+  a.neighbours += b.neighbours;
+  a.pairs += b.pairs;
+  a.clip += b.clip;
+  a.device += b.device;
+  return a;
+}
+
 EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   if (seeds.empty()) throw Error("there are no seeds; give at least one");
   const Want computed = includes(want, Want::dual) ? (want & Want::polyhedra) | Want::polygons : want;
   if (!includes(offers_, computed)) throw std::logic_error("a backend of a surface was asked for polyhedra");
-  compute(seeds, computed, diagram);
+  const EvaluationReport report = compute(seeds, computed, diagram);
   if (!includes(computed, Want::polygons)) diagram.polygons = {};
   if (!includes(computed, Want::polyhedra)) diagram.polyhedra = {};
   if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
   else diagram.dual = {};
   diagram.has = want | computed;
-  return {diagram.moments.certification, diagram.moments.seconds};
+  diagram.moments.certification = report.certification;
+  diagram.moments.seconds = report.seconds;
+  return report;
 }
 
 void Backend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) {

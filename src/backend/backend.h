@@ -11,6 +11,9 @@
 
 namespace bisector {
 
+DeviceSeconds& operator+=(DeviceSeconds& a, const DeviceSeconds& b);
+DiagramSeconds& operator+=(DiagramSeconds& a, const DiagramSeconds& b);
+
 // A backend holds one domain, which must outlive it: a surface, or a solid. Every backend returns the same pairs and labels for the
 // same seeds; moments agree to rounding, and runs repeat bit for bit.
 class Backend {
@@ -45,7 +48,7 @@ class Backend {
   Backend(const Surface& boundary, double mass, Want offers) : surface_(boundary), mass_(mass), offers_(offers) {}
 
   // Sets the moments and, of polygons and polyhedra, those that are wanted. There are seeds.
-  virtual void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
+  virtual EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
 
  private:
   const Surface& surface_;

@@ -18,8 +18,14 @@ BackendDescription CpuBackendOf<Base, Voronoi>::description() const {
 }
 
 template <class Base, class Voronoi>
-void CpuBackendOf<Base, Voronoi>::compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
-  diagram_.evaluate(seeds, source_, want, diagram);
+EvaluationReport CpuBackendOf<Base, Voronoi>::compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
+  const DiagramWork work = diagram_.evaluate(seeds, source_, want, diagram);
+  EvaluationReport report;
+  report.certification.pairs = work.counts.pairs;
+  report.certification.uncertain = report.certification.cpu = work.counts.uncertain;
+  report.certification.wider = work.counts.wider;
+  report.seconds = {work.delaunay, work.neighbours, work.owners, work.clip, {}};
+  return report;
 }
 
 template class CpuBackendOf<Backend, RestrictedVoronoi>;

@@ -21,7 +21,7 @@ class CpuBackendOf : public Base {
   template <class Domain, class... Options>
   CpuBackendOf(const Domain& domain, NeighbourSource source, std::string fallback, Options... options);
 
-  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
 
  private:
   NeighbourSource source_;

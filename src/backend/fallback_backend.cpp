@@ -15,12 +15,11 @@ FallbackOf<Base>::FallbackOf(const Domain& domain, std::unique_ptr<Base>&& devic
       backend_(std::move(device)) {}
 
 template <class Base>
-void FallbackOf<Base>::compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
+EvaluationReport FallbackOf<Base>::compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   if (on_device_) {
     std::string reason;
     try {
-      backend_->evaluate(seeds, want, diagram);
-      return;
+      return backend_->evaluate(seeds, want, diagram);
     } catch (const DeviceError& error) {
       reason = error.what();
     }
@@ -28,7 +27,7 @@ void FallbackOf<Base>::compute(const std::vector<Vec3>& seeds, Want want, Diagra
     backend_ = on_cpu_(reason);
     context_.warn("going on with the CPU because of this: " + reason);
   }
-  backend_->evaluate(seeds, want, diagram);
+  return backend_->evaluate(seeds, want, diagram);
 }
 
 template class FallbackOf<Backend>;

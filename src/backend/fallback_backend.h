@@ -27,7 +27,7 @@ class FallbackOf : public Base {
   FallbackOf(const Domain& domain, std::unique_ptr<Base>&& device,
              std::function<std::unique_ptr<Base>(const std::string& reason)> on_cpu, Context context);
 
-  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
 
  private:
   std::function<std::unique_ptr<Base>(const std::string&)> on_cpu_;

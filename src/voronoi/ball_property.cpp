@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <tuple>
 #include <utility>
 
 #include "core/parallel.h"
 #include "mesh/topology.h"
+#include "voronoi/collinear_strips.h"
+#include "voronoi/polygons.h"
 
 namespace bisector {
 namespace {
@@ -32,219 +33,6 @@ std::vector<Index> singletons(std::size_t n) {
   std::iota(parent.begin(), parent.end(), Index{0});
   return parent;
 }
-
-// First polygon of each triangle, and the end.
-std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles) {
-  std::vector<std::size_t> begin(triangles + 1, 0);
-  for (const auto& pair : polygons.pairs) ++begin[pair.triangle + 1];
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  return begin;
-}
-
-bool distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
-
-// Divides collinear triangles as the cells cross their edges. A cell is convex and so meets a line in one interval; the cells
-// along an edge are a list without repeats, and a vertex between the ends splits that list at its owner.
-class Strips {
- public:
-  Strips(const Surface& surface, const RestrictedPolygons& polygons) : surface_(surface), polygons_(polygons) {
-    const std::vector<Triangle>& triangles = surface.mesh.triangles;
-    for (Index t = 0; t < triangles.size(); ++t)
-      if (surface.facet_of[t] == kNone && distinct(triangles[t])) flat_.push_back(t);
-    if (flat_.empty()) return;
-    read_facets();
-    place_loose_vertices();
-    read_flat();
-  }
-
-  std::size_t unread() const { return flat_.size() - chains_.size(); }
-  bool empty() const { return chains_.empty(); }
-
-  // The diagram with the strips among its polygons, without positions; `source` receives the given polygon of each, or
-  // kNone for a strip.
-  RestrictedPolygons merged(std::vector<Index>& source) const {
-    RestrictedPolygons all;
-    std::size_t k = 0;
-    const auto copy_below = [&](std::size_t triangle) {
-      for (; k < polygons_.pairs.size() && polygons_.pairs[k].triangle < triangle; ++k) {
-        all.pairs.push_back(polygons_.pairs[k]);
-        all.labels.insert(all.labels.end(), polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[k]),
-                          polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[k + 1]));
-        all.offsets.push_back(all.labels.size());
-        source.push_back(static_cast<Index>(k));
-      }
-    };
-    for (const auto& [triangle, chain] : chains_) {
-      copy_below(triangle);
-      std::vector<std::size_t> order(chain.cells.size());
-      std::iota(order.begin(), order.end(), std::size_t{0});
-      std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return chain.cells[a] < chain.cells[b]; });
-      for (const std::size_t r : order) {
-        append_strip(chain, r, all.labels);
-        all.pairs.push_back({triangle, chain.cells[r]});
-        all.offsets.push_back(all.labels.size());
-        source.push_back(kNone);
-      }
-    }
-    copy_below(kNone);
-    return all;
-  }
-
- private:
-  using Edge = std::array<Index, 2>;  // lower vertex first
-  using Cells = std::vector<Index>;
-
-  // A triangle's corners along its line, and the cells from the low end to the high one.
-  struct Chain {
-    Index low, middle, high;  // corners
-    Cells cells;
-    std::size_t split = 0;    // the middle corner lies in cells[split]
-  };
-
-  static Edge edge_of(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
-
-  // The cells along an edge from a to b, if known.
-  std::optional<Cells> along(Index a, Index b) const {
-    const auto at = cells_.find(edge_of(a, b));
-    if (at == cells_.end()) return std::nullopt;
-    Cells cells = at->second;
-    if (a > b) std::reverse(cells.begin(), cells.end());
-    return cells;
-  }
-
-  bool know(Index a, Index b, Cells cells) {
-    if (a > b) std::reverse(cells.begin(), cells.end());
-    return cells_.try_emplace(edge_of(a, b), std::move(cells)).second;
-  }
-
-  // What facets say of the edges and vertices of collinear triangles.
-  void read_facets() {
-    const std::vector<Triangle>& triangles = surface_.mesh.triangles;
-    std::vector<char> wanted(surface_.mesh.vertices.size(), 0);
-    for (Index t : flat_)
-      for (Index v : triangles[t]) wanted[v] = 1;
-    const std::vector<std::size_t> begin = first_polygons(polygons_, triangles.size());
-    for (Index t = 0; t < triangles.size(); ++t) {
-      if (surface_.facet_of[t] == kNone) continue;
-      for (Index k = 0; k < 3; ++k) {
-        const Index a = triangles[t][k], b = triangles[t][(k + 1) % 3];
-        if (!wanted[a] && !wanted[b]) continue;
-        const Cells cells = walk(begin[t], begin[t + 1], k);
-        if (cells.empty()) continue;
-        owner_.try_emplace(a, cells.front());
-        owner_.try_emplace(b, cells.back());
-        if (wanted[a] && wanted[b]) know(a, b, cells);
-      }
-    }
-  }
-
-  // The cells along edge k of a facet whose polygons are given.
-  Cells walk(std::size_t begin, std::size_t end, Index k) const {
-    const Index edge = kEdgeLabel | k;
-    std::map<Index, std::array<Index, 2>> ends;  // of each cell: labels before and after the edge
-    Index cell = kNone;
-    for (std::size_t p = begin; p < end; ++p) {
-      const std::size_t first = polygons_.offsets[p], size = polygons_.offsets[p + 1] - first;
-      for (std::size_t e = 0; e < size; ++e) {
-        if (polygons_.labels[first + e] != edge) continue;
-        const Index before = polygons_.labels[first + (e + size - 1) % size];
-        ends[polygons_.pairs[p].cell] = {before, polygons_.labels[first + (e + 1) % size]};
-        if (is_edge(before)) cell = polygons_.pairs[p].cell;
-      }
-    }
-    Cells cells;
-    while (cells.size() < ends.size() && ends.count(cell)) {
-      cells.push_back(cell);
-      cell = ends[cell][1];
-    }
-    return cells;
-  }
-
-  // Vertices that no facet uses are taken to be where the vertex is from which they are reached first: that changes nothing
-  // but the division of triangles without area.
-  void place_loose_vertices() {
-    for (const auto& [v, cell] : owner_) position_[v] = surface_.mesh.vertices[v];
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (Index t : flat_)
-        for (Index v : surface_.mesh.triangles[t]) {
-          if (owner_.count(v)) continue;
-          for (Index from : surface_.mesh.triangles[t])
-            if (!owner_.count(v) && owner_.count(from)) {
-              owner_[v] = owner_[from];
-              position_[v] = position_[from];
-              changed = true;
-            }
-        }
-    }
-  }
-
-  void read_flat() {
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (Index t : flat_)
-        if (!chains_.count(t) && read(t)) changed = true;
-    }
-  }
-
-  bool read(Index t) {
-    const Triangle& v = surface_.mesh.triangles[t];
-    for (Index corner : v)
-      if (!owner_.count(corner)) return false;
-    std::array<Index, 3> order{0, 1, 2};
-    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-      const Vec3 &p = position_.at(v[a]), &q = position_.at(v[b]);
-      return std::tie(p.x, p.y, p.z, v[a]) < std::tie(q.x, q.y, q.z, v[b]);
-    });
-    Chain chain{order[0], order[1], order[2], {}, 0};
-    const Index a = v[chain.low], c = v[chain.middle], b = v[chain.high];
-    // An edge between two vertices at one place lies in their cell.
-    for (const auto& [p, q] : {std::pair{a, c}, std::pair{c, b}, std::pair{a, b}})
-      if (position_.at(p) == position_.at(q)) know(p, q, {owner_.at(p)});
-    std::optional<Cells> whole = along(a, b);
-    const std::optional<Cells> first = along(a, c), second = along(c, b);
-    if (!whole) {
-      if (!first || !second) return false;
-      whole = first;
-      whole->insert(whole->end(), second->begin() + 1, second->end());
-      know(a, b, *whole);
-    }
-    const auto at = std::find(whole->begin(), whole->end(), owner_.at(c));
-    if (at == whole->end()) return false;
-    know(a, c, Cells(whole->begin(), at + 1));
-    know(c, b, Cells(at, whole->end()));
-    chain.split = static_cast<std::size_t>(at - whole->begin());
-    chain.cells = std::move(*whole);
-    chains_.emplace(t, std::move(chain));
-    return true;
-  }
-
-  static void append_strip(const Chain& chain, std::size_t r, std::vector<Index>& labels) {
-    const bool before = r <= chain.split, after = r >= chain.split;  // of the middle corner, on its side
-    if (r > 0) labels.push_back(chain.cells[r - 1]);
-    if ((chain.low + 1) % 3 == chain.middle) {
-      if (before) labels.push_back(kEdgeLabel | chain.low);
-      if (after) labels.push_back(kEdgeLabel | chain.middle);
-    } else {
-      labels.push_back(kEdgeLabel | chain.low);
-    }
-    if (r + 1 < chain.cells.size()) labels.push_back(chain.cells[r + 1]);
-    if ((chain.low + 1) % 3 == chain.middle) {
-      labels.push_back(kEdgeLabel | chain.high);
-    } else {
-      if (after) labels.push_back(kEdgeLabel | chain.high);
-      if (before) labels.push_back(kEdgeLabel | chain.middle);
-    }
-  }
-
-  const Surface& surface_;
-  const RestrictedPolygons& polygons_;
-  std::vector<Index> flat_;          // collinear triangles of three different vertices
-  std::map<Edge, Cells> cells_;      // along edges, from the lower vertex
-  std::map<Index, Index> owner_;     // of vertices
-  std::map<Index, Vec3> position_;
-  std::map<Index, Chain> chains_;    // of the triangles that could be read
-};
 
 // Vertices whose triangles, linked through edges, fall apart into several fans.
 std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std::size_t vertices, const EdgeTable& table) {
@@ -350,6 +138,13 @@ class Complex {
     std::vector<Meeting> meetings;
     std::vector<Index> border;                   // entries on the surface's border
     std::vector<std::array<Index, 2>> closures;  // consecutive entries of the boundary that are joined for its loops only
+
+    void clear() {
+      contacts.clear();
+      meetings.clear();
+      border.clear();
+      closures.clear();
+    }
   };
 
   bool is_read(std::size_t triangle) const { return begin_[triangle] < begin_[triangle + 1]; }
@@ -385,86 +180,105 @@ class Complex {
     }
   }
 
-  void check_cell(Index cell, Scratch& s, BallReport& report) {
-    s.contacts.clear();
-    s.meetings.clear();
-    s.border.clear();
-    s.closures.clear();
+  // What is counted of one cell while its polygons are read.
+  struct CellCounts {
     long long vertices = 0, edges = 0, border_vertices = 0;
     bool plain = true;  // meets no mesh edge of more than two triangles
-    for (const Index* at = of_cell_.begin(cell); at != of_cell_.end(cell); ++at) {
-      const Index p = *at, triangle = diagram_.pairs[p].triangle;
-      for (std::size_t e = diagram_.offsets[p]; e < diagram_.offsets[p + 1]; ++e) {
-        const Index entry = static_cast<Index>(e), label = diagram_.labels[e];
-        const std::size_t previous = step(p, e, false);
-        const Index before = diagram_.labels[previous];
-        if (!is_edge(label)) {
-          ++edges;
-          const bool ends = !is_edge(diagram_.labels[step(p, e, true)]);
-          s.contacts.push_back({label, Kind::piece, entry, (ends ? 1 : 0) + (is_edge(before) ? 0 : 1)});
-          if (is_edge(before)) continue;
-          ++vertices;
-          s.meetings.push_back({std::min(label, before), std::max(label, before), entry});
-          s.closures.push_back({static_cast<Index>(previous), entry});
-          continue;
-        }
-        const Index k = label & ~kEdgeLabel;
-        const Index start = triangles_[triangle][k];
-        if (is_edge(before)) {
-          if (polygon_at_[start] == kNone) {
-            polygon_at_[start] = p;
-            ++vertices;
-          } else {
-            join(parts_, polygon_at_[start], p);
-          }
-        }
-        // The lowest half-edge counts for all on the mesh edge.
-        const std::size_t h = 3 * static_cast<std::size_t>(triangle) + k;
-        const Index twin = twin_[h];
-        const bool on_border = twin == kBorder, branches = twin == kSeveral;
-        if (branches ? several_.at(h).front() != h : twin < h) continue;
-        ++edges;
-        plain = plain && !branches;
-        if (on_border) s.border.push_back(entry);
-        for (bool forward : {false, true}) {
-          const std::size_t side = step(p, e, forward);
-          const Index other = diagram_.labels[side];
-          if (!is_edge(other)) {
-            ++vertices;
-            s.contacts.push_back({other, on_border ? Kind::end : branches ? Kind::branching : Kind::crossing, entry, 0});
-            if (on_border) {
-              ++border_vertices;
-              s.closures.push_back({entry, static_cast<Index>(side)});
-            }
-          } else if (on_border) {
-            Index& piece = piece_at_[forward ? triangles_[triangle][(k + 1) % 3] : start];
-            if (piece == kNone) {
-              piece = entry;
-              ++border_vertices;
-            } else {
-              join(lines_, piece, entry);
-            }
-          }
-        }
-        const auto glue_to = [&](std::size_t h2) {
-          const Index q = polygon_of(h2 / 3, cell);
-          if (q != kNone) glue(p, e, q, h2);
-        };
-        if (branches) {
-          for (const std::size_t h2 : several_.at(h))
-            if (h2 != h) glue_to(h2);
-        } else if (!on_border) {
-          glue_to(twin);
-        }
-      }
-    }
+  };
 
+  void check_cell(Index cell, Scratch& s, BallReport& report) {
+    s.clear();
+    CellCounts counts;
+    for (const Index* p = of_cell_.begin(cell); p != of_cell_.end(cell); ++p)
+      for (std::size_t e = diagram_.offsets[*p]; e < diagram_.offsets[*p + 1]; ++e) {
+        if (is_edge(diagram_.labels[e])) read_mesh_edge(cell, *p, e, s, counts);
+        else read_bisector(*p, e, s, counts);
+      }
     check_edges(cell, s, report);
     check_vertices(cell, s, report);
-    BallReport::Cell found{cell, vertices - edges + static_cast<long long>(of_cell_.size(cell)), 0, 0, 0, 0, {}, {}};
-    found.components = count_roots(parts_, of_cell_.begin(cell), of_cell_.end(cell));
+    conclude_cell(cell, counts, s, report);
+  }
+
+  // A side of polygon p towards another cell, and the vertex where it starts.
+  void read_bisector(Index p, std::size_t e, Scratch& s, CellCounts& counts) const {
+    const Index entry = static_cast<Index>(e), label = diagram_.labels[e];
+    const std::size_t previous = step(p, e, false);
+    const Index before = diagram_.labels[previous];
+    ++counts.edges;
+    const bool ends = !is_edge(diagram_.labels[step(p, e, true)]);
+    s.contacts.push_back({label, Kind::piece, entry, (ends ? 1 : 0) + (is_edge(before) ? 0 : 1)});
+    if (is_edge(before)) return;
+    ++counts.vertices;
+    s.meetings.push_back({std::min(label, before), std::max(label, before), entry});
+    s.closures.push_back({static_cast<Index>(previous), entry});
+  }
+
+  // A side of polygon p on a mesh edge, and the mesh vertex where it starts if it starts in one.
+  void read_mesh_edge(Index cell, Index p, std::size_t e, Scratch& s, CellCounts& counts) {
+    const Index triangle = diagram_.pairs[p].triangle, k = diagram_.labels[e] & ~kEdgeLabel;
+    if (is_edge(diagram_.labels[step(p, e, false)])) read_mesh_vertex(triangles_[triangle][k], p, counts);
+    // The lowest half-edge counts for all on the mesh edge.
+    const std::size_t h = 3 * static_cast<std::size_t>(triangle) + k;
+    const Index twin = twin_[h];
+    const bool on_border = twin == kBorder, branches = twin == kSeveral;
+    if (branches ? several_.at(h).front() != h : twin < h) return;
+    ++counts.edges;
+    counts.plain = counts.plain && !branches;
+    if (on_border) s.border.push_back(static_cast<Index>(e));
+    for (const bool forward : {false, true}) read_end(p, e, forward, twin, s, counts);
+    if (branches) {
+      for (const std::size_t other : several_.at(h))
+        if (other != h) glue_across(cell, p, e, other);
+    } else if (!on_border) {
+      glue_across(cell, p, e, twin);
+    }
+  }
+
+  void read_mesh_vertex(Index vertex, Index p, CellCounts& counts) {
+    if (polygon_at_[vertex] == kNone) {
+      polygon_at_[vertex] = p;
+      ++counts.vertices;
+    } else {
+      join(parts_, polygon_at_[vertex], p);
+    }
+  }
+
+  // An end of the side e of polygon p on a mesh edge: another cell's bisector crosses the mesh edge there, or a piece of the border
+  // meets the next in a mesh vertex.
+  void read_end(Index p, std::size_t e, bool forward, Index twin, Scratch& s, CellCounts& counts) {
+    const Index entry = static_cast<Index>(e);
+    const bool on_border = twin == kBorder;
+    const std::size_t side = step(p, e, forward);
+    const Index other = diagram_.labels[side];
+    if (!is_edge(other)) {
+      ++counts.vertices;
+      s.contacts.push_back({other, on_border ? Kind::end : twin == kSeveral ? Kind::branching : Kind::crossing, entry, 0});
+      if (!on_border) return;
+      ++counts.border_vertices;
+      s.closures.push_back({entry, static_cast<Index>(side)});
+    } else if (on_border) {
+      const Index k = diagram_.labels[e] & ~kEdgeLabel;
+      Index& piece = piece_at_[triangles_[diagram_.pairs[p].triangle][forward ? (k + 1) % 3 : k]];
+      if (piece == kNone) {
+        piece = entry;
+        ++counts.border_vertices;
+      } else {
+        join(lines_, piece, entry);
+      }
+    }
+  }
+
+  void glue_across(Index cell, Index p, std::size_t e, std::size_t half_edge) {
+    const Index q = polygon_of(half_edge / 3, cell);
+    if (q != kNone) glue(p, e, q, half_edge);
+  }
+
+  void conclude_cell(Index cell, const CellCounts& counts, const Scratch& s, BallReport& report) {
+    const Index *begin = of_cell_.begin(cell), *end = of_cell_.end(cell);
+    BallReport::Cell found{cell, counts.vertices - counts.edges + static_cast<long long>(of_cell_.size(cell)), 0, 0, 0, 0, {}, {}};
+    found.components = count_roots(parts_, begin, end);
     found.border_parts = count_roots(lines_, s.border.data(), s.border.data() + s.border.size());
-    found.border_euler = border_vertices - static_cast<long long>(s.border.size());
+    found.border_euler = counts.border_vertices - static_cast<long long>(s.border.size());
     for (const auto& [a, b] : s.closures) join(lines_, a, b);
     std::vector<Index> boundary = s.border;
     for (const Contact& c : s.contacts)
@@ -474,8 +288,8 @@ class Complex {
     report.euler += found.euler;
     const bool connected = found.components == 1 && found.euler == 1;
     const bool border = found.border_parts == 0 || (found.border_parts == 1 && found.border_euler == 1);
-    if (connected && (!plain || (found.loops == 1 && border))) return;
-    found.parts = groups(parts_, of_cell_.begin(cell), of_cell_.end(cell));
+    if (connected && (!counts.plain || (found.loops == 1 && border))) return;
+    found.parts = groups(parts_, begin, end);
     found.loop_parts = groups(lines_, boundary.data(), boundary.data() + boundary.size());
     report.cells.push_back(std::move(found));
   }
@@ -593,7 +407,7 @@ void restore_indices(const RestrictedPolygons& merged, const std::vector<Index>&
 }  // namespace
 
 BallReport check_ball_property(const Surface& surface, const RestrictedPolygons& polygons) {
-  const Strips strips(surface, polygons);
+  const CollinearStrips strips(surface, polygons);
   BallReport report;
   if (strips.empty()) {
     report = Complex(surface, polygons).check();

@@ -1,23 +1,20 @@
 #include "voronoi/clipped.h"
 
 #include <algorithm>
-#include <chrono>
 
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "voronoi/clip_tet.h"
 #include "voronoi/fixed_tree_sum.h"
+#include "voronoi/marks.h"
 #include "voronoi/polyhedra.h"
 #include "voronoi/step_mass.h"
 
 namespace bisector {
 namespace {
 
-constexpr std::size_t kWalks = 16;   // cells that are walked together
-constexpr std::size_t kWholes = 256;  // cells that are taken whole together
-
-double seconds_between(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
-  return std::chrono::duration<double>(b - a).count();
-}
+constexpr std::size_t kWalks = 16;    // cells of a chunk that are cut up
+constexpr std::size_t kWholes = 256;  // cells of a chunk that are taken whole
 
 // What one chunk of cells contributes.
 struct Chunk {
@@ -25,37 +22,15 @@ struct Chunk {
   std::vector<Index> neighbours;       // slots of the bisectors of its polyhedra
   std::vector<Index> tets;             // of each neighbour: one where the two cells meet
   ClippedPolyhedra polyhedra;
-  Certification certification;
+  PairCounts counts;
 
   void clear() {
     first_neighbour.clear();
     neighbours.clear();
     tets.clear();
     polyhedra = {};
-    certification = {};
+    counts = {};
   }
-};
-
-// Marks by generation, so that nothing has to be cleared.
-class Marks {
- public:
-  void begin(std::size_t size) {
-    if (stamps_.size() != size || now_ == kNone - 1) {
-      stamps_.assign(size, 0);
-      now_ = 0;
-    }
-    ++now_;
-  }
-  // Whether k was not marked before.
-  bool mark(Index k) {
-    if (stamps_[k] == now_) return false;
-    stamps_[k] = now_;
-    return true;
-  }
-
- private:
-  std::vector<Index> stamps_;
-  Index now_ = 0;
 };
 
 // Per thread: a clipper, and what the current cell has met.
@@ -103,7 +78,7 @@ struct ClippedVoronoi::Work {
   void take_inner(const std::vector<Start>& reached, CellMoments& result, bool want_polyhedra);
   std::vector<Start> newly_reached(const std::vector<Chunk>& chunks);
   void gather(ClippedPolyhedra& polyhedra) const;
-  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want, Diagram& diagram);
+  DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want, Diagram& diagram);
 };
 
 ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
@@ -148,10 +123,9 @@ void ClippedVoronoi::Work::walk(Index slot, const Starts& starts, Walker& walker
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index tet = walker.queue[head];
     const bool found = clipper.clip(frames[tet]);
-    chunk.certification.uncertain += clipper.uncertain();
-    chunk.certification.wider += clipper.wider();
+    chunk.counts.add_doubts(clipper);
     if (!found) continue;
-    ++chunk.certification.pairs;
+    ++chunk.counts.pairs;
     clipper.each_label([&](Index label) {
       if (is_facet(label)) {
         const Index across = solid.adjacent[tet][label & ~kFacetLabel];
@@ -178,8 +152,7 @@ void ClippedVoronoi::Work::take_whole(Index slot, Walker& walker, Chunk& chunk, 
   clipper.begin(slot);
   chunk.first_neighbour.push_back(static_cast<Index>(chunk.neighbours.size()));
   const bool found = clipper.clip(enclosure);
-  chunk.certification.uncertain += clipper.uncertain();
-  chunk.certification.wider += clipper.wider();
+  chunk.counts.add_doubts(clipper);
   if (!found) return;
   const std::size_t first = chunk.neighbours.size();
   bool bounded = true;
@@ -273,15 +246,16 @@ void ClippedVoronoi::Work::take_inner(const std::vector<Start>& reached, CellMom
     }
   }
   for (std::size_t k = 0; k < slots.size(); ++k) {
-    if (inside[slots[k]]) ++chunks[k / kWholes].certification.pairs;
+    if (inside[slots[k]]) ++chunks[k / kWholes].counts.pairs;
     else result.cells[seeds().id[slots[k]]] = {};
   }
 }
 
-void ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want, Diagram& diagram) {
-  boundary.trace(given, source, want, diagram);
+DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want,
+                                           Diagram& diagram) {
+  DiagramWork work = boundary.trace(given, source, want, diagram);
   CellMoments& result = diagram.moments;
-  const auto t0 = std::chrono::steady_clock::now();
+  Stopwatch watch;
   ++generation;
   round_count = 0;
   result.cells.assign(given.size(), Moments{});
@@ -292,17 +266,13 @@ void ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSou
   set_step_masses(seeds(), boundary.neighbours(), result);
   result.mass = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].second; });
-  result.certification = {};
+  work.counts = {};
   for (std::size_t r = 0; r < round_count; ++r)
-    for (const Chunk& chunk : rounds[r]) {
-      result.certification.pairs += chunk.certification.pairs;
-      result.certification.uncertain += chunk.certification.uncertain;
-      result.certification.wider += chunk.certification.wider;
-    }
-  result.certification.cpu = result.certification.uncertain;
-  result.seconds.pairs += result.seconds.clip;
-  result.seconds.clip = seconds_between(t0, std::chrono::steady_clock::now());
+    for (const Chunk& chunk : rounds[r]) work.counts += chunk.counts;
+  work.owners += work.clip;
+  work.clip = watch.seconds();
   if (want_polyhedra) gather(diagram.polyhedra);
+  return work;
 }
 
 // Polyhedra lie in chunks by cells; the result is in order of tetrahedra, then cells.
@@ -348,8 +318,8 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
 ClippedVoronoi::ClippedVoronoi(const Solid& solid, InnerCells inner) : work_(std::make_unique<Work>(solid, inner)) {}
 ClippedVoronoi::~ClippedVoronoi() = default;
 
-void ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
-  work_->evaluate(seeds, source, want, diagram);
+DiagramWork ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
+  return work_->evaluate(seeds, source, want, diagram);
 }
 
 std::vector<Tetrahedron> dual_tets(const ClippedPolyhedra& polyhedra) {

@@ -30,7 +30,7 @@ class ClippedVoronoi {
   // Sets the moments of every cell in the solid, zero for a seed whose cell lies outside, and of the polygons of the boundary and the
   // polyhedra what is wanted. `moments.triangles` are the incident boundary triangles of each cell: seeds with any are boundary
   // seeds. Between calls memory is kept, and the last diagram serves for first guesses.
-  void evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
+  DiagramWork evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
 
  private:
   struct Work;

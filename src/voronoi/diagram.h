@@ -1,20 +1,15 @@
 // What is known of a Voronoi diagram on a surface or in a solid, and which parts of it a caller asks for.
 #pragma once
 
-#include <array>
-#include <cstdint>
+#include <cstddef>
 #include <vector>
 
+#include "bisector/cells.h"
 #include "bisector/device.h"
 #include "core/geometry.h"
 #include "voronoi/moments.h"
-#include "voronoi/surface.h"
 
 namespace bisector {
-
-// What a polyhedron's facet lies on: a seed (its bisector with the cell's own), or facet k of the tetrahedron.
-inline constexpr Index kFacetLabel = 0x80000000u;
-inline bool is_facet(Index label) { return label & kFacetLabel; }
 
 // Integrals over the restricted or clipped cells; positions are relative to the seed.
 struct CellMoments {
@@ -25,47 +20,36 @@ struct CellMoments {
   double mass = 0;                 // sum over the cells
   double energy = 0;               // sum of the second moments: the CVT energy
   Csr<Index> triangles;            // incident triangles of each cell, of the surface or the solid's boundary, ascending
-  Certification certification;
+  Certification certification;     // as Backend::evaluate() reports it
   DiagramSeconds seconds;
 };
 
-// The non-empty intersections of cells and triangles, sorted by (triangle, cell).
-struct RestrictedPolygons {
-  struct Pair {
-    Index triangle, cell;
-  };
-  std::vector<Pair> pairs;
-  std::vector<std::size_t> offsets{0};  // polygon k has the entries offsets[k] .. offsets[k + 1)
-  // Entry e: the counter-clockwise polygon's vertex and the label of the edge that starts there. The vertex is where the
-  // preceding label and this one meet.
-  std::vector<Index> labels;
-  std::vector<Vec3> vertices;
+// How many pairs of a cell and a triangle or tetrahedron there are, and how many took more than the first attempt.
+struct PairCounts {
+  std::size_t pairs = 0;
+  std::size_t uncertain = 0;  // settled in exact arithmetic
+  std::size_t wider = 0;      // needed a longer list of neighbours
+
+  // What a clipper has to say of its last pair.
+  template <class AnyClipper>
+  void add_doubts(const AnyClipper& clipper) {
+    uncertain += clipper.uncertain();
+    wider += clipper.wider();
+  }
+  PairCounts& operator+=(const PairCounts& b) {
+    pairs += b.pairs;
+    uncertain += b.uncertain;
+    wider += b.wider;
+    return *this;
+  }
 };
 
-// The non-empty intersections of cells and tetrahedra, sorted by (tetrahedron, cell); inner cells taken whole have the
-// tetrahedron kNone and come last. A polyhedron is kept in dual form: the labels of its facets, ascending (facets of the
-// tetrahedron after seeds), and its vertices as triples of positions in that list.
-struct ClippedPolyhedra {
-  struct Pair {
-    Index tet, cell;
-  };
-  std::vector<Pair> pairs;
-  std::vector<std::size_t> label_offsets{0};   // of pair k: label_offsets[k] .. label_offsets[k + 1)
-  std::vector<Index> labels;
-  std::vector<std::size_t> vertex_offsets{0};  // likewise
-  // The three planes of a vertex, counter-clockwise around it seen from outside, the first the least; sorted in each pair.
-  std::vector<std::array<std::uint16_t, 3>> triples;
-  std::vector<Vec3> vertices;                  // where the planes of each triple meet
-};
-
-// The restricted Delaunay triangulation.
-struct Dual {
-  // Triples of cells that share a vertex of the diagram, each oriented as the surface at its first such vertex. Sorted as
-  // ascending triples, without repeats.
-  std::vector<Triangle> triangles;
-  // How many vertices of the diagram each triple has; 1 where the topological ball property holds.
-  std::vector<Index> multiplicity;
-  std::vector<Index> mesh_triangle;  // in which its first such vertex lies
+// What computing a diagram took, in seconds by phase.
+struct DiagramWork {
+  PairCounts counts;
+  double delaunay = 0, neighbours = 0;  // lists of neighbours, by their source
+  double owners = 0;                    // which cells the vertices lie in; for a solid all that concerns its boundary
+  double clip = 0;                      // clipping and sums
 };
 
 // Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it.

@@ -5,12 +5,11 @@
 #include <memory>
 #include <vector>
 
-#include "bisector/device.h"
+#include "bisector/cells.h"
 #include "core/geometry.h"
 #include "spatial/seed_tree.h"
 
 namespace bisector {
-
 
 // The distinct seeds in a spatial order. Internal indices ("slots") index `x`; `id` maps them to the caller's indices,
 // which alone decide ties. A seed equal to one of lower index owns nothing and has no slot.

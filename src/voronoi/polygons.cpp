@@ -1,5 +1,7 @@
 #include "voronoi/polygons.h"
 
+#include <numeric>
+
 namespace bisector {
 
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot, RestrictedPolygons& out) {
@@ -12,6 +14,13 @@ void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index tria
     out.vertices.push_back(seeds.x[slot] + clipper.vertex(k));
   }
   out.offsets.push_back(out.labels.size());
+}
+
+std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles) {
+  std::vector<std::size_t> begin(triangles + 1, 0);
+  for (const auto& pair : polygons.pairs) ++begin[pair.triangle + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  return begin;
 }
 
 }  // namespace bisector

@@ -1,12 +1,18 @@
-// Polygons of a diagram as they leave a clipper.
+// Polygons of a diagram: how they leave a clipper, and where those of a triangle lie.
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include "voronoi/clip.h"
-#include "voronoi/restricted.h"
+#include "voronoi/diagram.h"
 
 namespace bisector {
 
 // Appends the clipper's polygon on the triangle, starting at the edge of the smallest label; slots become the caller's indices.
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot, RestrictedPolygons& out);
+
+// The first polygon of each triangle, and one past the last.
+std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles);
 
 }  // namespace bisector

@@ -1,11 +1,12 @@
 #include "voronoi/restricted.h"
 
 #include <algorithm>
-#include <chrono>
 
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "voronoi/clip.h"
 #include "voronoi/fixed_tree_sum.h"
+#include "voronoi/marks.h"
 #include "voronoi/owner.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
@@ -15,10 +16,8 @@ namespace {
 
 constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
 constexpr std::size_t kRanges = 8;  // of triangles, in the sort by cells
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
+constexpr std::size_t kMostFacets = 512, kFewestChunks = 256;  // of a chunk; and chunks, where facets are few and large
+constexpr std::size_t kPointsAtOnce = 256, kCellsAtOnce = 256;  // of a parallel loop
 
 // The moments of a pair whose cell holds all of the facet are left to the facet's summary.
 constexpr Index kWhole = kNone;
@@ -35,29 +34,31 @@ struct Chunk {
   std::vector<Index> first_label;  // of each of `moments`, in `labels`; and one past the last
   std::vector<Index> labels;       // bounding lines in cyclic order: slots or facet edges
   RestrictedPolygons polygons;
-  Certification certification;
+  PairCounts counts;
+
+  void clear() {
+    entries.clear();
+    moments.clear();
+    first_label.clear();
+    labels.clear();
+    polygons = {};
+    counts = {};
+  }
 };
 
 // Per thread: a clipper, and the cells that the current facet has met.
 struct Walker {
   Clipper clipper;
   std::vector<Index> queue;
-  std::vector<Index> stamp;  // by slot: the last visit
-  Index visit = 0;
+  Marks met;                     // slots
   std::uint64_t generation = 0;  // of the seeds that the clipper knows
 
   void begin(std::size_t slots) {
-    if (stamp.size() != slots || visit == kNone - 1) {
-      stamp.assign(slots, 0);
-      visit = 0;
-    }
-    ++visit;
+    met.begin(slots);
     queue.clear();
   }
   void meet(Index slot) {
-    if (stamp[slot] == visit) return;
-    stamp[slot] = visit;
-    queue.push_back(slot);
+    if (met.mark(slot)) queue.push_back(slot);
   }
 };
 
@@ -68,7 +69,7 @@ struct RestrictedVoronoi::Work {
   SortedSeeds seeds;
   Neighbours neighbours;
   NeighbourSource built_source = NeighbourSource::nearest;
-  std::vector<Index> owner;   // slot of each site
+  std::vector<Index> owner;   // slot of each used vertex
   std::vector<Index> hint;    // owner's seed index in the last diagram
   std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
   std::uint64_t generation = 0;  // of `seeds`
@@ -91,21 +92,22 @@ struct RestrictedVoronoi::Work {
   bool confirm_last(std::size_t facet, Index slot, Clipper& clipper) const;
   std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
   void sort_items();
-  void list_triangles(std::size_t seed_count, CellMoments& result);
+  PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
   void gather(RestrictedPolygons& polygons) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
-  void evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want, Diagram& diagram);
+  DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want,
+                       Diagram& diagram);
 };
 
 void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
-  const std::size_t n = surface.sites.size();
+  const std::size_t n = surface.used_vertices.size();
   owner.resize(n);
   hint.resize(n, kNone);
-  parallel_chunks(n, 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+  parallel_chunks(n, kPointsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     Index last = kNone;
     for (std::size_t k = begin; k < end; ++k) {
-      const Vec3& q = surface.mesh.vertices[surface.sites[k]];
+      const Vec3& q = surface.mesh.vertices[surface.used_vertices[k]];
       Index guess = hint[k] < seed_count ? seeds.slot[hint[k]] : kNone;
       if (guess == kNone) guess = last;
       if (guess == kNone) guess = neighbours.nearest(q);
@@ -118,9 +120,9 @@ void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
 void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk, bool want_polygons) const {
   const FacetSummary& summary = surface.summaries[index];
   Clipper& clipper = walker.clipper;
-  const Index first = owner[summary.site[0]];
+  const Index first = owner[summary.vertex[0]];
   // A cell is convex: it holds the facet if it owns the corners.
-  if (first == owner[summary.site[1]] && first == owner[summary.site[2]]) {
+  if (first == owner[summary.vertex[1]] && first == owner[summary.vertex[2]]) {
     chunk.entries.push_back({first, kWhole});
     if (want_polygons) {
       clipper.begin(surface.facets[index]);
@@ -132,13 +134,12 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
   const bool uniform = surface.density.empty();
   clipper.begin(surface.facets[index]);
   walker.begin(seeds.x.size());
-  for (Index site : summary.site) walker.meet(owner[site]);
+  for (const Index vertex : summary.vertex) walker.meet(owner[vertex]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index slot = walker.queue[head];
     if (!confirm_last(index, slot, clipper)) {
       const bool found = clipper.clip(neighbours, slot);
-      chunk.certification.uncertain += clipper.uncertain();
-      chunk.certification.wider += clipper.wider();
+      chunk.counts.add_doubts(clipper);
       if (!found) continue;
     }
     chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
@@ -174,8 +175,7 @@ std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk&
 
 void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
   const std::size_t n = surface.facets.size();
-  // Small chunks where facets are few and large.
-  chunk_size = std::clamp<std::size_t>(n / 256, 1, 512);
+  chunk_size = std::clamp<std::size_t>(n / kFewestChunks, 1, kMostFacets);
   chunks.swap(last_chunks);
   first_entry.swap(last_first_entry);
   chunks.resize((n + chunk_size - 1) / chunk_size);
@@ -183,12 +183,7 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
   ++generation;
   parallel_chunks(n, chunk_size, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Chunk& chunk = chunks[c];
-    chunk.entries.clear();
-    chunk.moments.clear();
-    chunk.first_label.clear();
-    chunk.labels.clear();
-    chunk.polygons = {};
-    chunk.certification = {};
+    chunk.clear();
     Walker& walker = walkers.local();
     if (walker.generation != generation) {
       walker.generation = generation;
@@ -239,7 +234,8 @@ void RestrictedVoronoi::Work::sort_items() {
   });
 }
 
-void RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellMoments& result) {
+// Sets the incident triangles of each cell. Returns the counts of all pairs.
+PairCounts RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellMoments& result) {
   sort_items();
   const std::size_t slots = seeds.x.size();
   result.triangles.offsets.assign(seed_count + 1, 0);
@@ -248,24 +244,21 @@ void RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellMoments
     result.triangles.offsets[i + 1] = result.triangles.offsets[i] + (s == kNone ? 0 : cell_begin[s + 1] - cell_begin[s]);
   }
   result.triangles.values.resize(items.size());
-  parallel_chunks(slots, 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+  parallel_chunks(slots, kCellsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       Index* triangles = result.triangles.values.data() + result.triangles.offsets[seeds.id[s]];
       for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) *triangles++ = surface.summaries[items[k].facet].triangle;
     }
   });
-  result.certification = {};
-  result.certification.pairs = items.size();
-  for (const Chunk& chunk : chunks) {
-    result.certification.uncertain += chunk.certification.uncertain;
-    result.certification.wider += chunk.certification.wider;
-  }
-  result.certification.cpu = result.certification.uncertain;
+  PairCounts counts;
+  for (const Chunk& chunk : chunks) counts += chunk.counts;
+  counts.pairs = items.size();
+  return counts;
 }
 
 void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
   result.cells.assign(seed_count, Moments{});
-  parallel_chunks(seeds.x.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+  parallel_chunks(seeds.x.size(), kCellsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     FixedTreeSum sum;
     for (std::size_t s = begin; s < end; ++s) {
       for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
@@ -289,28 +282,26 @@ bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSo
   return neighbours.update();
 }
 
-void RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want,
-                                       Diagram& diagram) {
+DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments,
+                                              Want want, Diagram& diagram) {
   const bool want_polygons = includes(want, Want::polygons);
-  CellMoments& result = diagram.moments;
-  const auto t0 = std::chrono::steady_clock::now();
+  DiagramWork work;
+  Stopwatch watch;
   followed = follow(given, source);
   if (!followed) {
     seeds = sort_seeds(given);
     neighbours.build(seeds, source);
     built_source = source;
   }
-  const auto t1 = std::chrono::steady_clock::now();
+  (source == NeighbourSource::delaunay ? work.delaunay : work.neighbours) = watch.lap();
   find_owners(given.size());
-  const auto t2 = std::chrono::steady_clock::now();
+  work.owners = watch.lap();
   clip_facets(want_polygons);
-  list_triangles(given.size(), result);
-  if (want_moments) sum_cells(given.size(), result);
-  const double building = std::chrono::duration<double>(t1 - t0).count();
-  const bool delaunay = source == NeighbourSource::delaunay;
-  result.seconds = {delaunay ? building : 0, delaunay ? 0 : building, std::chrono::duration<double>(t2 - t1).count(),
-                    seconds_since(t2), {}};
+  work.counts = list_triangles(given.size(), diagram.moments);
+  if (want_moments) sum_cells(given.size(), diagram.moments);
+  work.clip = watch.lap();
   if (want_polygons) gather(diagram.polygons);
+  return work;
 }
 
 // Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of triangles,
@@ -342,36 +333,17 @@ void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
   }
 }
 
-DeviceSeconds& DeviceSeconds::operator+=(const DeviceSeconds& b) {
-  transfer += b.transfer;
-  grid += b.grid;
-  neighbours += b.neighbours;
-  owners += b.owners;
-  clip += b.clip;
-  sort += b.sort;
-  sum += b.sum;
-  return *this;
-}
-
-DiagramSeconds& DiagramSeconds::operator+=(const DiagramSeconds& b) {
-  delaunay += b.delaunay;
-  neighbours += b.neighbours;
-  pairs += b.pairs;
-  clip += b.clip;
-  device += b.device;
-  return *this;
-}
-
 RestrictedVoronoi::RestrictedVoronoi(const Surface& surface, ListLength lists)
     : work_(std::make_unique<Work>(surface, lists)) {}
 RestrictedVoronoi::~RestrictedVoronoi() = default;
 
-void RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
-  work_->evaluate(seeds, source, true, want, diagram);
+DiagramWork RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want,
+                                        Diagram& diagram) {
+  return work_->evaluate(seeds, source, true, want, diagram);
 }
 
-void RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
-  work_->evaluate(seeds, source, false, want, diagram);
+DiagramWork RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
+  return work_->evaluate(seeds, source, false, want, diagram);
 }
 
 const SortedSeeds& RestrictedVoronoi::seeds() const { return work_->seeds; }

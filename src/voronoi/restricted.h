@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "bisector/device.h"
+#include "bisector/cells.h"
 #include "core/geometry.h"
 #include "voronoi/diagram.h"
 #include "voronoi/neighbours.h"
@@ -24,9 +24,9 @@ class RestrictedVoronoi {
 
   // Sets the moments of every cell, and the polygons if they are wanted. Between calls memory is kept, and the owners of the last
   // diagram serve as first guesses.
-  void evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
-  // Only who meets whom: of the moments `triangles`, `certification` and `seconds`, and the polygons if they are wanted.
-  void trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
+  DiagramWork evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
+  // Only who meets whom: of the moments the `triangles`, and the polygons if they are wanted.
+  DiagramWork trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
 
   // Of the last diagram.
   const SortedSeeds& seeds() const;

@@ -58,10 +58,10 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
       of_point.push_back(v);
     }
   box = bounding_box(points);
-  std::vector<Index> site_of(mesh.vertices.size(), kNone);
+  std::vector<Index> place_of(mesh.vertices.size(), kNone);
   for (Index k : hilbert_order(points)) {
-    site_of[of_point[k]] = static_cast<Index>(sites.size());
-    sites.push_back(of_point[k]);
+    place_of[of_point[k]] = static_cast<Index>(used_vertices.size());
+    used_vertices.push_back(of_point[k]);
   }
 
   facet_of.assign(mesh.triangles.size(), kNone);
@@ -76,7 +76,7 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     for (unsigned char m = 0; m < 3; ++m) {
       f.corners[m] = mesh.vertices[v[m]];
       f.density[m] = density.empty() ? 1.0 : density[v[m]];
-      summary.site[m] = site_of[v[m]];
+      summary.vertex[m] = place_of[v[m]];
       const unsigned char next = static_cast<unsigned char>((m + 1) % 3);
       f.origin[m] = v[m] < v[next] ? m : next;
       edges[m] = {std::min(v[m], v[next]), std::max(v[m], v[next]), m};

@@ -3,14 +3,11 @@
 
 #include <vector>
 
+#include "bisector/cells.h"
 #include "core/geometry.h"
 #include "voronoi/moments.h"
 
 namespace bisector {
-
-// Labels of polygon edges on a facet: a seed, or the facet's edge k (from corner k to corner k + 1).
-inline constexpr Index kEdgeLabel = 0x80000000u;
-inline bool is_edge(Index label) { return label & kEdgeLabel; }
 
 // One triangle as the clipping reads it. Edge k runs from corner k to corner k + 1.
 struct Facet {
@@ -27,7 +24,7 @@ struct Facet {
 struct FacetSummary {
   Vec3 anchor;      // position of that corner
   Moments moments;  // of the whole triangle, about the anchor
-  Index site[3];    // of the corners, in Surface::sites
+  Index vertex[3];  // the corners' places in Surface::used_vertices
   Index triangle;   // index in the mesh
 };
 
@@ -44,11 +41,11 @@ struct Surface {
   std::vector<double> density;       // per vertex, or empty
   std::vector<Facet> facets;         // in a spatial order; exactly collinear triangles are left out
   std::vector<FacetSummary> summaries;  // of the facets
-  std::vector<Index> sites;          // the vertices that facets use, in a spatial order
+  std::vector<Index> used_vertices;  // of the mesh: those that facets use, in a spatial order
   std::vector<Index> facet_of;       // of each triangle, or kNone
   double area = 0;
   double mass = 0;                   // integral of the density
-  Box box;                           // of the sites
+  Box box;                           // of the used vertices
 };
 
 }  // namespace bisector

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "core/parallel.h"
+#include "voronoi/polygons.h"
 
 namespace bisector {
 namespace {
@@ -55,16 +56,13 @@ bool tiles(const std::vector<Side>& sides) {
 }  // namespace
 
 std::size_t count_untiled(const Surface& surface, const RestrictedPolygons& polygons) {
-  // First polygon of each triangle; triangles without area have none and are not asked about.
   const std::size_t n = surface.mesh.triangles.size();
-  std::vector<std::size_t> begin(n + 1, 0);
-  for (const auto& pair : polygons.pairs) ++begin[pair.triangle + 1];
-  for (std::size_t t = 0; t < n; ++t) begin[t + 1] += begin[t];
+  const std::vector<std::size_t> begin = first_polygons(polygons, n);
   std::atomic<std::size_t> failed{0};
   parallel_chunks(n, 512, [&](std::size_t, std::size_t from, std::size_t to) {
     std::vector<Side> sides;
     for (std::size_t t = from; t < to; ++t) {
-      if (surface.facet_of[t] == kNone) continue;
+      if (surface.facet_of[t] == kNone) continue;  // a triangle without area has no polygons
       sides.clear();
       for (std::size_t k = begin[t]; k < begin[t + 1]; ++k) {
         const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;

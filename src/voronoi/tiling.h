@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "voronoi/diagram.h"
+#include "voronoi/surface.h"
 
 namespace bisector {
 

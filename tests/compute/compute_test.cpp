@@ -31,10 +31,11 @@ class FailingBackend : public CpuBackend {
   double energy_noise() const override { return 1e-7; }
 
  private:
-  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override {
-    CpuBackend::compute(seeds, want, diagram);
+  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override {
+    const EvaluationReport report = CpuBackend::compute(seeds, want, diagram);
     if (left_ == 0) diagram.polygons.pairs.resize(diagram.polygons.pairs.size() / 2);
     fail(diagram.moments);
+    return report;
   }
   void fail(CellMoments& moments) {
     if (left_-- > 0) return;
@@ -178,7 +179,7 @@ class BrokenBackend : public CpuBackend {
   using CpuBackend::CpuBackend;
 
  private:
-  void compute(const std::vector<Vec3>&, Want, Diagram&) override { throw Error("bad input"); }
+  EvaluationReport compute(const std::vector<Vec3>&, Want, Diagram&) override { throw Error("bad input"); }
 };
 
 TEST_F(Compute, OtherErrorsAreNotTheDevices) {
@@ -218,9 +219,10 @@ class NoisyBackend : public CpuBackend {
   double energy_noise() const override { return noise_; }
 
  private:
-  void compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override {
-    CpuBackend::compute(seeds, want, diagram);
+  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override {
+    const EvaluationReport report = CpuBackend::compute(seeds, want, diagram);
     diagram.moments.energy *= 1 + 5e-7 * (2 * Random(7, evaluations_++).uniform() - 1);
+    return report;
   }
 
   double noise_;

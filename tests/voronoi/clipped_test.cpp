@@ -25,7 +25,8 @@ constexpr NeighbourSource kSources[] = {NeighbourSource::nearest, NeighbourSourc
 
 Diagram diagram_of(ClippedVoronoi& voronoi, const std::vector<Vec3>& seeds, NeighbourSource source) {
   Diagram d;
-  voronoi.evaluate(seeds, source, Want::polygons | Want::polyhedra, d);
+  const DiagramWork work = voronoi.evaluate(seeds, source, Want::polygons | Want::polyhedra, d);
+  EXPECT_EQ(work.counts.pairs, d.polyhedra.pairs.size());
   return d;
 }
 
@@ -120,7 +121,6 @@ bool triangles_differ(const Solid& solid) {
 void expect_sound(const Solid& solid, const Diagram& d) {
   EXPECT_EQ(count_untiled(solid, d.polyhedra), 0u);
   EXPECT_NEAR(d.moments.mass, solid.mass, 1e-12 * solid.mass);
-  EXPECT_EQ(d.moments.certification.pairs, d.polyhedra.pairs.size());
   const auto pairs = pairs_of(d.polyhedra);
   EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
   EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end());
