@@ -154,7 +154,7 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
                           fmt::format("{:.2f}", median(base.total) / median(s.total)),
                           fmt::format("{:.0f}", s.memory), std::to_string(m.certification.pairs),
                           std::to_string(m.certification.uncertain), std::to_string(m.certification.wider),
-                          fmt::format("{:.1e}", std::abs(m.mass - surface.mass) / surface.mass)});
+                          fmt::format("{:.1e}", std::abs(s.mass - surface.mass) / surface.mass)});
     if (is_cpu(options.device.device)) continue;
     const DeviceSeconds& d = m.seconds.device;
     std::vector<std::string>& row = table.rows.back();
