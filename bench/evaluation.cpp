@@ -16,12 +16,11 @@
 #include "backend/cpu_backend.h"
 #include "bisector/error.h"
 #include "bisector/io.h"
-#include "common.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
-#include "delaunay_time.h"
 #include "io/files.h"
-#include "voronoi/restricted.h"
+#include "common.h"
+#include "delaunay_time.h"
 
 namespace {
 
@@ -47,8 +46,8 @@ struct Run {
   EvaluationReport report;
 };
 
-// From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which
-// has compiled its kernels and got its memory.
+// From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which has
+// compiled its kernels and got its memory.
 Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source, unsigned threads,
              Backend* device) {
   const ThreadLimit limit(threads);
@@ -66,8 +65,8 @@ Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSo
   const double missing = std::abs(run.diagram.moments.mass - surface.mass);
   run.total = watch.seconds();
   if (!(missing <= (device ? device->mass_tolerance() : 1e-12) * surface.mass))
-    throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(),
-                            run.diagram.moments.mass, surface.mass));
+    throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(), run.diagram.moments.mass,
+                            surface.mass));
   return run;
 }
 
@@ -75,22 +74,12 @@ std::unique_ptr<Backend> device_of(const Surface& surface, const Options& option
   return is_cpu(options.device.device) ? nullptr : make_device_backend(surface, options.device, source);
 }
 
-// Peak resident memory, in MiB, of a process that reads the model and evaluates once. Must come before the first loop
-// of this process: a new process counts what its parent held.
+// Peak resident memory, in MiB, of a process that reads the model and evaluates once. Must come before the first loop of
+// this process: a new process counts what its parent held.
 double peak_memory(const Options& options, std::size_t seeds, const std::string& source, unsigned threads) {
-  std::vector<std::string> words{"bench_evaluation",
-                                 options.model,
-                                 "--once",
-                                 "--seeds",
-                                 std::to_string(seeds),
-                                 "--sources",
-                                 source,
-                                 "--threads",
-                                 std::to_string(threads),
-                                 "--device",
-                                 word_of(options.device.device),
-                                 "--precision",
-                                 std::string(cli::kPrecisionWords.word_of(options.device.precision))};
+  std::vector<std::string> words{"bench_evaluation", options.model, "--once", "--seeds", std::to_string(seeds), "--sources",
+                                 source, "--threads", std::to_string(threads), "--device", word_of(options.device.device),
+                                 "--precision", std::string(cli::kPrecisionWords.word_of(options.device.precision))};
   if (!options.device.double_rung) words.insert(words.end(), {"--double-rung", "off"});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -125,8 +114,7 @@ struct Series {
     owners.push_back(phases.pairs);
     clip.push_back(phases.clip);
     ratio.push_back(run.total / delaunay);
-    if (gradient_norm != 0 && run.gradient_norm != gradient_norm)
-      throw Error("the gradient differs from the last run's");
+    if (gradient_norm != 0 && run.gradient_norm != gradient_norm) throw Error("the gradient differs from the last run's");
     gradient_norm = run.gradient_norm;
     mass = run.diagram.moments.mass;
     energy = run.diagram.moments.energy;
@@ -204,13 +192,12 @@ void run(const Options& options) {
   const Surface surface(std::move(mesh));
   fmt::print("surface prepared once in {:.0f} ms, not counted below; times in ms, memory in MiB\n\n",
              1e3 * preparing.seconds());
-  Table table{{"seeds", "source", "threads", "total", "neighbours", "owners", "clip", "CGAL", "ratio", "speed-up",
-               "memory", "pairs", "uncertain", "wider", "mass error"},
-              {}};
+  Table table{{"seeds", "source", "threads", "total", "neighbours", "owners", "clip", "CGAL", "ratio", "speed-up", "memory",
+               "pairs", "uncertain", "wider", "mass error"}, {}};
   if (!is_cpu(options.device.device)) {
     fmt::print("device: {}\n\n", describe_device(options.device));
-    for (const char* name :
-         {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort", "d. sum"})
+    for (const char* name : {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort",
+                             "d. sum"})
       table.columns.push_back(name);
   }
   for (std::size_t k = 0; k < all.size(); ++k) measure(surface, options, options.seeds[k], std::move(all[k]), table);
@@ -226,8 +213,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Times one cold evaluation of a restricted Voronoi diagram beside CGAL's Delaunay triangulation."};
   app.add_option("MESH", options.model, "the surface; default: examples/smooth.off");
   app.add_option("--seeds", options.seeds, "counts, area-uniform random seeds")->delimiter(',');
-  app.add_option("--repeat", options.repeat, "runs of each; half as many from 500,000 seeds on")
-      ->check(CLI::Range(1, 1000));
+  app.add_option("--repeat", options.repeat, "runs of each; half as many from 500,000 seeds on")->check(CLI::Range(1, 1000));
   app.add_option("--threads", options.threads, "numbers of threads")->delimiter(',')->check(CLI::Range(1, 1024));
   app.add_option("--sources", options.sources, cli::kNeighbourWords.list())
       ->delimiter(',')
