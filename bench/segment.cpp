@@ -22,7 +22,7 @@
 #include "io/files.h"
 #include "segment/proxy.h"
 #include "segment/quadric_fit.h"
-#include "segment/segment.h"
+#include "bisector/segment.h"
 #include "segment/segment_domain.h"
 #include "common.h"
 #include "vsa.h"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "bisector/io.h"
+#include "bisector/tree.h"
 #include "core/parallel.h"
-#include "tree/tree.h"
 
 namespace {
 

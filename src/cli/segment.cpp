@@ -7,13 +7,16 @@
 #include <memory>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "bisector/io.h"
 #include "bisector/preview.h"
 #include "bisector/quality.h"
+#include "bisector/segment.h"
 #include "cells.h"
 #include "commands.h"
 #include "console.h"
@@ -24,7 +27,6 @@
 #include "outputs.h"
 #include "report.h"
 #include "segment/dual_graph.h"
-#include "segment/segment.h"
 #include "summary.h"
 #include "words.h"
 
@@ -131,7 +133,7 @@ std::vector<Colour> region_colours(const TriangleMesh& mesh, const SegmentResult
 
 std::vector<std::string> region_names(const SegmentResult& result) {
   std::vector<std::string> names;
-  for (const SegmentRegion& region : result.regions) names.push_back(name_of(region.proxy.type));
+  for (const SegmentRegion& region : result.regions) names.push_back(name_of(type_of(region.proxy)));
   return names;
 }
 
@@ -161,7 +163,7 @@ std::string counted_type(std::size_t n, const std::string& type) {
 // "22: 10 planes, 5 cylinders, ...", the most frequent first.
 std::string describe_regions(const SegmentResult& result) {
   std::map<std::string, std::size_t> counts;
-  for (const SegmentRegion& region : result.regions) ++counts[name_of(region.proxy.type)];
+  for (const SegmentRegion& region : result.regions) ++counts[name_of(type_of(region.proxy))];
   std::vector<std::pair<std::string, std::size_t>> types(counts.begin(), counts.end());
   std::stable_sort(types.begin(), types.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
   std::string text = fmt::format("{}: ", result.regions.size());
@@ -169,50 +171,48 @@ std::string describe_regions(const SegmentResult& result) {
   return text;
 }
 
-void add_parameters(Json& json, const Primitive& p) {
-  const auto symmetry = [&] {
-    json["centre"] = point_json(p.centre);
-    json["axes"] = {point_json(p.axes[0]), point_json(p.axes[1]), point_json(p.axes[2])};
-    json["lengths"] = p.lengths;
-  };
-  switch (p.type) {
-    case SurfaceType::plane:
-      json["normal"] = point_json(p.axis);
-      json["offset"] = dot(p.axis, p.centre);
-      return;
-    case SurfaceType::sphere:
-      json["centre"] = point_json(p.centre);
-      json["radius"] = p.radius;
-      return;
-    case SurfaceType::cylinder:
-      json["centre"] = point_json(p.centre);
-      json["axis"] = point_json(p.axis);
-      json["radius"] = p.radius;
-      return;
-    case SurfaceType::cone:
-      json["centre"] = point_json(p.centre);
-      json["axis"] = point_json(p.axis);
-      json["angle"] = 180 / std::numbers::pi * p.angle;
-      return;
-    case SurfaceType::torus:
-      json["centre"] = point_json(p.centre);
-      json["axis"] = point_json(p.axis);
-      json["radius"] = p.radius;
-      json["minor_radius"] = p.minor_radius;
-      return;
-    default: symmetry();
-  }
+void add_parameters(Json& json, const Plane& plane) {
+  const Vec3 foot = plane.offset * plane.normal;  // of the origin
+  json["normal"] = point_json(plane.normal);
+  json["offset"] = dot(plane.normal, foot);
+}
+
+void add_parameters(Json& json, const Sphere& sphere) {
+  json["centre"] = point_json(sphere.centre);
+  json["radius"] = sphere.radius;
+}
+
+void add_parameters(Json& json, const Cylinder& cylinder) {
+  json["centre"] = point_json(cylinder.point);
+  json["axis"] = point_json(cylinder.axis);
+  json["radius"] = cylinder.radius;
+}
+
+void add_parameters(Json& json, const Cone& cone) {
+  json["centre"] = point_json(cone.apex);
+  json["axis"] = point_json(cone.axis);
+  json["angle"] = 180 / std::numbers::pi * cone.angle;
+}
+
+void add_parameters(Json& json, const Torus& torus) {
+  json["centre"] = point_json(torus.centre);
+  json["axis"] = point_json(torus.axis);
+  json["radius"] = torus.radius;
+  json["minor_radius"] = torus.minor_radius;
+}
+
+void add_parameters(Json& json, const GeneralQuadric& quadric) {
+  json["centre"] = point_json(quadric.centre);
+  json["axes"] = {point_json(quadric.axes[0]), point_json(quadric.axes[1]), point_json(quadric.axes[2])};
+  json["lengths"] = quadric.lengths;
 }
 
 Json region_json(const SegmentRegion& region) {
-  const Primitive& p = region.proxy;
-  Json json{{"type", name_of(p.type)},
-            {"triangles", region.triangles},
-            {"area", region.area},
-            {"rms", region.rms},
-            {"max", region.max}};
-  json["coefficients"] = p.type == SurfaceType::torus ? Json(nullptr) : Json(p.quadric.c);
-  add_parameters(json, p);
+  Json json{{"type", name_of(type_of(region.proxy))}, {"triangles", region.triangles}, {"area", region.area},
+            {"rms", region.rms},                      {"max", region.max}};
+  const std::optional<Quadric> quadric = quadric_of(region.proxy);
+  json["coefficients"] = quadric ? Json(quadric->c) : Json(nullptr);
+  std::visit([&](const auto& surface) { add_parameters(json, surface); }, region.proxy);
   return json;
 }
 
@@ -264,7 +264,7 @@ void print_summary(Console& console, const SegmentCommand& command, const Segmen
   console.print(fmt::format("regions    {}", describe_regions(result)));
   console.print(fmt::format("distance   rms {:.4g} % of the diagonal, at most {:.3g} % (region {}, {})",
                             100 * result.rms / diagonal, 100 * worst->max / diagonal, worst - result.regions.begin(),
-                            name_of(worst->proxy.type)));
+                            name_of(type_of(worst->proxy))));
   if (command.options.smooth > 0)
     console.print(
         fmt::format("borders    {:.6g} long, {:.6g} before smoothing", result.border_after, result.border_before));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bisector/io.h"
+#include "bisector/tree.h"
 #include "commands.h"
 #include "console.h"
 #include "core/geometry.h"
@@ -17,8 +18,6 @@
 #include "report.h"
 #include "summary.h"
 #include "tree/coverage.h"
-#include "tree/tree.h"
-#include "tree/tree_io.h"
 #include "words.h"
 
 namespace bisector::cli {

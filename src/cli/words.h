@@ -2,11 +2,10 @@
 #pragma once
 
 #include "bisector/device.h"
+#include "bisector/segment.h"
+#include "bisector/tree.h"
 #include "core/words.h"
 #include "remesh/remesh.h"
-#include "segment/segment.h"
-#include "tree/iges.h"
-#include "tree/tree.h"
 
 namespace bisector::cli {
 

@@ -1,10 +1,10 @@
 #include "segment/dual_graph.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "core/geometry.h"
+#include "core/grouping.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -31,35 +31,31 @@ DualGraph dual_graph(const TriangleMesh& mesh) {
   const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
   const std::size_t n = mesh.triangles.size(), edges = table.edges.size();
   DualGraph graph;
-  std::vector<Index> around;
-  std::vector<std::size_t> slot(n + 1, 0);
-  for (std::size_t e = 0; e < edges; ++e) {
-    triangles_at(table, e, around);
-    for (const Index t : around) slot[t + 1] += around.size() - 1;
-  }
-  std::partial_sum(slot.begin(), slot.end(), slot.begin());
-  std::vector<std::size_t> first = slot;
-
-  std::vector<Neighbour> found(first[n]);
+  std::vector<double> length(edges);
   double sum = 0;
   for (std::size_t e = 0; e < edges; ++e) {
     const auto [a, b] = table.edges[e];
-    const double length = norm(mesh.vertices[b] - mesh.vertices[a]);
-    sum += length;
-    triangles_at(table, e, around);
-    for (const Index t : around)
-      for (const Index u : around)
-        if (t != u) found[slot[t]++] = {u, length};
+    length[e] = norm(mesh.vertices[b] - mesh.vertices[a]);
+    sum += length[e];
   }
   graph.mean_edge_length = edges ? sum / static_cast<double>(edges) : 0;
+  Csr<Neighbour> found = group_into_rows<Neighbour>(n, [&](const auto& put) {
+    std::vector<Index> around;
+    for (std::size_t e = 0; e < edges; ++e) {
+      triangles_at(table, e, around);
+      for (const Index t : around)
+        for (const Index u : around)
+          if (t != u) put(t, Neighbour{u, length[e]});
+    }
+  });
 
   graph.neighbours.offsets.reserve(n + 1);
-  graph.neighbours.values.reserve(found.size());
-  graph.edge_length.reserve(found.size());
+  graph.neighbours.values.reserve(found.values.size());
+  graph.edge_length.reserve(found.values.size());
   for (std::size_t t = 0; t < n; ++t) {
-    const auto begin = found.begin() + first[t], end = found.begin() + first[t + 1];
+    Neighbour *const begin = found.values.data() + found.offsets[t], *const end = found.values.data() + found.offsets[t + 1];
     std::stable_sort(begin, end, [](const Neighbour& p, const Neighbour& q) { return p.triangle < q.triangle; });
-    for (auto it = begin; it != end; ++it) {
+    for (const Neighbour* it = begin; it != end; ++it) {
       if (it != begin && it->triangle == graph.neighbours.values.back()) {
         graph.edge_length.back() += it->length;
       } else {

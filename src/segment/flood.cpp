@@ -6,6 +6,11 @@
 namespace bisector {
 namespace {
 
+constexpr std::size_t kMostSearched = 40;  // triangles about one that is to leave its region, to see that the rest hangs together
+constexpr int kRounds = 20;                // of moves at borders
+// What rounding alone could turn is left as it is: relative and absolute slack of squared distances in the unit-sized model.
+constexpr double kRelativeSlack = 1e-9, kAbsoluteSlack = 1e-18;
+
 struct Offer {
   double distance;
   Index triangle, region;
@@ -31,13 +36,12 @@ class Bridges {
     for (const Index* n = graph_.neighbours.begin(triangle); n != graph_.neighbours.end(triangle); ++n)
       if (labels[*n] == region) own_.push_back(*n);
     if (own_.size() < 2) return own_.size() == 1;  // the last triangle of a region stays
-    constexpr std::size_t kMost = 40;
     ++stamp_;
     seen_[triangle] = stamp_;
     queue_.assign(1, own_[0]);
     seen_[own_[0]] = stamp_;
     std::size_t missing = own_.size() - 1;
-    for (std::size_t k = 0; k < queue_.size() && queue_.size() < kMost; ++k)
+    for (std::size_t k = 0; k < queue_.size() && queue_.size() < kMostSearched; ++k)
       for (const Index* n = graph_.neighbours.begin(queue_[k]); n != graph_.neighbours.end(queue_[k]); ++n) {
         if (labels[*n] != region || seen_[*n] == stamp_) continue;
         seen_[*n] = stamp_;
@@ -92,13 +96,11 @@ std::size_t relax_borders(const SegmentDomain& domain, const std::vector<Proxy>&
   Bridges bridges(domain);
   std::vector<Index> next;
   std::size_t moved = 0;
-  constexpr int kRounds = 20;
   for (int round = 0; round < kRounds && !triangles.empty(); ++round) {
     next.clear();
     for (const Index t : triangles) {
       Index best = labels[t];
-      // What rounding alone could turn is left.
-      double least = distances[t] * (1 - 1e-9) - 1e-18 * domain.areas[t];
+      double least = distances[t] * (1 - kRelativeSlack) - kAbsoluteSlack * domain.areas[t];
       for (const Index* n = neighbours.begin(t); n != neighbours.end(t); ++n) {
         const Index other = labels[*n];
         if (other == labels[t] || other == best) continue;

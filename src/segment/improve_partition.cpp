@@ -8,18 +8,24 @@
 #include <set>
 #include <tuple>
 
-
 #include "segment/flood.h"
 
 namespace bisector {
 namespace {
 
-constexpr int kFirstSteps = 2, kMoreSteps = 4;  // of Lloyd's iteration in a region that is divided
-constexpr int kTrialSteps = 8;     // of Lloyd's iteration, before a teleportation is judged
-constexpr std::size_t kMostEvaluations = 100;  // of distances for each triangle, in all teleportations
-constexpr int kMostRefusals = 10;    // teleportations in a row that do not lower the energy
-constexpr double kLeastShare = 0.1;  // of what a removal costs before iterating, that a division must gain
+// Division of a region in two.
+constexpr int kFirstSteps = 2, kMoreSteps = 4;  // of Lloyd's iteration in the region: from each start, then from the best
+constexpr double kFlatShare = 0.6, kRestShare = 0.1;  // of the triangles, that a plane is taken out of the region with
+constexpr int kTrimSteps = 4, kAverages = 4;  // of trimmed least squares, and of averaging over neighbours in each
+
+// Teleportation: a region is removed and another one divided.
+constexpr int kTrialSteps = 8;                 // of Lloyd's iteration, before a teleportation is judged
+constexpr std::size_t kMostEvaluations = 100;  // of distances for each triangle, in all teleportations: bounds the time
+constexpr int kMostRefusals = 10;     // in a row that do not lower the energy: others would hardly do better
+constexpr double kLeastShare = 0.1;   // of what the removal costs before iterating, that the division must gain
 constexpr double kWorthwhile = 1e-3;  // part of the energy that a teleportation must gain
+
+constexpr double kRedundant = 0.5;  // of the largest energy of a region: a merging that costs less is one to make
 
 Index farthest_triangle(const Partition& partition, Index region) {
   return *std::max_element(partition.triangles.begin(region), partition.triangles.end(region),
@@ -42,7 +48,7 @@ Index nearest_triangle(const SegmentDomain& domain, const std::vector<Index>& tr
 
 Proxy plane_of(const SegmentDomain& domain, Index triangle) {
   const Vec3& n = domain.normals[triangle];
-  return Proxy::of(Quadric::plane(n, dot(n, domain.barycentres[triangle])));
+  return Proxy::of(plane_quadric(n, dot(n, domain.barycentres[triangle])));
 }
 
 // In two across the longest direction.
@@ -71,8 +77,6 @@ std::array<std::vector<Index>, 2> halves(const SegmentDomain& domain, const Inde
 // What is nearest to a plane, by trimmed least squares, and what is farthest from it: takes a plane out of a region that a
 // curved proxy was bent around. Signed distances are averaged over neighbours, so that noise does not decide.
 std::array<std::vector<Index>, 2> flat_and_rest(const SegmentDomain& domain, const Index* begin, const Index* end) {
-  constexpr double kFlatShare = 0.6, kRestShare = 0.1;  // of the triangles
-  constexpr int kSteps = 4, kAverages = 4;
   const auto n = static_cast<std::size_t>(end - begin);
   std::array<std::vector<Index>, 2> parts;
   const auto flat = static_cast<std::size_t>(kFlatShare * static_cast<double>(n));
@@ -80,7 +84,7 @@ std::array<std::vector<Index>, 2> flat_and_rest(const SegmentDomain& domain, con
   if (flat < 3 || rest < 3) return parts;
   std::vector<Index> order(begin, end);
   std::vector<double> off(n), averaged(n);
-  for (int k = 0; k < kSteps; ++k) {
+  for (int k = 0; k < kTrimSteps; ++k) {
     const auto count = static_cast<std::ptrdiff_t>(k == 0 ? n : flat);
     const PlaneFit plane = fit_plane(sum_of_moments(domain, order.data(), order.data() + count));
     for (std::size_t i = 0; i < n; ++i) off[i] = dot(plane.normal, domain.barycentres[begin[i]]) - plane.offset;
@@ -287,7 +291,7 @@ bool PartitionEditor::merge_redundant(Partition& partition) {
   for (const RegionProxy& region : partition.regions) largest = std::max(largest, region.energy);
   for (const Removal& removal : removals(partition)) {
     if (removal.into == kNone) continue;
-    if (!(removal.cost < 0.5 * largest)) return false;
+    if (!(removal.cost < kRedundant * largest)) return false;
     partition = without(partition, removal);
     lloyd_.iterate(partition, iterations_);
     ++merges;

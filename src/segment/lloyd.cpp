@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "segment/flood.h"
 #include "segment/primitive_fit.h"
@@ -14,20 +15,21 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kTorusSamples = 160;
-constexpr std::size_t kLeastForTorus = 12;  // triangles
-constexpr int kToriEvery = 5;               // steps, for regions that are none yet
-constexpr int kFirstFloods = 3, kFloodEvery = 4;  // steps of Lloyd's iteration that flood
+constexpr std::size_t kTorusSamples = 160;  // points of a region that tori are fitted to
+constexpr std::size_t kLeastForTorus = 12;  // triangles of a region that tori are tried on
+constexpr int kToriEvery = 5;               // steps after which tori are tried anew on regions that are none; they are dear to fit
+constexpr int kFirstFloods = 3, kFloodEvery = 4;  // the first steps flood, then one in so many: later only borders move
 constexpr double kEnough = 1e-4;            // a step that lowers the energy by a smaller part is the last
+constexpr double kStepsToCome = 5;          // as large as the last one, that a trial may still hope for
 constexpr double kExact = 1e-14;            // squared distance that is as good as none, in the unit-sized model
+constexpr double kOneSided = 0.99;          // share of the area with normals on one side of a surface, at least
 
 // Whether the triangles' normals are on one side of a surface. Noise is fitted best by two sheets with the data between.
 bool is_one_sided(const SegmentDomain& domain, const Index* begin, const Index* end, const Proxy& proxy) {
-  constexpr double kLeastShare = 0.99;  // of the area, on one side
   double along = 0, against = 0;
   for (const Index* t = begin; t != end; ++t)
     (dot(proxy.gradient(domain.barycentres[*t]), domain.normals[*t]) < 0 ? against : along) += domain.areas[*t];
-  return std::max(along, against) >= kLeastShare * (along + against);
+  return std::max(along, against) >= kOneSided * (along + against);
 }
 
 // Moments of triangles that are not many more or others than those that `known` is of.
@@ -81,7 +83,7 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
   const double enough = kExact * moments.area();
   // The samples' mean square is never below the integral for a plane.
   const PlaneFit plane = fit_plane(moments);
-  if (plane.squared_distance < best.energy) consider(Proxy::of(Quadric::plane(plane.normal, plane.offset)));
+  if (plane.squared_distance < best.energy) consider(Proxy::of(plane_quadric(plane.normal, plane.offset)));
   best.invalid = false;
   if (best.energy > enough && surfaces_ != SegmentSurfaces::planes) {
     const ProxyFit fit = fit_proxy(moments, surfaces_);
@@ -113,7 +115,7 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
 Partition Lloyd::fit(std::vector<Index> labels, std::size_t count, const Partition* known) {
   Partition partition;
   partition.labels = std::move(labels);
-  partition.triangles = region_triangles(partition.labels, count);
+  partition.triangles = items_of_labels<Index>(partition.labels, count);
   partition.distances = known ? known->distances : std::vector<double>(partition.labels.size());
   partition.regions.resize(count);
   partition.changed.assign(count, 1);
@@ -185,7 +187,7 @@ bool Lloyd::step(Partition& partition, bool flooding) {
     next.distances = partition.distances;
     if (relax_borders(domain_, all, triangles, next.labels, next.distances, counts.evaluations) == 0) return false;
   }
-  next.triangles = region_triangles(next.labels, count);
+  next.triangles = items_of_labels<Index>(next.labels, count);
   const bool tori = counts.iterations % kToriEvery == 0;
   for (std::size_t r = 0; r < count; ++r) {
     const Index *begin = next.triangles.begin(r), *end = next.triangles.end(r);
@@ -194,7 +196,7 @@ bool Lloyd::step(Partition& partition, bool flooding) {
     const SurfaceMoments moments = changed_moments(domain_, partition.regions[r].moments, partition.triangles.begin(r),
                                                    partition.triangles.end(r), begin, end);
     const RegionProxy& old = partition.regions[r];
-    next.regions[r] = refit(begin, end, moments, &old, next.distances, tori || old.proxy.torus);
+    next.regions[r] = refit(begin, end, moments, &old, next.distances, tori || old.proxy.torus.has_value());
   }
   const double after = next.energy();
   if (!(after < before)) return false;
@@ -222,7 +224,6 @@ void Lloyd::try_out(Partition& partition, int iterations, double goal) {
     context_.check();
     const double before = partition.energy();
     if (!step(partition, k == 0)) break;
-    constexpr double kStepsToCome = 5;
     const double now = partition.energy();
     if (now - kStepsToCome * (before - now) > goal) break;
   }

@@ -16,16 +16,16 @@ namespace bisector {
 struct RegionProxy {
   Proxy proxy;
   double energy = 0;          // sum of distance_to over the region
-  bool invalid = false;       // the best quadric is none (is_invalid)
+  bool invalid = false;       // the best quadric is no surface of its own (is_invalid)
   SurfaceMoments moments;     // of the region
-  std::uint64_t version = 0;  // unlike that of any other pair of a set of triangles and a proxy
+  std::uint64_t version = 0;  // differs for every pair of a set of triangles and a proxy, so that costs can be kept by it
 };
 
 struct Partition {
   std::vector<Index> labels;
   std::vector<double> distances;  // distance_to of each triangle and its region's proxy
   std::vector<RegionProxy> regions;
-  std::vector<char> changed;      // of each region: its triangles or its proxy, since floods took account of it
+  std::vector<char> changed;      // of each region: whether its triangles or its proxy changed in the last step
   Csr<Index> triangles;           // of each region
 
   double energy() const;

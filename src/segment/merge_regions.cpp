@@ -7,16 +7,18 @@
 #include <queue>
 #include <utility>
 
+#include "core/grouping.h"
 #include "segment/primitive_fit.h"
 #include "segment/proxy.h"
 
 namespace bisector {
 namespace {
 
-constexpr int kPollEvery = 1024;
-constexpr std::size_t kTorusSamples = 96;
-constexpr std::size_t kLeastForTorus = 12;  // triangles
-constexpr std::size_t kFewForTori = 60;     // regions
+constexpr int kPollEvery = 1024;            // mergings of triangles after which the context is asked whether to go on
+constexpr std::size_t kTorusSamples = 96;   // points of a pair of regions that tori are fitted to
+constexpr std::size_t kLeastForTorus = 12;  // triangles of a pair that tori are tried on
+constexpr std::size_t kFewForTori = 60;     // regions from which on tori are tried: they are dear, and on small regions quadrics do
+constexpr double kPoorFit = 1.5;            // growth of the squared distance from which on a torus is worth trying
 
 // Area, first and second moments, about the origin of the unit-sized model.
 struct PlaneMoments {
@@ -155,7 +157,7 @@ class SurfaceMerging {
   SurfaceMerging(const SegmentDomain& domain, const std::vector<Index>& labels, SegmentSurfaces surfaces)
       : domain_(domain), surfaces_(surfaces) {
     const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
-    const Csr<Index> rows = region_triangles(labels, count);
+    const Csr<Index> rows = items_of_labels<Index>(labels, count);
     regions_.resize(count);
     for (std::size_t r = 0; r < count; ++r) {
       Region& region = regions_[r];
@@ -193,7 +195,7 @@ class SurfaceMerging {
     // Only where the pair does not fit otherwise.
     const double apart = first.squared_distance + second.squared_distance;
     const std::size_t count = first.triangles.size() + second.triangles.size();
-    if (least <= 1.5 * apart + 1e-12 * both.area() || count < kLeastForTorus) return least;
+    if (least <= kPoorFit * apart + 1e-12 * both.area() || count < kLeastForTorus) return least;
     std::vector<Index> triangles;
     triangles.reserve(count);
     std::merge(first.triangles.begin(), first.triangles.end(), second.triangles.begin(), second.triangles.end(),

@@ -1,12 +1,12 @@
-// A start that needs no luck: small regions merged pairwise, the pair that costs least first.
+// A start that is the same for every random seed: small regions merged pairwise, the pair that costs least first.
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
 #include "bisector/context.h"
+#include "bisector/segment.h"
 #include "core/geometry.h"
-#include "segment/segment.h"
 #include "segment/segment_domain.h"
 
 namespace bisector {

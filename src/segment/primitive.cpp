@@ -18,7 +18,7 @@ using Axes = std::array<Vec3, 3>;
 constexpr double kRounding = 1e-9;      // of the extent: what differs by less is the same
 constexpr double kZeroCurvature = 1e-15;  // of the greatest eigenvalue: what is less is 0
 
-Vec3 unit(const Vec3& v, const char* what) {
+Vec3 require_direction(const Vec3& v, const char* what) {
   const double length = norm(v);
   if (!(length > 0) || !std::isfinite(length))
     throw Error(std::string(what) + " is no direction: give a finite vector other than 0");
@@ -29,38 +29,29 @@ void require_length(double length, const char* what) {
   if (!(length > 0) || !std::isfinite(length)) throw Error(std::string(what) + " is not positive: give a finite length");
 }
 
-Vec3 perpendicular_to(const Vec3& axis) {
-  const double x = std::abs(axis.x), y = std::abs(axis.y), z = std::abs(axis.z);
-  const Vec3 other = x <= y && x <= z ? Vec3{1, 0, 0} : y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
-  const Vec3 v = cross(axis, other);
-  return (1 / norm(v)) * v;
-}
-
 // Cylindrical coordinates of a point about an axis; `outward` is a unit vector, any one for points of the axis.
 struct Cylindrical {
   Vec3 outward;
   double rho, z;
 };
 
-Cylindrical cylindrical(const Primitive& primitive, const Vec3& p) {
-  const Vec3 q = p - primitive.centre;
-  const double z = dot(primitive.axis, q);
-  const Vec3 across = q - z * primitive.axis;
+Cylindrical cylindrical(const Vec3& centre, const Vec3& axis, const Vec3& p) {
+  const Vec3 q = p - centre;
+  const double z = dot(axis, q);
+  const Vec3 across = q - z * axis;
   const double rho = norm(across);
-  if (!(rho > 0)) return {perpendicular_to(primitive.axis), rho, z};
+  if (!(rho > 0)) return {frame_across(axis).first, rho, z};
   // Near the axis rounding leaves something along it.
   Vec3 outward = (1 / rho) * across;
-  outward -= dot(outward, primitive.axis) * primitive.axis;
+  outward -= dot(outward, axis) * axis;
   const double length = norm(outward);
-  return {length > 0.5 ? (1 / length) * outward : perpendicular_to(primitive.axis), rho, z};
+  return {length > 0.5 ? (1 / length) * outward : frame_across(axis).first, rho, z};
 }
 
-bool is_general(SurfaceType type) { return type > SurfaceType::torus; }
-
-// General quadrics with an apex or a line where their gradient is 0; their lengths are ratios.
-bool meets_itself(const Primitive& primitive) {
-  return primitive.type == SurfaceType::elliptic_cone ||
-         (primitive.type == SurfaceType::plane_pair && primitive.lengths[1] > 0);
+// Quadrics with an apex or a line where their gradient is 0; their lengths are ratios.
+bool meets_itself(const GeneralQuadric& quadric) {
+  return quadric.type == SurfaceType::elliptic_cone ||
+         (quadric.type == SurfaceType::plane_pair && quadric.lengths[1] > 0);
 }
 
 // v' A v for the matrix A of the second-degree terms.
@@ -123,10 +114,10 @@ void find_root(NearestPointPath& path, bool v_is_s, double start) {
 // The quadric's nearest point to p, or none if it has no real one.
 std::optional<Vec3> nearest_point(const Quadric& q, const Axes& axes, const Vec3& p) {
   NearestPointPath path;
-  const double value = q.value(p), sign = value < 0 ? -1 : 1;
+  const double value = value_of(q, p), sign = value < 0 ? -1 : 1;
   if (value == 0) return p;
   path.c = std::abs(value);
-  const Vec3 gradient = q.gradient(p);
+  const Vec3 gradient = gradient_of(q, p);
   double greatest = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     path.g[k] = sign * dot(axes[k], gradient);
@@ -167,10 +158,10 @@ std::optional<Vec3> nearest_point(const Quadric& q, const Axes& axes, const Vec3
 
   // What rounding has left of the value, along the gradient.
   for (int i = 0; i < 3; ++i) {
-    const double left = q.value(foot);
-    const Vec3 down = q.gradient(foot);
+    const double left = value_of(q, foot);
+    const Vec3 down = gradient_of(q, foot);
     const Vec3 next = foot - (left / norm2(down)) * down;
-    if (!(std::abs(q.value(next)) < std::abs(left))) break;
+    if (!(std::abs(value_of(q, next)) < std::abs(left))) break;
     foot = next;
   }
   return foot;
@@ -255,9 +246,9 @@ Points surface_points(const Quadric& q, const Axes& axes) {
 }
 
 bool close(const Primitive& candidate, const Points& points, double slack) {
+  const bool general = std::holds_alternative<GeneralQuadric>(candidate);
   return std::all_of(points.begin(), points.end(), [&](const Vec3& p) {
-    if (!is_general(candidate.type)) return distance(candidate, p) <= slack;
-    return norm(foot_point(candidate, p) - p) <= slack;
+    return (general ? norm(foot_point(candidate, p) - p) : distance(candidate, p)) <= slack;
   });
 }
 
@@ -288,15 +279,9 @@ PrincipalForm levelled(PrincipalForm form, std::size_t k, const Points& points) 
   return form;
 }
 
-Primitive general(SurfaceType type, const PrincipalForm& form, const Vec3& centre, const std::array<double, 3>& lengths) {
-  Primitive primitive;
-  primitive.type = type;
-  primitive.quadric = form.quadric();
-  primitive.centre = centre;
-  primitive.axes = form.axes;
-  primitive.axis = form.axes[2];
-  primitive.lengths = lengths;
-  return primitive;
+GeneralQuadric general(SurfaceType type, const PrincipalForm& form, const Vec3& centre,
+                       const std::array<double, 3>& lengths) {
+  return {type, form.quadric(), centre, form.axes, lengths};
 }
 
 std::optional<Primitive> as_plane(const Points& points) {
@@ -442,7 +427,8 @@ Primitive simplest(const PrincipalForm& form, const Points& points, double slack
   const auto take = [&](std::optional<Primitive> next) {
     candidate = std::move(next);
     if (!candidate) return false;
-    const bool singular = candidate->type == SurfaceType::cone || meets_itself(*candidate);
+    const GeneralQuadric* quadric = std::get_if<GeneralQuadric>(&*candidate);
+    const bool singular = quadric ? meets_itself(*quadric) : std::holds_alternative<Cone>(*candidate);
     return close(*candidate, points, std::max(slack, singular ? 10 * std::sqrt(noise) : 10 * noise));
   };
   if (points.empty()) return collapsed(form);
@@ -463,9 +449,157 @@ Primitive simplest(const PrincipalForm& form, const Points& points, double slack
 // Of root mean square gradient 1 on the points.
 void normalise(Quadric& q, const Points& points) {
   double sum = 0;
-  for (const Vec3& p : points) sum += norm2(q.gradient(p)) / static_cast<double>(points.size());
+  for (const Vec3& p : points) sum += norm2(gradient_of(q, p)) / static_cast<double>(points.size());
   if (!(sum > 0)) return;
   for (double& c : q.c) c /= std::sqrt(sum);
+}
+
+// Distances.
+
+double distance_from(const Plane& s, const Vec3& p) { return std::abs(dot(s.normal, p - s.offset * s.normal)); }
+
+double distance_from(const Sphere& s, const Vec3& p) { return std::abs(norm(p - s.centre) - s.radius); }
+
+double distance_from(const Cylinder& s, const Vec3& p) { return std::abs(norm(cross(s.axis, p - s.point)) - s.radius); }
+
+double distance_from(const Cone& s, const Vec3& p) {
+  const Vec3 q = p - s.apex;
+  return std::abs(norm(cross(s.axis, q)) * std::cos(s.angle) - std::abs(dot(s.axis, q)) * std::sin(s.angle));
+}
+
+double distance_from(const Torus& s, const Vec3& p) {
+  const Vec3 q = p - s.centre;
+  const double rho = norm(cross(s.axis, q)) - s.radius, z = dot(s.axis, q);
+  return std::abs(std::sqrt(rho * rho + z * z) - s.minor_radius);
+}
+
+double distance_from(const GeneralQuadric& s, const Vec3& p) {
+  return approximate_distance(s.polynomial, second_order_of(s.polynomial), p);
+}
+
+// Nearest points.
+
+Vec3 foot_on(const Plane& s, const Vec3& p) { return p - dot(s.normal, p - s.offset * s.normal) * s.normal; }
+
+Vec3 foot_on(const Sphere& s, const Vec3& p) {
+  const Vec3 q = p - s.centre;
+  const double length = norm(q);
+  return s.centre + (length > 0 ? (s.radius / length) * q : s.radius * Vec3{0, 0, 1});
+}
+
+Vec3 foot_on(const Cylinder& s, const Vec3& p) {
+  const Cylindrical q = cylindrical(s.point, s.axis, p);
+  return s.point + q.z * s.axis + s.radius * q.outward;
+}
+
+Vec3 foot_on(const Cone& s, const Vec3& p) {
+  const Cylindrical q = cylindrical(s.apex, s.axis, p);
+  const double sine = std::sin(s.angle), cosine = std::cos(s.angle);
+  const double slant = q.rho * sine + std::abs(q.z) * cosine;
+  return s.apex + slant * (sine * q.outward + (q.z < 0 ? -cosine : cosine) * s.axis);
+}
+
+Vec3 foot_on(const Torus& s, const Vec3& p) {
+  const Cylindrical q = cylindrical(s.centre, s.axis, p);
+  const double rho = q.rho - s.radius, length = std::hypot(rho, q.z);
+  const Vec3 out = length > 0 ? (1 / length) * (rho * q.outward + q.z * s.axis) : q.outward;
+  return s.centre + s.radius * q.outward + s.minor_radius * out;
+}
+
+Vec3 foot_on_plane_pair(const GeneralQuadric& s, const Vec3& p) {
+  const double a = s.lengths[0], b = s.lengths[1];
+  const Vec3 q = p - s.centre;
+  const double x = dot(s.axes[0], q), y = dot(s.axes[1], q);
+  if (b == 0) return p + ((x < 0 ? -a : a) - x) * s.axes[0];
+  // Both planes contain the common line; the nearer one runs through p's quadrant.
+  const double side = x * y < 0 ? -1 : 1;
+  const Vec3 normal = b * s.axes[0] - (side * a) * s.axes[1];
+  return p - ((b * x - side * a * y) / (a * a + b * b)) * normal;
+}
+
+Vec3 foot_on_elliptic_cone(const GeneralQuadric& s, const Vec3& p) {
+  // About the apex only second-degree terms are left, and without the others rounding does not move it.
+  Quadric about_apex;
+  std::copy(s.polynomial.c.begin() + 4, s.polynomial.c.end(), about_apex.c.begin() + 4);
+  const Vec3 q = p - s.centre;
+  return s.centre + nearest_point(about_apex, s.axes, q).value_or(q);
+}
+
+Vec3 foot_on(const GeneralQuadric& s, const Vec3& p) {
+  if (s.type == SurfaceType::plane_pair) return foot_on_plane_pair(s, p);
+  if (s.type == SurfaceType::elliptic_cone) return foot_on_elliptic_cone(s, p);
+  return nearest_point(s.polynomial, s.axes, p).value_or(p);
+}
+
+// Types and polynomials.
+
+SurfaceType surface_type(const Plane&) { return SurfaceType::plane; }
+SurfaceType surface_type(const Sphere&) { return SurfaceType::sphere; }
+SurfaceType surface_type(const Cylinder&) { return SurfaceType::cylinder; }
+SurfaceType surface_type(const Cone&) { return SurfaceType::cone; }
+SurfaceType surface_type(const Torus&) { return SurfaceType::torus; }
+SurfaceType surface_type(const GeneralQuadric& s) { return s.type; }
+
+std::optional<Quadric> polynomial(const Plane& s) { return plane_quadric(s.normal, s.offset); }
+
+std::optional<Quadric> polynomial(const Sphere& sphere) {
+  const Vec3& m = sphere.centre;
+  const double s = 1 / (2 * sphere.radius);
+  return Quadric{
+      {s * (norm2(m) - sphere.radius * sphere.radius), -2 * s * m.x, -2 * s * m.y, -2 * s * m.z, s, 0, 0, s, 0, s}};
+}
+
+std::optional<Quadric> polynomial(const Cylinder& cylinder) {
+  const Vec3& a = cylinder.axis;
+  const double s = 1 / (2 * cylinder.radius);
+  const Quadric about_point{{-s * cylinder.radius * cylinder.radius, 0, 0, 0, s * (1 - a.x * a.x), -2 * s * a.x * a.y,
+                             -2 * s * a.x * a.z, s * (1 - a.y * a.y), -2 * s * a.y * a.z, s * (1 - a.z * a.z)}};
+  return from_local(about_point, cylinder.point, 1);
+}
+
+std::optional<Quadric> polynomial(const Cone& cone) {
+  // The gradient on the surface is as long as the way to the apex.
+  const Vec3& a = cone.axis;
+  const double s = 1 / std::sin(2 * cone.angle), r = std::cos(cone.angle) * std::cos(cone.angle) * s;
+  const Quadric about_apex{{0, 0, 0, 0, r - s * a.x * a.x, -2 * s * a.x * a.y, -2 * s * a.x * a.z, r - s * a.y * a.y,
+                            -2 * s * a.y * a.z, r - s * a.z * a.z}};
+  return from_local(about_apex, cone.apex, 1);
+}
+
+std::optional<Quadric> polynomial(const Torus&) { return std::nullopt; }
+
+std::optional<Quadric> polynomial(const GeneralQuadric& s) { return s.polynomial; }
+
+// In coordinates x = origin + scale y.
+
+Primitive placed(const Plane& s, const Vec3& origin, double scale) {
+  return make_plane(s.normal, dot(s.normal, origin + scale * (s.offset * s.normal)));
+}
+
+Primitive placed(const Sphere& s, const Vec3& origin, double scale) {
+  return make_sphere(origin + scale * s.centre, scale * s.radius);
+}
+
+Primitive placed(const Cylinder& s, const Vec3& origin, double scale) {
+  return make_cylinder(origin + scale * s.point, s.axis, scale * s.radius);
+}
+
+Primitive placed(const Cone& s, const Vec3& origin, double scale) {
+  return make_cone(origin + scale * s.apex, s.axis, s.angle);
+}
+
+Primitive placed(const Torus& s, const Vec3& origin, double scale) {
+  return make_torus(origin + scale * s.centre, s.axis, scale * s.radius, scale * s.minor_radius);
+}
+
+Primitive placed(const GeneralQuadric& s, const Vec3& origin, double scale) {
+  GeneralQuadric result = s;
+  result.centre = origin + scale * s.centre;
+  result.polynomial = from_local(s.polynomial, origin, scale);
+  for (double& c : result.polynomial.c) c *= scale;
+  if (!meets_itself(s))
+    for (double& length : result.lengths) length *= scale;
+  return result;
 }
 
 }  // namespace
@@ -491,133 +625,55 @@ const char* name_of(SurfaceType type) {
   return "";
 }
 
+std::pair<Vec3, Vec3> frame_across(const Vec3& axis) {
+  const double x = std::abs(axis.x), y = std::abs(axis.y), z = std::abs(axis.z);
+  const Vec3 u = unit(cross(axis, x <= y && x <= z ? Vec3{1, 0, 0} : y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1}));
+  return {u, cross(axis, u)};
+}
+
+SurfaceType type_of(const Primitive& primitive) {
+  return std::visit([](const auto& s) { return surface_type(s); }, primitive);
+}
+
+std::optional<Quadric> quadric_of(const Primitive& primitive) {
+  return std::visit([](const auto& s) { return polynomial(s); }, primitive);
+}
+
 double distance(const Primitive& primitive, const Vec3& p) {
-  switch (primitive.type) {
-    case SurfaceType::plane: return std::abs(dot(primitive.axis, p - primitive.centre));
-    case SurfaceType::sphere: return std::abs(norm(p - primitive.centre) - primitive.radius);
-    case SurfaceType::cylinder: return std::abs(norm(cross(primitive.axis, p - primitive.centre)) - primitive.radius);
-    case SurfaceType::cone: {
-      const Vec3 q = p - primitive.centre;
-      return std::abs(norm(cross(primitive.axis, q)) * std::cos(primitive.angle) -
-                      std::abs(dot(primitive.axis, q)) * std::sin(primitive.angle));
-    }
-    case SurfaceType::torus: {
-      const Vec3 q = p - primitive.centre;
-      const double rho = norm(cross(primitive.axis, q)) - primitive.radius, z = dot(primitive.axis, q);
-      return std::abs(std::sqrt(rho * rho + z * z) - primitive.minor_radius);
-    }
-    default: return approximate_distance(primitive.quadric, primitive.quadric.second_order(), p);
-  }
+  return std::visit([&](const auto& s) { return distance_from(s, p); }, primitive);
 }
 
 Vec3 foot_point(const Primitive& primitive, const Vec3& p) {
-  switch (primitive.type) {
-    case SurfaceType::plane: return p - dot(primitive.axis, p - primitive.centre) * primitive.axis;
-    case SurfaceType::sphere: {
-      const Vec3 q = p - primitive.centre;
-      const double length = norm(q);
-      return primitive.centre + (length > 0 ? (primitive.radius / length) * q : primitive.radius * primitive.axis);
-    }
-    case SurfaceType::cylinder: {
-      const Cylindrical q = cylindrical(primitive, p);
-      return primitive.centre + q.z * primitive.axis + primitive.radius * q.outward;
-    }
-    case SurfaceType::cone: {
-      const Cylindrical q = cylindrical(primitive, p);
-      const double sine = std::sin(primitive.angle), cosine = std::cos(primitive.angle);
-      const double slant = q.rho * sine + std::abs(q.z) * cosine;
-      return primitive.centre + slant * (sine * q.outward + (q.z < 0 ? -cosine : cosine) * primitive.axis);
-    }
-    case SurfaceType::torus: {
-      const Cylindrical q = cylindrical(primitive, p);
-      const double rho = q.rho - primitive.radius, length = std::hypot(rho, q.z);
-      const Vec3 out = length > 0 ? (1 / length) * (rho * q.outward + q.z * primitive.axis) : q.outward;
-      return primitive.centre + primitive.radius * q.outward + primitive.minor_radius * out;
-    }
-    case SurfaceType::plane_pair: {
-      const auto& [a, b, none] = primitive.lengths;
-      const Vec3 q = p - primitive.centre;
-      const double x = dot(primitive.axes[0], q), y = dot(primitive.axes[1], q);
-      if (b == 0) return p + ((x < 0 ? -a : a) - x) * primitive.axes[0];
-      // Both planes contain the common line; the nearer one runs through p's quadrant.
-      const double side = x * y < 0 ? -1 : 1;
-      const Vec3 normal = b * primitive.axes[0] - (side * a) * primitive.axes[1];
-      return p - ((b * x - side * a * y) / (a * a + b * b)) * normal;
-    }
-    case SurfaceType::elliptic_cone: {
-      // About the apex only second-degree terms are left, and without the others rounding does not move it.
-      Quadric about_apex;
-      std::copy(primitive.quadric.c.begin() + 4, primitive.quadric.c.end(), about_apex.c.begin() + 4);
-      const Vec3 q = p - primitive.centre;
-      return primitive.centre + nearest_point(about_apex, primitive.axes, q).value_or(q);
-    }
-    default: return nearest_point(primitive.quadric, primitive.axes, p).value_or(p);
-  }
+  return std::visit([&](const auto& s) { return foot_on(s, p); }, primitive);
 }
 
-Primitive make_plane(const Vec3& normal, double offset) {
+Plane make_plane(const Vec3& normal, double offset) {
   const double length = norm(normal);
-  Primitive plane;
-  plane.axis = unit(normal, "normal of a plane");
-  plane.centre = (offset / length) * plane.axis;
-  plane.quadric = Quadric::plane(plane.axis, offset / length);
-  return plane;
+  const Vec3 direction = require_direction(normal, "normal of a plane");
+  return {direction, offset / length};
 }
 
-Primitive make_sphere(const Vec3& centre, double radius) {
+Sphere make_sphere(const Vec3& centre, double radius) {
   require_length(radius, "radius of a sphere");
-  Primitive sphere;
-  sphere.type = SurfaceType::sphere;
-  sphere.centre = centre;
-  sphere.radius = radius;
-  const double s = 1 / (2 * radius);
-  sphere.quadric = {{s * (norm2(centre) - radius * radius), -2 * s * centre.x, -2 * s * centre.y, -2 * s * centre.z, s, 0, 0,
-                     s, 0, s}};
-  return sphere;
+  return {centre, radius};
 }
 
-Primitive make_cylinder(const Vec3& point, const Vec3& axis, double radius) {
+Cylinder make_cylinder(const Vec3& point, const Vec3& axis, double radius) {
   require_length(radius, "radius of a cylinder");
-  Primitive cylinder;
-  cylinder.type = SurfaceType::cylinder;
-  cylinder.axis = unit(axis, "axis of a cylinder");
-  cylinder.centre = point - dot(point, cylinder.axis) * cylinder.axis;
-  cylinder.radius = radius;
-  const Vec3& a = cylinder.axis;
-  const double s = 1 / (2 * radius);
-  const Quadric about_centre{{-s * radius * radius, 0, 0, 0, s * (1 - a.x * a.x), -2 * s * a.x * a.y, -2 * s * a.x * a.z,
-                              s * (1 - a.y * a.y), -2 * s * a.y * a.z, s * (1 - a.z * a.z)}};
-  cylinder.quadric = from_local(about_centre, cylinder.centre, 1);
-  return cylinder;
+  const Vec3 direction = require_direction(axis, "axis of a cylinder");
+  return {point - dot(point, direction) * direction, direction, radius};
 }
 
-Primitive make_cone(const Vec3& apex, const Vec3& axis, double angle) {
+Cone make_cone(const Vec3& apex, const Vec3& axis, double angle) {
   if (!(angle > 0 && angle < std::acos(0.0))) throw Error("angle of a cone is not between 0 and pi/2: give radians");
-  Primitive cone;
-  cone.type = SurfaceType::cone;
-  cone.centre = apex;
-  cone.axis = unit(axis, "axis of a cone");
-  cone.angle = angle;
-  // The gradient on the surface is as long as the way to the apex.
-  const Vec3& a = cone.axis;
-  const double s = 1 / std::sin(2 * angle), r = std::cos(angle) * std::cos(angle) * s;
-  const Quadric about_apex{{0, 0, 0, 0, r - s * a.x * a.x, -2 * s * a.x * a.y, -2 * s * a.x * a.z, r - s * a.y * a.y,
-                            -2 * s * a.y * a.z, r - s * a.z * a.z}};
-  cone.quadric = from_local(about_apex, apex, 1);
-  return cone;
+  return {apex, require_direction(axis, "axis of a cone"), angle};
 }
 
-Primitive make_torus(const Vec3& centre, const Vec3& axis, double radius, double minor_radius) {
+Torus make_torus(const Vec3& centre, const Vec3& axis, double radius, double minor_radius) {
   require_length(minor_radius, "minor radius of a torus");
   if (!(radius > minor_radius) || !std::isfinite(radius))
     throw Error("radius of a torus is not greater than its minor radius: tori that meet themselves are not supported");
-  Primitive torus;
-  torus.type = SurfaceType::torus;
-  torus.centre = centre;
-  torus.axis = unit(axis, "axis of a torus");
-  torus.radius = radius;
-  torus.minor_radius = minor_radius;
-  return torus;
+  return {centre, require_direction(axis, "axis of a torus"), radius, minor_radius};
 }
 
 Primitive classify(const Quadric& quadric, const Vec3& near, double extent, double tolerance) {
@@ -625,7 +681,7 @@ Primitive classify(const Quadric& quadric, const Vec3& near, double extent, doub
   Quadric local = to_local(quadric, near, extent), absolute;
   for (std::size_t k = 0; k < 10; ++k) absolute.c[k] = std::abs(quadric.c[k]);
   const double rounding =
-      std::numeric_limits<double>::epsilon() * absolute.value({std::abs(near.x), std::abs(near.y), std::abs(near.z)});
+      std::numeric_limits<double>::epsilon() * value_of(absolute, {std::abs(near.x), std::abs(near.y), std::abs(near.z)});
   double greatest = 0;
   for (double c : local.c) greatest = std::isfinite(c) ? std::max(greatest, std::abs(c)) : c;
   if (!std::isfinite(greatest)) throw Error("coefficient of a quadric is not finite: give finite ones");
@@ -635,31 +691,15 @@ Primitive classify(const Quadric& quadric, const Vec3& near, double extent, doub
   const PrincipalForm form = principal_form(local);
   const Points points = surface_points(local, form.axes);
   Primitive result = simplest(form, points, std::max(tolerance / extent, kRounding), greatest > 0 ? rounding / greatest : 0);
-  if (is_general(result.type)) {
-    normalise(result.quadric, points);
-  } else if (result.type == SurfaceType::plane && !points.empty() && dot(local.gradient(points[0]), result.axis) < 0) {
-    result = make_plane(-result.axis, -dot(result.axis, result.centre));
-  }
+  if (auto* general = std::get_if<GeneralQuadric>(&result)) normalise(general->polynomial, points);
+  const auto* plane = std::get_if<Plane>(&result);
+  if (plane && !points.empty() && dot(gradient_of(local, points[0]), plane->normal) < 0)
+    result = make_plane(-plane->normal, -dot(plane->normal, plane->offset * plane->normal));
   return from_local(result, near, extent);
 }
 
 Primitive from_local(const Primitive& local, const Vec3& origin, double scale) {
-  const Vec3 centre = origin + scale * local.centre;
-  switch (local.type) {
-    case SurfaceType::plane: return make_plane(local.axis, dot(local.axis, centre));
-    case SurfaceType::sphere: return make_sphere(centre, scale * local.radius);
-    case SurfaceType::cylinder: return make_cylinder(centre, local.axis, scale * local.radius);
-    case SurfaceType::cone: return make_cone(centre, local.axis, local.angle);
-    case SurfaceType::torus: return make_torus(centre, local.axis, scale * local.radius, scale * local.minor_radius);
-    default: break;
-  }
-  Primitive result = local;
-  result.centre = centre;
-  result.quadric = from_local(local.quadric, origin, scale);
-  for (double& c : result.quadric.c) c *= scale;
-  if (!meets_itself(local))
-    for (double& length : result.lengths) length *= scale;
-  return result;
+  return std::visit([&](const auto& s) { return placed(s, origin, scale); }, local);
 }
 
 }  // namespace bisector

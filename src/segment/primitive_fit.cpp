@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "bisector/error.h"
@@ -10,13 +11,19 @@
 namespace bisector {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kLargest = 1e3;              // radii at most, in extents of the points
-constexpr double kLeastAngle = 0.1 * kPi / 180;  // of a cone that is neither a cylinder nor a plane
-constexpr double kExact = 1e-22;              // mean squared distance, in squared extents, that is rounding
-constexpr double kGain = 10;                  // by this over the number of points must a surface lessen a simpler one's variance
-constexpr double kLeastPivot = 1e-13;         // of the greatest, for unknowns that the points determine
-constexpr std::size_t kScreened = 64;         // samples that starts are compared on
+using std::numbers::pi;
+
+// What fits are refused for. Lengths are in extents of the points: the greatest distance from their centroid.
+constexpr double kLargest = 1e3;                // radii at most: larger surfaces are flat over the points, up to rounding
+constexpr double kLeastAngle = 0.1 * pi / 180;  // radians, of a cone that is neither a cylinder nor a plane
+constexpr double kExact = 1e-22;      // mean squared distance that is rounding
+constexpr double kGain = 10;          // a surface must lessen a simpler one's variance by this part over the number of points
+constexpr double kLeastPivot = 1e-13;  // of the normal equations, in the greatest one: the points determine all unknowns
+
+// How starts are compared: the best few on a part of the samples, the winner on all of them.
+constexpr std::size_t kScreened = 64;       // samples
+constexpr std::size_t kTried = 4;           // starts that take steps
+constexpr int kFirstSteps = 4, kSteps = 60;  // of Levenberg and Marquardt, on the part and on all
 constexpr int kMaxUnknowns = 7;
 
 using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxUnknowns, 1>;
@@ -81,13 +88,14 @@ Local thinned(const Local& local) {
   return thin;
 }
 
-// A surface while it is fitted. Of cylinders and cones `centre` is the axis' point nearest the origin.
+// A sphere, cylinder, cone or torus while it is fitted. Of cylinders and cones `centre` is the axis' point nearest the origin.
 struct Shape {
   SurfaceType type;
   Vec3 centre, axis{0, 0, 1};
-  double a = 0;  // radius; of a cone its distance to `centre`
-  double b = 0;  // minor radius of a torus; angle of a cone
-  double sine = 0, cosine = 1;  // of a cone's angle
+  double radius = 0;        // of a cone: the distance from `centre` to the cone
+  double minor_radius = 0;  // of a torus
+  double angle = 0;         // of a cone
+  double sine = 0, cosine = 1;  // of the angle
 };
 
 constexpr int unknowns(SurfaceType type) {
@@ -100,40 +108,33 @@ constexpr int unknowns(SurfaceType type) {
   }
 }
 
-std::pair<Vec3, Vec3> across(const Vec3& axis) {
-  const double x = std::abs(axis.x), y = std::abs(axis.y), z = std::abs(axis.z);
-  const Vec3 other = x <= y && x <= z ? Vec3{1, 0, 0} : y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
-  Vec3 u = cross(axis, other);
-  u *= 1 / norm(u);
-  return {u, cross(axis, u)};
-}
-
-// Brings a shape into its normal form; false if it is none.
-bool settle(Shape& shape) {
-  if (!std::isfinite(norm2(shape.centre) + norm2(shape.axis) + shape.a + shape.b)) return false;
+// Brings a shape into its normal form: axis, signs and centre. False if its numbers describe no surface of its type.
+bool normalise(Shape& shape) {
+  if (!std::isfinite(norm2(shape.centre) + norm2(shape.axis) + shape.radius + shape.minor_radius + shape.angle)) return false;
   shape.axis *= 1 / norm(shape.axis);
   if (shape.type == SurfaceType::cone) {
-    if (shape.b < 0) {
-      shape.b = -shape.b;
+    if (shape.angle < 0) {
+      shape.angle = -shape.angle;
       shape.axis = -shape.axis;
     }
-    if (shape.b >= kPi / 2) return false;
-    shape.sine = std::sin(shape.b);
-    shape.cosine = std::cos(shape.b);
+    if (shape.angle >= pi / 2) return false;
+    shape.sine = std::sin(shape.angle);
+    shape.cosine = std::cos(shape.angle);
     const double along = dot(shape.centre, shape.axis);
     shape.centre -= along * shape.axis;
-    shape.a -= along * shape.sine;
+    shape.radius -= along * shape.sine;
     return true;
   }
   if (shape.type == SurfaceType::cylinder) shape.centre -= dot(shape.centre, shape.axis) * shape.axis;
-  return shape.a > 0 && (shape.type != SurfaceType::torus || shape.b > 0);
+  return shape.radius > 0 && (shape.type != SurfaceType::torus || shape.minor_radius > 0);
 }
 
-// Signed distance of a point, the unit normal at its foot, and the distance's derivatives by a and b.
+// Signed distance of a point, the unit normal at its foot, and the distance's derivatives by the radius and by a torus' minor
+// radius or a cone's angle.
 struct Residual {
   double d;
   Vec3 normal;
-  double by_a, by_b;
+  double by_radius, by_second;
   Vec3 out = normal;  // of a torus away from its axis, across it
 };
 
@@ -142,21 +143,21 @@ inline Residual residual(const Shape& shape, const Vec3& p) {
   const Vec3 q = p - shape.centre;
   if constexpr (type == SurfaceType::sphere) {
     const double length = norm(q);
-    return {length - shape.a, length > 0 ? (1 / length) * q : shape.axis, -1, 0};
+    return {length - shape.radius, length > 0 ? (1 / length) * q : shape.axis, -1, 0};
   }
   const double z = dot(shape.axis, q);
   Vec3 out = q - z * shape.axis;
   const double rho = norm(out);
   if (rho > 0) out *= 1 / rho;
-  if constexpr (type == SurfaceType::cylinder) return {rho - shape.a, out, -1, 0};
+  if constexpr (type == SurfaceType::cylinder) return {rho - shape.radius, out, -1, 0};
   if constexpr (type == SurfaceType::cone) {
     // Of the nappe that the axis points into, continued beyond the apex: both together can take up a plane's noise.
-    return {rho * shape.cosine - shape.a - z * shape.sine, shape.cosine * out - shape.sine * shape.axis, -1,
+    return {rho * shape.cosine - shape.radius - z * shape.sine, shape.cosine * out - shape.sine * shape.axis, -1,
             -rho * shape.sine - z * shape.cosine};
   }
-  const double beyond = rho - shape.a, length = std::sqrt(beyond * beyond + z * z);
+  const double beyond = rho - shape.radius, length = std::sqrt(beyond * beyond + z * z);
   const double cosine = length > 0 ? beyond / length : 0, sine = length > 0 ? z / length : 0;
-  return {length - shape.b, cosine * out + sine * shape.axis, -cosine, -1, out};
+  return {length - shape.minor_radius, cosine * out + sine * shape.axis, -cosine, -1, out};
 }
 
 // Calls one of a template's instances for a type.
@@ -182,7 +183,7 @@ double energy(const Shape& shape, const Local& local) {
 }
 
 // The unknowns: translations across the axis (a sphere's, a torus' along it too), rotations about the origin across the
-// axis, then a and b. A translation t and a rotation w of the surface change the distance of p by -n.t and -w.(p x n).
+// axis, then the radius, then the minor radius or the angle. A translation t and a rotation w of the surface change the distance of p by -n.t and -w.(p x n).
 struct NormalEquations {
   Matrix matrix;
   Vector right;
@@ -193,7 +194,7 @@ struct NormalEquations {
 NormalEquations normal_equations(const Shape& shape, const Local& local) {
   return for_type(shape.type, [&]<SurfaceType type>() {
     constexpr int n = unknowns(type);
-    const auto [u, v] = across(shape.axis);
+    const auto [u, v] = frame_across(shape.axis);
     double m[n][n] = {}, r[n] = {}, j[n];
     NormalEquations equations;
     for (std::size_t i = 0; i < local.points.size(); ++i) {
@@ -208,8 +209,8 @@ NormalEquations normal_equations(const Shape& shape, const Local& local) {
         j[k++] = -dot(moment, u);
         j[k++] = -dot(moment, v);
       }
-      j[k++] = f.by_a;
-      if constexpr (type == SurfaceType::cone || type == SurfaceType::torus) j[k] = f.by_b;
+      j[k++] = f.by_radius;
+      if constexpr (type == SurfaceType::cone || type == SurfaceType::torus) j[k] = f.by_second;
       const double w = local.weights[i];
       for (int a = 0; a < n; ++a) {
         const double wj = w * j[a];
@@ -244,7 +245,7 @@ double stepped_radius(double radius, double step) {
 }
 
 Shape stepped(const Shape& shape, const NormalEquations& at, const Vector& step) {
-  const auto [u, v] = across(shape.axis);
+  const auto [u, v] = frame_across(shape.axis);
   Shape next = shape;
   int k = 2;
   Vec3 move = step(0) * u + step(1) * v;
@@ -256,18 +257,18 @@ Shape stepped(const Shape& shape, const NormalEquations& at, const Vector& step)
   }
   if (shape.type == SurfaceType::cone) {
     // The circle across `centre` takes the linear step, so that it stays on the surface under large changes of the angle.
-    const double radius = (shape.a + step(k) + shape.a * shape.sine / shape.cosine * step(k + 1)) / shape.cosine;
-    next.a = radius * std::cos(shape.b + step(k + 1));
-    next.b += step(k + 1);
+    const double radius = (shape.radius + step(k) + shape.radius * shape.sine / shape.cosine * step(k + 1)) / shape.cosine;
+    next.radius = radius * std::cos(shape.angle + step(k + 1));
+    next.angle += step(k + 1);
   } else {
     // What the radii change beyond the step, the surface moves back, so that it stays where the points are.
-    next.a = stepped_radius(shape.a, step(k));
+    next.radius = stepped_radius(shape.radius, step(k));
     if (shape.type == SurfaceType::torus) {
-      next.b = stepped_radius(shape.b, step(k + 1));
-      const double beyond = next.b - shape.b - step(k + 1);
+      next.minor_radius = stepped_radius(shape.minor_radius, step(k + 1));
+      const double beyond = next.minor_radius - shape.minor_radius - step(k + 1);
       move -= beyond * at.normal;
     }
-    move -= (next.a - shape.a - step(k)) * at.out;
+    move -= (next.radius - shape.radius - step(k)) * at.out;
   }
   next.axis = rotated(shape.axis, turn);
   next.centre = rotated(shape.centre + move, turn);
@@ -283,7 +284,7 @@ NormalEquations descend(Shape& shape, const Local& local, int steps) {
     damped.diagonal() += (damping * at.matrix.diagonal()).cwiseMax(1e-30);
     const Vector step = damped.ldlt().solve(at.right);
     Shape next = stepped(shape, at, step);
-    if (step.allFinite() && settle(next)) {
+    if (step.allFinite() && normalise(next)) {
       NormalEquations there = normal_equations(next, local);
       if (there.energy < at.energy) {
         const bool done = at.energy - there.energy < 1e-7 * at.energy;
@@ -399,7 +400,7 @@ Directions axis_directions(const Sums& sums) {
 // The point of the plane across the axis that the lines of the normals pass most closely by.
 Vec3 axis_point(const Sums& sums, const Vec3& axis) {
   // Sum of ((p - x) . (axis x n))^2; (p . (axis x n)) = -axis . (p x n).
-  const auto [u, v] = across(axis);
+  const auto [u, v] = frame_across(axis);
   const Eigen::Vector3d a = eigen(axis), eu = eigen(u), ev = eigen(v);
   // x . (axis x n) = (x x axis) . n, with u x axis = -v and v x axis = u.
   Eigen::Matrix2d matrix;
@@ -449,7 +450,7 @@ void add_axes_by_curvature(const Local& local, const Sums& sums, const std::vect
 }
 
 std::optional<Shape> start_cylinder(const Local& local, const Vec3& axis) {
-  const auto [u, v] = across(axis);
+  const auto [u, v] = frame_across(axis);
   RoundFitter<2> circle;
   for (std::size_t i = 0; i < local.points.size(); ++i)
     circle.add({dot(u, local.points[i]), dot(v, local.points[i])}, local.weights[i]);
@@ -472,9 +473,9 @@ std::optional<Shape> start_cone(const Local& local, const Vec3& axis, const Vec3
   Eigen::Vector2d line = solver.eigenvectors().col(1);
   if (line(0) < 0) line = -line;
   Shape cone{SurfaceType::cone, point, axis};
-  cone.b = std::atan2(line(0), std::abs(line(1)));
+  cone.angle = std::atan2(line(0), std::abs(line(1)));
   if (line(1) < 0) cone.axis = -axis;
-  cone.a = mean(0) * std::cos(cone.b) - (line(1) < 0 ? -mean(1) : mean(1)) * std::sin(cone.b);
+  cone.radius = mean(0) * std::cos(cone.angle) - (line(1) < 0 ? -mean(1) : mean(1)) * std::sin(cone.angle);
   return cone;
 }
 
@@ -493,7 +494,7 @@ std::optional<Shape> start_cone_at_apex(const Local& local, const Vec3& axis, co
   }
   // The points' centroid is the origin.
   Shape cone{SurfaceType::cone, apex, dot(axis, apex) > 0 ? -axis : axis};
-  cone.b = std::atan2(rho, along);
+  cone.angle = std::atan2(rho, along);
   return cone;
 }
 
@@ -519,7 +520,7 @@ std::optional<Shape> start_sphere(const Local& local) {
 std::vector<Shape> starts(SurfaceType type, const Local& local) {
   std::vector<Shape> result;
   const auto add = [&](std::optional<Shape> shape) {
-    if (shape && settle(*shape)) result.push_back(*shape);
+    if (shape && normalise(*shape)) result.push_back(*shape);
   };
   if (type == SurfaceType::sphere) {
     add(start_sphere(local));
@@ -532,7 +533,7 @@ std::vector<Shape> starts(SurfaceType type, const Local& local) {
     if (type == SurfaceType::cone) add(start_cone_at_apex(local, direction, apex_point(sums)));
   }
   if (type == SurfaceType::cone) add_axes_by_curvature(local, sums, {-1.2, -0.8, -0.3, 0.3, 0.8, 1.2}, axes);
-  if (type == SurfaceType::torus) add_axes_by_curvature(local, sums, {0, kPi / 4, kPi / 2, -kPi / 4}, axes);
+  if (type == SurfaceType::torus) add_axes_by_curvature(local, sums, {0, pi / 4, pi / 2, -pi / 4}, axes);
   for (const Axis& axis : axes) {
     if (type == SurfaceType::cylinder) add(start_cylinder(local, axis.direction));
     if (type == SurfaceType::cone) add(start_cone(local, axis.direction, axis.point));
@@ -548,8 +549,6 @@ struct Fitted {
 
 // The best of the starts' descents on a part of the samples, taken to its end on all of them.
 std::optional<Fitted> best_of(std::vector<Shape> candidates, const Local& local, const Local& thin) {
-  constexpr std::size_t kTried = 4;
-  constexpr int kFirstSteps = 4, kSteps = 60;
   std::vector<std::pair<double, Shape>> ranked;
   for (const Shape& shape : candidates) {
     const double e = energy(shape, thin);
@@ -574,18 +573,19 @@ std::optional<Fitted> best_of(SurfaceType type, const Local& local) {
   return best_of(starts(type, thin), local, thin);
 }
 
-struct Plane {
+// The best plane through the samples' centroid.
+struct FlatFit {
   Vec3 normal;
   double energy;
   bool determined;
 };
 
-Plane best_plane(const Local& local) {
+FlatFit best_plane(const Local& local) {
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < local.points.size(); ++i)
     second += local.weights[i] * eigen(local.points[i]) * eigen(local.points[i]).transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(second);
-  Plane plane{vec3(solver.eigenvectors().col(0)), 0, solver.eigenvalues()(1) > kLeastPivot * solver.eigenvalues()(2)};
+  FlatFit plane{vec3(solver.eigenvectors().col(0)), 0, solver.eigenvalues()(1) > kLeastPivot * solver.eigenvalues()(2)};
   double side = 0;
   for (std::size_t i = 0; i < local.points.size(); ++i) {
     const double d = dot(local.points[i], plane.normal);
@@ -619,57 +619,67 @@ bool has_simpler(const Fitted& fitted, const Local& local) {
   };
   if (beaten_by(best_plane(local).energy, SurfaceType::plane)) return true;
   if (shape.type == SurfaceType::cone) {
-    Shape cylinder{SurfaceType::cylinder, shape.centre, shape.axis, shape.a / shape.cosine};
-    return settle(cylinder) && beaten_by_fit(best_of({cylinder}, local, local));
+    Shape cylinder{SurfaceType::cylinder, shape.centre, shape.axis, shape.radius / shape.cosine};
+    return normalise(cylinder) && beaten_by_fit(best_of({cylinder}, local, local));
   }
   if (shape.type != SurfaceType::torus) return false;
   if (beaten_by_fit(best_of(SurfaceType::sphere, local))) return true;
   constexpr double kLarge = 10;
-  return shape.a > kLarge && (beaten_by_fit(best_of(SurfaceType::cylinder, local)) || beaten_by_fit(best_of(SurfaceType::cone, local)));
+  return shape.radius > kLarge && (beaten_by_fit(best_of(SurfaceType::cylinder, local)) || beaten_by_fit(best_of(SurfaceType::cone, local)));
 }
 
 // Share of the weight before a cone's apex.
 double before_apex(const Shape& shape, const Local& local) {
   double share = 0;
   for (std::size_t i = 0; i < local.points.size(); ++i)
-    if (shape.a + dot(local.points[i] - shape.centre, shape.axis) * shape.sine < 0) share += local.weights[i];
+    if (shape.radius + dot(local.points[i] - shape.centre, shape.axis) * shape.sine < 0) share += local.weights[i];
   return share;
 }
 
 bool acceptable(const Shape& shape, const Local& local) {
   switch (shape.type) {
     case SurfaceType::cone:
-      return shape.b > kLeastAngle && shape.b < kPi / 2 - kLeastAngle &&
-             std::abs(shape.a) / shape.sine < kLargest / kLeastAngle && before_apex(shape, local) < 0.5;
-    case SurfaceType::torus: return shape.a < kLargest && shape.b < shape.a;
-    default: return shape.a < kLargest;
+      return shape.angle > kLeastAngle && shape.angle < pi / 2 - kLeastAngle &&
+             std::abs(shape.radius) / shape.sine < kLargest / kLeastAngle && before_apex(shape, local) < 0.5;
+    case SurfaceType::torus: return shape.radius < kLargest && shape.minor_radius < shape.radius;
+    default: return shape.radius < kLargest;
   }
 }
 
 Primitive to_primitive(const Shape& shape) {
-  Primitive primitive;
   switch (shape.type) {
-    case SurfaceType::sphere: primitive = make_sphere(shape.centre, shape.a); break;
-    case SurfaceType::cylinder: primitive = make_cylinder(shape.centre, shape.axis, shape.a); break;
+    case SurfaceType::sphere: return make_sphere(shape.centre, shape.radius);
+    case SurfaceType::cylinder: return make_cylinder(shape.centre, shape.axis, shape.radius);
     case SurfaceType::cone: {
-      const Vec3 apex = shape.centre - (shape.a / shape.sine) * shape.axis;
-      primitive = make_cone(apex, shape.axis, shape.b);
-      break;
+      const Vec3 apex = shape.centre - (shape.radius / shape.sine) * shape.axis;
+      return make_cone(apex, shape.axis, shape.angle);
     }
-    default: primitive = make_torus(shape.centre, shape.axis, shape.a, shape.b); break;
+    default: return make_torus(shape.centre, shape.axis, shape.radius, shape.minor_radius);
   }
-  return primitive;
 }
 
+// The shape of a sphere, cylinder, cone or torus in the samples' coordinates.
 std::optional<Shape> to_shape(const Primitive& primitive, const Local& local) {
-  Shape shape{primitive.type, (1 / local.scale) * (primitive.centre - local.origin), primitive.axis};
-  shape.a = primitive.radius / local.scale;
-  if (primitive.type == SurfaceType::torus) shape.b = primitive.minor_radius / local.scale;
-  if (primitive.type == SurfaceType::cone) {
-    shape.a = 0;
-    shape.b = primitive.angle;
+  Shape shape{type_of(primitive), {}};
+  const auto place = [&](const Vec3& centre) { shape.centre = (1 / local.scale) * (centre - local.origin); };
+  if (const auto* sphere = std::get_if<Sphere>(&primitive)) {
+    place(sphere->centre);
+    shape.radius = sphere->radius / local.scale;
+  } else if (const auto* cylinder = std::get_if<Cylinder>(&primitive)) {
+    place(cylinder->point);
+    shape.axis = cylinder->axis;
+    shape.radius = cylinder->radius / local.scale;
+  } else if (const auto* cone = std::get_if<Cone>(&primitive)) {
+    place(cone->apex);
+    shape.axis = cone->axis;
+    shape.angle = cone->angle;
+  } else if (const auto* torus = std::get_if<Torus>(&primitive)) {
+    place(torus->centre);
+    shape.axis = torus->axis;
+    shape.radius = torus->radius / local.scale;
+    shape.minor_radius = torus->minor_radius / local.scale;
   }
-  if (!settle(shape)) return std::nullopt;
+  if (!normalise(shape)) return std::nullopt;
   return shape;
 }
 
@@ -678,7 +688,7 @@ std::optional<PrimitiveFit> checked(const std::optional<Fitted>& fitted, const L
   if (!determined(fitted->equations) || has_simpler(*fitted, local)) return std::nullopt;
   const Primitive primitive = to_primitive(fitted->shape);
   double energy = fitted->equations.energy;
-  if (primitive.type == SurfaceType::cone) {
+  if (std::holds_alternative<Cone>(primitive)) {
     // Before the apex the other nappe is nearer than the one that was fitted.
     energy = 0;
     for (std::size_t i = 0; i < local.points.size(); ++i) {
@@ -690,7 +700,7 @@ std::optional<PrimitiveFit> checked(const std::optional<Fitted>& fitted, const L
 }
 
 std::optional<PrimitiveFit> fit_plane_to(const Local& local) {
-  const Plane plane = best_plane(local);
+  const FlatFit plane = best_plane(local);
   if (!plane.determined) return std::nullopt;
   return PrimitiveFit{make_plane(plane.normal, dot(plane.normal, local.origin)),
                       plane.energy * local.total * local.scale * local.scale};
@@ -712,7 +722,7 @@ bool enough(SurfaceType type, const Local& local) {
 }
 
 double squared_distance(const Quadric& quadric, const SurfaceSamples& samples) {
-  const double second_order = quadric.second_order();
+  const double second_order = second_order_of(quadric);
   double sum = 0;
   for (std::size_t i = 0; i < samples.points.size(); ++i) {
     const double d = approximate_distance(quadric, second_order, samples.points[i]);
@@ -726,13 +736,13 @@ std::optional<Quadric> reweighted(const Quadric& last, const SurfaceSamples& loc
   using Vector9 = Eigen::Matrix<double, 9, 1>;
   using Matrix9 = Eigen::Matrix<double, 9, 9>;
   double mean_slope = 0, total = 0;
-  for (std::size_t i = 0; i < local.points.size(); ++i) mean_slope += local.weights[i] * norm2(last.gradient(local.points[i]));
+  for (std::size_t i = 0; i < local.points.size(); ++i) mean_slope += local.weights[i] * norm2(gradient_of(last, local.points[i]));
   if (!(mean_slope > 0)) return std::nullopt;
   Matrix9 second = Matrix9::Zero(), slopes = Matrix9::Zero();
   Vector9 mean = Vector9::Zero();
   for (std::size_t i = 0; i < local.points.size(); ++i) {
     const Vec3& p = local.points[i];
-    const double w = local.weights[i] / std::max(norm2(last.gradient(p)), 1e-3 * mean_slope);
+    const double w = local.weights[i] / std::max(norm2(gradient_of(last, p)), 1e-3 * mean_slope);
     Vector9 f, x, y, z;
     f << p.x, p.y, p.z, p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z;
     x << 1, 0, 0, 2 * p.x, p.y, p.z, 0, 0, 0;
@@ -766,20 +776,22 @@ std::optional<PrimitiveFit> fit_primitive(SurfaceType type, const SurfaceSamples
 }
 
 std::optional<PrimitiveFit> refine_primitive(const Primitive& start, const SurfaceSamples& samples) {
-  require_fitted(start.type);
+  const SurfaceType type = type_of(start);
+  require_fitted(type);
   const Local local = to_local(samples);
-  if (!enough(start.type, local)) return std::nullopt;
-  if (start.type == SurfaceType::plane) return fit_plane_to(local);
+  if (!enough(type, local)) return std::nullopt;
+  if (type == SurfaceType::plane) return fit_plane_to(local);
   const std::optional<Shape> shape = to_shape(start, local);
   if (!shape) return std::nullopt;
   return checked(best_of({*shape}, local, local), local);
 }
 
 PrimitiveFit refine_quadric(const Primitive& start, const SurfaceSamples& samples) {
-  constexpr int kSteps = 10;
+  constexpr int kReweightings = 10;
   const Local local = to_local(samples);
   PrimitiveFit best{start, 0};
-  if (start.type == SurfaceType::torus || !(local.scale > 0)) {
+  const std::optional<Quadric> first = quadric_of(start);
+  if (!first || !(local.scale > 0)) {
     for (std::size_t i = 0; i < samples.points.size(); ++i) {
       const double d = distance(start, samples.points[i]);
       best.squared_distance += samples.weights[i] * d * d;
@@ -787,11 +799,11 @@ PrimitiveFit refine_quadric(const Primitive& start, const SurfaceSamples& sample
     return best;
   }
   const SurfaceSamples scaled{local.points, local.normals, local.weights};
-  Quadric quadric = bisector::to_local(start.quadric, local.origin, local.scale);
+  Quadric quadric = bisector::to_local(*first, local.origin, local.scale);
   const double before = squared_distance(quadric, scaled);
   double least = before;
   Quadric kept = quadric;
-  for (int i = 0; i < kSteps; ++i) {
+  for (int i = 0; i < kReweightings; ++i) {
     const std::optional<Quadric> next = reweighted(quadric, scaled);
     if (!next) break;
     quadric = *next;

@@ -9,17 +9,20 @@
 namespace bisector {
 namespace {
 
-// In units of the piece's root mean square radius.
-constexpr double kSharp = 0.12;      // hyperbolas with smaller semi-axes are taken for their asymptotes
-constexpr double kFlat = 0.05;       // eigenvalues smaller than this part of the others are taken for 0
-constexpr double kOneSided = 1.13;   // data farther on one side than so many deviations are on one side
-constexpr double kAligned = 0.5;     // least alignment of a gradient with the normals
+// What is no surface of its own. Lengths are in root mean square radii of the piece.
+constexpr double kSharp = 0.12;     // semi-axes of a hyperbola that is taken for two crossing planes, at most
+constexpr double kCrossing = 1.5;   // distance from the piece's middle up to which planes cross within it
+constexpr double kFlat = 0.05;      // ratio of curvatures (or slopes) below which the lesser is taken for 0
+constexpr double kOneSided = 1.13;  // data farther than so many standard deviations on one side of a centre are on one side
+constexpr double kAligned = 0.5;    // QuadricFit::alignment of a surface, at least
+// Mean squared distance, in the unit-sized model, of what is flat to a part in 1e7 of it: a plane.
+constexpr double kExactPlane = 1e-14;
 
 }  // namespace
 
 Proxy Proxy::of(const Primitive& primitive) {
-  if (primitive.type != SurfaceType::torus) return of(primitive.quadric);
-  return {true, {}, 0, primitive.centre, primitive.axis, primitive.radius, primitive.minor_radius};
+  if (const std::optional<Quadric> quadric = quadric_of(primitive)) return of(*quadric);
+  return {std::get<Torus>(primitive), {}, 0};
 }
 
 SurfaceMoments sum_of_moments(const SegmentDomain& domain, const Index* begin, const Index* end) {
@@ -112,16 +115,16 @@ bool is_invalid(const Quadric& quadric, const SurfaceMoments& moments) {
   if (lambda(0) < 0 && lambda(2) > 0) {
     const double smaller = std::min(-lambda(0), lambda(2));
     const bool straight = std::abs(lambda(1)) < kFlat * smaller && !curved_along_rest(smaller);
-    if (straight && gap(0) < kSharp && gap(2) < kSharp && std::abs(centre(0)) < 1.5 && std::abs(centre(2)) < 1.5) return true;
+    if (straight && gap(0) < kSharp && gap(2) < kSharp && std::abs(centre(0)) < kCrossing && std::abs(centre(2)) < kCrossing)
+      return true;
   }
   return false;
 }
 
 ProxyFit fit_proxy(const SurfaceMoments& moments, SegmentSurfaces surfaces) {
   const PlaneFit plane = fit_plane(moments);
-  ProxyFit best{Proxy::of(Quadric::plane(plane.normal, plane.offset)), plane.squared_distance, true, false};
-  // What is flat to a part in 1e7 of the model is a plane.
-  if (surfaces == SegmentSurfaces::planes || plane.squared_distance <= 1e-14 * moments.area()) return best;
+  ProxyFit best{Proxy::of(plane_quadric(plane.normal, plane.offset)), plane.squared_distance, true, false};
+  if (surfaces == SegmentSurfaces::planes || plane.squared_distance <= kExactPlane * moments.area()) return best;
   QuadricFit fit = fit_quadric(moments);
   bool invalid = fit.valid && (std::abs(fit.alignment) < kAligned || is_invalid(fit.quadric, moments));
   if (invalid) {

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
+#include "bisector/segment.h"
 #include "core/geometry.h"
-#include "segment/primitive.h"
 #include "segment/quadric.h"
-#include "segment/segment.h"
 #include "segment/segment_domain.h"
 
 namespace bisector {
@@ -15,21 +15,19 @@ namespace bisector {
 inline constexpr double kTiny = 1e-290;  // keeps 0 / 0 away
 
 struct Proxy {
-  bool torus = false;
-  Quadric quadric;           // not of a torus
-  double second_order = 0;   // the quadric's
-  Vec3 centre, axis;         // of a torus
-  double radius = 0, minor_radius = 0;
+  std::optional<Torus> torus;
+  Quadric quadric;          // where there is no torus
+  double second_order = 0;  // second_order_of the quadric
 
-  static Proxy of(const Quadric& quadric) { return {false, quadric, quadric.second_order(), {}, {}, 0, 0}; }
+  static Proxy of(const Quadric& quadric) { return {std::nullopt, quadric, second_order_of(quadric)}; }
   static Proxy of(const Primitive& primitive);
 
   // Normal to the level set at p, of any length; 0 on the axis of a torus.
   Vec3 gradient(const Vec3& p) const {
-    if (!torus) return quadric.gradient(p);
-    const Vec3 v = p - centre, radial = v - dot(v, axis) * axis;
+    if (!torus) return gradient_of(quadric, p);
+    const Vec3 v = p - torus->centre, radial = v - dot(v, torus->axis) * torus->axis;
     const double r = norm(radial);
-    return r > 0 ? v - (radius / r) * radial : Vec3{};
+    return r > 0 ? v - (torus->radius / r) * radial : Vec3{};
   }
 };
 
@@ -39,10 +37,11 @@ inline double distance_to(const SegmentDomain& domain, Index triangle, const Pro
   const TriangleSamples& s = domain.samples[triangle];
   double squares[4];
   if (proxy.torus) {
+    const Torus& torus = *proxy.torus;
     for (std::size_t k = 0; k < 4; ++k) {
-      const Vec3 v = Vec3{s.x[k], s.y[k], s.z[k]} - proxy.centre;
-      const double z = dot(v, proxy.axis), r = std::sqrt(std::max(0.0, norm2(v) - z * z)) - proxy.radius;
-      const double d = std::sqrt(r * r + z * z) - proxy.minor_radius;
+      const Vec3 v = Vec3{s.x[k], s.y[k], s.z[k]} - torus.centre;
+      const double z = dot(v, torus.axis), r = std::sqrt(std::max(0.0, norm2(v) - z * z)) - torus.radius;
+      const double d = std::sqrt(r * r + z * z) - torus.minor_radius;
       squares[k] = d * d;
     }
   } else {
@@ -50,8 +49,8 @@ inline double distance_to(const SegmentDomain& domain, Index triangle, const Pro
     double value[4], slope[4];
     for (std::size_t k = 0; k < 4; ++k) {
       const Vec3 p{s.x[k], s.y[k], s.z[k]};
-      value[k] = std::abs(proxy.quadric.value(p));
-      slope[k] = norm2(proxy.quadric.gradient(p));
+      value[k] = std::abs(value_of(proxy.quadric, p));
+      slope[k] = norm2(gradient_of(proxy.quadric, p));
     }
     const double a = 4 * proxy.second_order;
     for (std::size_t k = 0; k < 4; ++k) {

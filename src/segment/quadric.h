@@ -1,38 +1,38 @@
-// Quadric surfaces as zero sets of second-degree polynomials (thesis 2.2.2).
+// Arithmetic of quadric surfaces, zero sets of second-degree polynomials (thesis 2.2.2, Eq. 2.2).
 #pragma once
 
-#include <array>
 #include <cmath>
 
+#include "bisector/segment.h"
 #include "core/geometry.h"
 
 namespace bisector {
 
-// f(x, y, z) = c0 + c1 x + c2 y + c3 z + c4 x^2 + c5 xy + c6 xz + c7 y^2 + c8 yz + c9 z^2 (thesis Eq. 2.2). A plane has
-// c4 = ... = c9 = 0. The scale of c is of no meaning.
-struct Quadric {
-  std::array<double, 10> c{};
+inline double value_of(const Quadric& q, const Vec3& p) {
+  const auto& c = q.c;
+  return c[0] + p.x * (c[1] + c[4] * p.x + c[5] * p.y + c[6] * p.z) + p.y * (c[2] + c[7] * p.y + c[8] * p.z) +
+         p.z * (c[3] + c[9] * p.z);
+}
 
-  double value(const Vec3& p) const {
-    return c[0] + p.x * (c[1] + c[4] * p.x + c[5] * p.y + c[6] * p.z) + p.y * (c[2] + c[7] * p.y + c[8] * p.z) +
-           p.z * (c[3] + c[9] * p.z);
-  }
-  Vec3 gradient(const Vec3& p) const {
-    return {c[1] + 2 * c[4] * p.x + c[5] * p.y + c[6] * p.z, c[2] + c[5] * p.x + 2 * c[7] * p.y + c[8] * p.z,
-            c[3] + c[6] * p.x + c[8] * p.y + 2 * c[9] * p.z};
-  }
-  // Frobenius norm of the matrix of the second-degree terms.
-  double second_order() const {
-    return std::sqrt(c[4] * c[4] + c[7] * c[7] + c[9] * c[9] + 0.5 * (c[5] * c[5] + c[6] * c[6] + c[8] * c[8]));
-  }
-  static Quadric plane(const Vec3& normal, double offset) { return {{-offset, normal.x, normal.y, normal.z}}; }
-};
+inline Vec3 gradient_of(const Quadric& q, const Vec3& p) {
+  const auto& c = q.c;
+  return {c[1] + 2 * c[4] * p.x + c[5] * p.y + c[6] * p.z, c[2] + c[5] * p.x + 2 * c[7] * p.y + c[8] * p.z,
+          c[3] + c[6] * p.x + c[8] * p.y + 2 * c[9] * p.z};
+}
+
+// Frobenius norm of the matrix of the second-degree terms.
+inline double second_order_of(const Quadric& q) {
+  const auto& c = q.c;
+  return std::sqrt(c[4] * c[4] + c[7] * c[7] + c[9] * c[9] + 0.5 * (c[5] * c[5] + c[6] * c[6] + c[8] * c[8]));
+}
+
+inline Quadric plane_quadric(const Vec3& normal, double offset) { return {{-offset, normal.x, normal.y, normal.z}}; }
 
 // Taubin's second-order approximation of the distance from p to the quadric, between 0 and the exact one (thesis 2.2.2;
 // Taubin 1993). `second_order` is the quadric's. The root of the quadratic equation is written so that planes are no
 // special case.
 inline double approximate_distance(const Quadric& q, double second_order, const Vec3& p) {
-  const double c = std::abs(q.value(p)), b2 = norm2(q.gradient(p)), b = std::sqrt(b2);
+  const double c = std::abs(value_of(q, p)), b2 = norm2(gradient_of(q, p)), b = std::sqrt(b2);
   const double denominator = b + std::sqrt(b2 + 4 * second_order * c);
   return denominator > 0 ? 2 * c / denominator : 0;
 }

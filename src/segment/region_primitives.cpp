@@ -7,7 +7,9 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "segment/flood.h"
 #include "segment/primitive_fit.h"
@@ -16,17 +18,21 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kEnoughInside = 24;  // vertices
-constexpr std::uint8_t kDeep = 4;          // edges away from borders
+// Which vertices tell a region's surface: those deep inside, since near borders that no crease marks some belong to others.
+constexpr std::uint8_t kDeep = 4;           // edges away from borders, at most
+constexpr std::size_t kEnoughInside = 24;   // vertices that are left one edge inside; twice as many deeper inside
 constexpr std::size_t kTrialSamples = 400;  // vertices that types are tried on
-constexpr double kExact = 2e-6;            // distances in the unit-sized model that do not tell types apart
+
+// When one surface is as good as another. Lengths are in the unit-sized model, energies those of Eq. 2.3.
+constexpr double kExact = 2e-6;       // distances that do not tell types apart
+constexpr double kMuchWorse = 1.5;    // ratio of energies, or of tilts, from which on the larger one is out of question
+constexpr double kHardlyWorse = 1.07;  // ratio of energies up to which the larger one is accepted for a simpler type
+constexpr double kOneSided = 0.98;    // least Candidate::side: less means two sheets with the data between
+
 // From the simplest to the most general.
 constexpr std::array kSpecialTypes{SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder, SurfaceType::cone,
                                    SurfaceType::torus};
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMuchWorse = 1.5;         // between energies of Eq. 2.3
-constexpr double kHardlyWorse = 1.07;
-constexpr double kOneSided = 0.98;         // least Candidate::side
 
 // How many edges each vertex is away from the borders between regions: 0 on them, at most kDeep.
 std::vector<std::uint8_t> vertex_depths(const SegmentDomain& domain, const std::vector<Index>& labels) {
@@ -126,6 +132,8 @@ int free_parameters(SurfaceType type) {
   }
 }
 
+int free_parameters(const Primitive& primitive) { return free_parameters(type_of(primitive)); }
+
 // What the sum of squared distances of n points may be larger by, as a factor, for so many parameters fewer: the Bayesian
 // information criterion (Schwarz 1978) with twice its penalty, since each type is the best of several fits.
 double simplicity_allowance(std::size_t n, int fewer) {
@@ -152,11 +160,12 @@ class RegionSurface {
     few_ = thinned(all_, 2 * kTrialSamples);
   }
 
-  std::size_t vertices() const { return vertices_.points.size(); }
+  std::size_t vertices() const { return vertices_.points.size(); }  // those that tell the surface
+  std::size_t corners() const { return corners_; }                  // all, those on the border too
   double area() const { return area_; }
-  std::size_t corners() const { return corners_; }  // vertices, those on the border too
-  // Of those vertices.
+  // Of the vertices that types are tried on.
   double weight() const { return std::accumulate(few_vertices_.weights.begin(), few_vertices_.weights.end(), 0.0); }
+  bool passes_through_vertices(const Candidate& c) const { return c.vertices <= weight() * (kExact * kExact); }
   // Whether the triangles are all on one of its sides: it is no pair of sheets with the data between.
   static bool is_sound(const Candidate& c) { return c.side >= kOneSided; }
 
@@ -197,10 +206,10 @@ class RegionSurface {
 
   // Fitted to all vertices, if that is no worse.
   Primitive refined(const Candidate& candidate) const {
-    const bool special = free_parameters(candidate.primitive.type) < kQuadricParameters;
-    const auto fit = special ? refine_primitive(candidate.primitive, vertices_)
-                             : std::optional(refine_quadric(candidate.primitive, vertices_));
-    if (!fit || fit->primitive.type == SurfaceType::plane_pair) return candidate.primitive;
+    const bool general = std::holds_alternative<GeneralQuadric>(candidate.primitive);
+    const auto fit = general ? std::optional(refine_quadric(candidate.primitive, vertices_))
+                             : refine_primitive(candidate.primitive, vertices_);
+    if (!fit || type_of(fit->primitive) == SurfaceType::plane_pair) return candidate.primitive;
     const Candidate better = measured(fit->primitive);
     const bool exact = better.vertices <= weight() * kExact * kExact && better.tilt <= kMuchWorse * candidate.tilt;
     const bool kept = is_sound(better) && (exact || better.energy <= kHardlyWorse * candidate.energy);
@@ -215,63 +224,124 @@ class RegionSurface {
   SurfaceSamples vertices_, all_, few_vertices_, few_;
 };
 
-Primitive primitive_of(const SegmentDomain& domain, const Index* begin, const Index* end,
-                       const std::vector<std::uint8_t>& depths, const Proxy& proxy, SegmentSurfaces surfaces) {
-  const SurfaceMoments moments = sum_of_moments(domain, begin, end);
-  const PlaneFit flat = fit_plane(moments);
-  const RegionSurface region(domain, begin, end, depths);
-  if (region.vertices() < 3 || surfaces == SegmentSurfaces::planes) return make_plane(flat.normal, flat.offset);
-
-  std::vector<Candidate> candidates{region.measured(make_plane(flat.normal, flat.offset))};
+// All types fitted to the region, from the simplest on: the plane, the special types, then general quadrics.
+std::vector<Candidate> fit_candidates(const RegionSurface& region, const SurfaceMoments& moments, const Plane& plane,
+                                      const Proxy& proxy, SegmentSurfaces surfaces) {
+  std::vector<Candidate> candidates{region.measured(plane)};
   for (const SurfaceType type : kSpecialTypes) {
     if (type == SurfaceType::torus && surfaces != SegmentSurfaces::all) continue;
     const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
     if (candidate) candidates.push_back(*candidate);
   }
-  if (proxy.torus)
-    candidates.push_back(region.measured(make_torus(proxy.centre, proxy.axis, proxy.radius, proxy.minor_radius)));
+  if (const std::optional<Torus>& torus = proxy.torus)
+    candidates.push_back(region.measured(make_torus(torus->centre, torus->axis, torus->radius, torus->minor_radius)));
   // The proxy, or the quadric nearest to what it covers.
   const Quadric quadric = proxy.torus ? fit_proxy(moments, surfaces).proxy.quadric : proxy.quadric;
   const Primitive start = classify(quadric, moments.centroid(), std::sqrt(moments.area()), kExact);
   candidates.push_back(region.measured(start));
   const auto refined = region.best([&](const SurfaceSamples& samples) { return std::optional(refine_quadric(start, samples)); });
   if (refined) candidates.push_back(*refined);
+  return candidates;
+}
 
-  // What passes through all vertices and is no more tilted than others may be as far off between them as tessellation makes it.
-  const double exact = kExact * kExact, weight = region.weight();
-  const auto through_vertices = [&](const Candidate& c) { return c.vertices <= weight * exact; };
-  // The plane is left by the first of these, and something by the second.
+// Leaves out what is no surface of its own; the plane always stays. Surfaces with all triangles on one side are preferred.
+void remove_invalid(const SurfaceMoments& moments, std::vector<Candidate>& candidates) {
   std::erase_if(candidates, [&](const Candidate& c) {
-    const bool general = free_parameters(c.primitive.type) == kQuadricParameters;
-    return c.primitive.type == SurfaceType::plane_pair || (general && is_invalid(c.primitive.quadric, moments));
+    const auto* quadric = std::get_if<GeneralQuadric>(&c.primitive);
+    return quadric && (quadric->type == SurfaceType::plane_pair || is_invalid(quadric->polynomial, moments));
   });
   if (std::any_of(candidates.begin(), candidates.end(), RegionSurface::is_sound))
     std::erase_if(candidates, [](const Candidate& c) { return !RegionSurface::is_sound(c); });
+}
+
+// Leaves out what is much farther off than the best. What passes through all vertices and is no more tilted than others may be
+// as far off between them as tessellation makes it.
+void remove_distant(const RegionSurface& region, std::vector<Candidate>& candidates) {
   Candidate least{{}, kInfinity, kInfinity, kInfinity, 1};
   for (const Candidate& c : candidates) {
     least.energy = std::min(least.energy, c.energy);
-    if (through_vertices(c)) least.tilt = std::min(least.tilt, c.tilt);
+    if (region.passes_through_vertices(c)) least.tilt = std::min(least.tilt, c.tilt);
   }
+  const double slack = region.area() * (kExact * kExact);
   std::erase_if(candidates, [&](const Candidate& c) {
-    return c.energy > kMuchWorse * least.energy + region.area() * exact &&
-           !(through_vertices(c) && c.tilt <= kMuchWorse * least.tilt + region.area() * exact);
+    return c.energy > kMuchWorse * least.energy + slack &&
+           !(region.passes_through_vertices(c) && c.tilt <= kMuchWorse * least.tilt + slack);
   });
-  const auto exact_one = std::find_if(candidates.begin(), candidates.end(), through_vertices);
-  if (exact_one != candidates.end()) return region.refined(*exact_one);
-  // From the simplest on, a more general one has to pay for its parameters.
+}
+
+// The simplest that passes through all vertices; else, from the simplest on, a more general one has to pay for its parameters.
+const Candidate& simplest_adequate(const RegionSurface& region, const std::vector<Candidate>& candidates) {
+  const auto exact_one = std::find_if(candidates.begin(), candidates.end(),
+                                      [&](const Candidate& c) { return region.passes_through_vertices(c); });
+  if (exact_one != candidates.end()) return *exact_one;
   const Candidate* chosen = &candidates[0];
   for (const Candidate& c : candidates) {
-    const int more = free_parameters(c.primitive.type) - free_parameters(chosen->primitive.type);
+    const int more = free_parameters(c.primitive) - free_parameters(chosen->primitive);
     if (c.energy * simplicity_allowance(region.corners(), more) < chosen->energy) chosen = &c;
   }
-  return region.refined(*chosen);
+  return *chosen;
+}
+
+Primitive primitive_of(const SegmentDomain& domain, const Index* begin, const Index* end,
+                       const std::vector<std::uint8_t>& depths, const Proxy& proxy, SegmentSurfaces surfaces) {
+  const SurfaceMoments moments = sum_of_moments(domain, begin, end);
+  const PlaneFit flat = fit_plane(moments);
+  const Plane plane = make_plane(flat.normal, flat.offset);
+  const RegionSurface region(domain, begin, end, depths);
+  if (region.vertices() < 3 || surfaces == SegmentSurfaces::planes) return plane;
+  std::vector<Candidate> candidates = fit_candidates(region, moments, plane, proxy, surfaces);
+  remove_invalid(moments, candidates);
+  remove_distant(region, candidates);
+  return region.refined(simplest_adequate(region, candidates));
+}
+
+// Regions with their surfaces, while simpler ones are tried.
+struct Labelling {
+  std::vector<Index> labels;
+  std::vector<Proxy> proxies;
+  std::vector<double> distances;  // of each triangle to the proxy of its region
+};
+
+// The labelling with a region's surface exchanged and the borders moved to where they then belong.
+Labelling exchanged(const SegmentDomain& domain, const Labelling& now, Index region, const Primitive& primitive,
+                    const Index* begin, const Index* end, std::size_t& evaluations) {
+  Labelling next = now;
+  next.proxies[region] = Proxy::of(primitive);
+  for (const Index* t = begin; t != end; ++t) next.distances[*t] = distance_to(domain, *t, next.proxies[region]);
+  evaluations += static_cast<std::size_t>(end - begin);
+  relax_borders(domain, next.proxies, {begin, end}, next.labels, next.distances, evaluations);
+  return next;
+}
+
+// Exchanges a region's surface for the simplest type that costs little. False: it stays.
+bool simplify(const SegmentDomain& domain, SegmentSurfaces surfaces, Index r, const RegionSurface& region,
+              const Index* begin, const Index* end, Labelling& labelling, Primitive& primitive,
+              std::size_t& evaluations) {
+  double energy = 0;
+  for (const Index* t = begin; t != end; ++t) energy += labelling.distances[*t];
+  for (const SurfaceType type : kSpecialTypes) {
+    if (type == type_of(primitive)) break;
+    if (type == SurfaceType::torus && surfaces != SegmentSurfaces::all) continue;
+    const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
+    if (!candidate || !RegionSurface::is_sound(*candidate)) continue;
+    Labelling next = exchanged(domain, labelling, r, candidate->primitive, begin, end, evaluations);
+    double rise = 0;
+    for (std::size_t t = 0; t < next.distances.size(); ++t) rise += next.distances[t] - labelling.distances[t];
+    const int fewer = free_parameters(primitive) - free_parameters(type);
+    const double allowance = std::max(kHardlyWorse, simplicity_allowance(region.corners(), fewer));
+    if (rise > (allowance - 1) * energy + region.area() * kExact * kExact) continue;
+    primitive = candidate->primitive;
+    labelling = std::move(next);
+    return true;
+  }
+  return false;
 }
 
 }  // namespace
 
 std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::size_t count,
                                          const std::vector<Proxy>& proxies, SegmentSurfaces surfaces) {
-  const Csr<Index> triangles = region_triangles(labels, count);
+  const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
   std::vector<Primitive> primitives(count);
   parallel_each(count, [&](std::size_t r) {
@@ -283,48 +353,26 @@ std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std:
 void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, std::vector<Index>& labels,
                          std::vector<Primitive>& primitives, std::size_t& evaluations) {
   if (surfaces == SegmentSurfaces::planes) return;
-  std::vector<double> distances(labels.size());
-  std::vector<Proxy> proxies;
-  for (const Primitive& p : primitives) proxies.push_back(Proxy::of(p));
-  for (Index t = 0; t < labels.size(); ++t) distances[t] = distance_to(domain, t, proxies[labels[t]]);
-  evaluations += labels.size();
-  Csr<Index> triangles = region_triangles(labels, primitives.size());
-  std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
+  Labelling labelling{std::move(labels), {}, {}};
+  for (const Primitive& p : primitives) labelling.proxies.push_back(Proxy::of(p));
+  labelling.distances.resize(labelling.labels.size());
+  for (Index t = 0; t < labelling.labels.size(); ++t)
+    labelling.distances[t] = distance_to(domain, t, labelling.proxies[labelling.labels[t]]);
+  evaluations += labelling.labels.size();
+  Csr<Index> triangles = items_of_labels<Index>(labelling.labels, primitives.size());
+  std::vector<std::uint8_t> depths = vertex_depths(domain, labelling.labels);
   for (Index r = 0; r < primitives.size(); ++r) {
     const Index *begin = triangles.begin(r), *end = triangles.end(r);
     const RegionSurface region(domain, begin, end, depths);
-    double energy = 0;
-    for (const Index* t = begin; t != end; ++t) energy += distances[*t];
-    for (const SurfaceType type : kSpecialTypes) {
-      if (type == primitives[r].type) break;
-      if (type == SurfaceType::torus && surfaces != SegmentSurfaces::all) continue;
-      const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
-      if (!candidate || !RegionSurface::is_sound(*candidate)) continue;
-      std::vector<Proxy> tried = proxies;
-      tried[r] = Proxy::of(candidate->primitive);
-      std::vector<Index> moved = labels;
-      std::vector<double> changed = distances;
-      for (const Index* t = begin; t != end; ++t) changed[*t] = distance_to(domain, *t, tried[r]);
-      evaluations += static_cast<std::size_t>(end - begin);
-      relax_borders(domain, tried, {begin, end}, moved, changed, evaluations);
-      double rise = 0;
-      for (std::size_t t = 0; t < labels.size(); ++t) rise += changed[t] - distances[t];
-      const int fewer = free_parameters(primitives[r].type) - free_parameters(type);
-      const double allowance = std::max(kHardlyWorse, simplicity_allowance(region.corners(), fewer));
-      if (rise > (allowance - 1) * energy + region.area() * kExact * kExact) continue;
-      primitives[r] = candidate->primitive;
-      proxies = std::move(tried);
-      labels = std::move(moved);
-      distances = std::move(changed);
-      triangles = region_triangles(labels, primitives.size());
-      depths = vertex_depths(domain, labels);
-      break;
-    }
+    if (!simplify(domain, surfaces, r, region, begin, end, labelling, primitives[r], evaluations)) continue;
+    triangles = items_of_labels<Index>(labelling.labels, primitives.size());
+    depths = vertex_depths(domain, labelling.labels);
   }
+  labels = std::move(labelling.labels);
 }
 
 void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::vector<Primitive>& primitives) {
-  const Csr<Index> triangles = region_triangles(labels, primitives.size());
+  const Csr<Index> triangles = items_of_labels<Index>(labels, primitives.size());
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
   parallel_each(primitives.size(), [&](std::size_t r) {
     const RegionSurface region(domain, triangles.begin(r), triangles.end(r), depths);

@@ -3,10 +3,9 @@
 
 #include <vector>
 
+#include "bisector/segment.h"
 #include "core/geometry.h"
-#include "segment/primitive.h"
 #include "segment/proxy.h"
-#include "segment/segment.h"
 #include "segment/segment_domain.h"
 
 namespace bisector {

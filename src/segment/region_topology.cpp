@@ -4,6 +4,8 @@
 #include <numeric>
 #include <utility>
 
+#include "core/grouping.h"
+
 namespace bisector {
 
 namespace {
@@ -68,14 +70,7 @@ RegionTopology::RegionTopology(const DualGraph& graph, const std::vector<Triangl
   for (std::size_t e = 0; e < table_.edges.size(); ++e)
     for (const std::size_t* h = table_.half_edges.begin(e); h != table_.half_edges.end(e); ++h) edge_of_[*h] = e;
 
-  at_vertex_.offsets.assign(vertices + 1, 0);
-  for (const Triangle& triangle : triangles)
-    for (const Index v : triangle) ++at_vertex_.offsets[v + std::size_t{1}];
-  std::partial_sum(at_vertex_.offsets.begin(), at_vertex_.offsets.end(), at_vertex_.offsets.begin());
-  at_vertex_.values.resize(3 * triangles.size());
-  std::vector<std::size_t> slot(at_vertex_.offsets.begin(), at_vertex_.offsets.end() - 1);
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-    for (const Index v : triangles[t]) at_vertex_.values[slot[v]++] = static_cast<Index>(t);
+  at_vertex_ = items_at_vertices<Index>(triangles, vertices);
 }
 
 void RegionTopology::relabel(Index triangle, Index label) {

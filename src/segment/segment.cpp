@@ -1,21 +1,23 @@
-#include "segment/segment.h"
+#include "bisector/segment.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/stopwatch.h"
 #include "segment/flood.h"
 #include "segment/improve_partition.h"
 #include "segment/lloyd.h"
 #include "segment/merge_regions.h"
+#include "segment/primitive.h"
 #include "segment/region_primitives.h"
 #include "segment/segment_domain.h"
 #include "segment/smooth_borders.h"
@@ -23,21 +25,22 @@
 namespace bisector {
 namespace {
 
-constexpr double kFarFoot = 2;  // times the largest distance in a region
+// Start by merging: so many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to all pairs.
+constexpr std::size_t kFewestPieces = 200, kMostPieces = 1000;
+constexpr std::size_t kPiecesPerProxy = 10, kTrianglesPerPiece = 40;
+constexpr int kPlanarSteps = 4;              // of Lloyd's iteration, for the pieces
+constexpr std::size_t kSpareShare = 5;       // one region in so many is added: which can be spared shows after Lloyd's iteration
 
-class Clock {
- public:
-  // Seconds since the last call.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    return seconds;
-  }
+// Smoothing: the weight is halved while the root mean square distance grows by more than this ratio.
+constexpr double kMostGrowth = 1.05;
+constexpr int kHalvings = 6;
+constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
+// Types and smooth borders cost some of the error; where they take more than was left, a smaller error is aimed at.
+constexpr int kAttempts = 4;
+constexpr double kAim = 0.97;  // of the error that would just do if all grew in proportion
+
+constexpr double kFarFoot = 2;  // a vertex is not projected farther than so many times the largest distance in its region
 
 void check_options(const SegmentOptions& options) {
   if (options.proxies == 0 && !(options.error > 0 && std::isfinite(options.error)))
@@ -73,18 +76,16 @@ Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double a
   const std::size_t n = domain.triangles.size();
   if (options.surfaces == SegmentSurfaces::planes && options.proxies > 0)
     return fit_all(lloyd, merge_into_planes(domain, options.proxies, lloyd.context()));
-  // So many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to all pairs.
-  constexpr std::size_t kFewest = 200, kMost = 1000;
-  const std::size_t enough = std::max(10 * options.proxies, std::clamp(n / 40, kFewest, kMost));
+  const std::size_t enough = std::max(kPiecesPerProxy * options.proxies,
+                                      std::clamp(n / kTrianglesPerPiece, kFewestPieces, kMostPieces));
   const std::size_t pieces = std::min(n, std::max(enough, domain.component_count));
   Lloyd planar(domain, SegmentSurfaces::planes, lloyd.context());
   Partition small = fit_all(planar, merge_into_planes(domain, pieces, lloyd.context()));
-  constexpr int kPlanarSteps = 4;
   planar.iterate(small, std::min(kPlanarSteps, options.iterations));
   lloyd.counts.evaluations += planar.counts.evaluations;
   lloyd.counts.iterations += planar.counts.iterations;
-  // Some more than wanted: which of them can be spared shows better after Lloyd's iteration.
-  const std::size_t count = options.proxies > 0 ? std::min(options.proxies + options.proxies / 5 + 1, pieces) : 0;
+  const std::size_t spare = options.proxies / kSpareShare + 1;
+  const std::size_t count = options.proxies > 0 ? std::min(options.proxies + spare, pieces) : 0;
   const RegionMerging merging{count, allowed, options.surfaces};
   return fit_all(lloyd, merge_regions(domain, std::move(small.labels), merging, lloyd.context()));
 }
@@ -92,7 +93,7 @@ Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double a
 // Around random triangles, at least one of each component, the others all over the mesh.
 Partition start_at_random(Lloyd& lloyd, std::size_t count, std::uint64_t random_seed) {
   const SegmentDomain& domain = lloyd.domain();
-  const Csr<Index> parts = region_triangles(domain.components, domain.component_count);
+  const Csr<Index> parts = items_of_labels<Index>(domain.components, domain.component_count);
   std::vector<FloodSeed> seeds;
   std::vector<Proxy> proxies;
   std::vector<char> taken(domain.triangles.size(), 0);
@@ -101,7 +102,7 @@ Partition start_at_random(Lloyd& lloyd, std::size_t count, std::uint64_t random_
     const Index t = from[static_cast<std::size_t>(random.uniform() * static_cast<double>(n))];
     if (std::exchange(taken[t], 1)) return;
     seeds.push_back({t, static_cast<Index>(seeds.size())});
-    proxies.push_back(Proxy::of(Quadric::plane(domain.normals[t], dot(domain.normals[t], domain.barycentres[t]))));
+    proxies.push_back(Proxy::of(plane_quadric(domain.normals[t], dot(domain.normals[t], domain.barycentres[t]))));
   };
   for (std::size_t c = 0; c < domain.component_count; ++c) draw(parts.begin(c), parts.size(c));
   while (seeds.size() < count) draw(parts.values.data(), parts.values.size());
@@ -126,7 +127,7 @@ Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptio
   const double most_rms = wanted > 0 ? 0 : allowed_rms(lloyd.domain(), options.error);
   const double allowed = most_rms * most_rms * lloyd.domain().area;
   const auto enough = [&](const Partition& p) { return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed; };
-  Clock clock;
+  Stopwatch clock;
   report(context, "start", 0);
   const bool merging = options.start == SegmentStart::merging;
   const std::size_t at_random = options.start == SegmentStart::random ? wanted : 1;
@@ -139,6 +140,7 @@ Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptio
   while (!enough(partition)) {
     report(context, "inserting regions", 0.3, partition.energy());
     if (!(merging ? editor.divide_best(partition) : editor.insert_farthest(partition))) break;
+    // What was inserted first may be redundant by now; its region is of more use where the error is largest.
     if (!merging && enough(partition) && editor.merge_redundant(partition)) editor.insert_farthest(partition);
   }
   seconds.lloyd = clock.lap();
@@ -182,7 +184,7 @@ std::vector<Proxy> proxies_of(const std::vector<Primitive>& primitives) {
   return proxies;
 }
 
-// With the final primitives.
+// Moves triangles at borders to the region whose final surface is nearer.
 void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxies, std::vector<Index>& labels,
                     std::size_t& evaluations) {
   std::vector<Index> all(labels.size());
@@ -195,8 +197,6 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
 // Smooths the borders and fits the primitives anew. Returns the weight, 0 if every one raised the distance too far.
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
                      double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
-  constexpr double kMostGrowth = 1.05, kNegligible = 1e-9;
-  constexpr int kHalvings = 6;
   // Distances that differ by rounding only say nothing about where a border belongs.
   const auto distance = [&](Index t, Index r) {
     return distance_to(domain, t, proxies[r]) + kNegligible * kNegligible * domain.areas[t];
@@ -262,9 +262,10 @@ std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDoma
   return result;
 }
 
-SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& domain, const SegmentOptions& options,
-                             const Context& context) {
-  Clock clock;
+// With the error that the options ask for as an aim; the result's may be larger.
+SegmentResult segment_once(const TriangleMesh& mesh, const SegmentDomain& domain, const SegmentOptions& options,
+                           const Context& context) {
+  Stopwatch clock;
   SegmentResult result;
   Lloyd lloyd(domain, options.surfaces, context);
   PartitionEditor editor(lloyd, options.iterations);
@@ -293,7 +294,7 @@ SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& doma
   result.seconds.smooth = clock.lap();
   result.rms = domain.scale * std::sqrt(mean_square(domain, labels, proxies_of(primitives)));
 
-  const Csr<Index> triangles = region_triangles(labels, count);
+  const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   for (std::size_t r = 0; r < count; ++r)
     result.regions.push_back(measure_region(domain, primitives[r], triangles.begin(r), triangles.end(r)));
   if (options.project) result.projected = projected_vertices(mesh, domain, labels, primitives, result.regions);
@@ -312,24 +313,22 @@ SegmentResult segment_domain(const TriangleMesh& mesh, const SegmentDomain& doma
 }  // namespace
 
 SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
-  Clock clock;
+  Stopwatch clock;
   check_options(options);
   const SegmentDomain domain = make_segment_domain(mesh);
   check_count(domain, options.proxies);
-  // Types and smooth borders cost some of the error; where they take more than was left, less is aimed at.
-  constexpr int kAttempts = 4;
   const double most = domain.scale * allowed_rms(domain, options.error);
   SegmentOptions aimed = options;
   SegmentResult result;
   for (int k = 0; k < kAttempts; ++k) {
-    result = segment_domain(mesh, domain, aimed, context);
+    result = segment_once(mesh, domain, aimed, context);
     if (options.proxies > 0 || result.rms <= most) break;
-    aimed.error *= 0.97 * most / result.rms;
+    aimed.error *= kAim * most / result.rms;
   }
   if (options.proxies == 0 && result.rms > most)
     context.warn(fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
                              "a number of proxies", result.rms, most));
-  result.seconds.total = clock.lap();
+  result.seconds.total = clock.seconds();
   return result;
 }
 

@@ -51,15 +51,4 @@ SegmentDomain make_segment_domain(const TriangleMesh& mesh) {
   return domain;
 }
 
-Csr<Index> region_triangles(const std::vector<Index>& labels, std::size_t count) {
-  Csr<Index> rows;
-  rows.offsets.assign(count + 1, 0);
-  for (const Index l : labels) ++rows.offsets[l + 1];
-  for (std::size_t r = 0; r < count; ++r) rows.offsets[r + 1] += rows.offsets[r];
-  rows.values.resize(labels.size());
-  std::vector<std::size_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
-  for (std::size_t t = 0; t < labels.size(); ++t) rows.values[next[labels[t]]++] = static_cast<Index>(t);
-  return rows;
-}
-
 }  // namespace bisector

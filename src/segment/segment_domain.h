@@ -38,7 +38,4 @@ struct SegmentDomain {
 // Throws Error for a mesh without area.
 SegmentDomain make_segment_domain(const TriangleMesh& mesh);
 
-// The triangles of each of `count` regions, ascending.
-Csr<Index> region_triangles(const std::vector<Index>& labels, std::size_t count);
-
 }  // namespace bisector

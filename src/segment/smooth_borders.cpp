@@ -17,7 +17,7 @@ namespace {
 
 // Energies are fixed-point numbers: sums and flows are exact, and no residue of rounding keeps a path open.
 using Cost = std::int64_t;
-constexpr double kUnit = 0x1p40;
+constexpr double kUnit = 0x1p40;  // of Cost, to an energy of 1
 
 // The triangles that may change sides, and the energy of a labelling x of them with 0 and 1.
 struct Strip {

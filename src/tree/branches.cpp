@@ -9,8 +9,8 @@
 namespace bisector {
 namespace {
 
-constexpr double kSimilar = 0.85;  // of the longest path's length: direction and radius decide
-constexpr double kReach = 3;      // radii that directions at a fork look ahead and back
+constexpr double kSimilar = 0.85;  // of the longest path's length: among paths so long direction and radius decide
+constexpr double kReach = 3;       // length in radii, ahead and back, that tells directions at a fork
 
 class Forks {
  public:

@@ -15,8 +15,8 @@ namespace {
 // where spans have no points.
 constexpr std::array<double, 4> kSmoothing{1e-2, 1e-4, 1e-6, 1e-8};
 constexpr int kCorrections = 4;     // of the parameters, for each smoothing
-constexpr double kProgress = 0.95;  // of a correction in the largest excess, at least
-constexpr double kGrowth = 1.25;
+constexpr double kProgress = 0.95;  // ratio of the largest excess after a correction to that before, at most, to go on
+constexpr double kGrowth = 1.25;    // of the number of control points, from one try to the next
 
 // The knot interval of t that is not empty.
 std::size_t span_of(const std::vector<double>& knots, std::size_t degree, double t) {

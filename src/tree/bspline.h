@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "bisector/tree.h"
 #include "core/geometry.h"
 
 namespace bisector {
@@ -20,18 +21,6 @@ struct BasisFunctions {
 // the domain, [knots[degree], knots[size - degree - 1]]; at a knot the derivatives are those from the right, at the
 // domain's end from the left.
 BasisFunctions basis_functions(const std::vector<double>& knots, int degree, double t);
-
-// Clamped, parameter in [0, 1] (others are clamped to it). Degree 3, less where there are fewer than four control
-// points.
-struct BSplineCurve {
-  int degree = 3;
-  std::vector<double> knots;  // control points + degree + 1, ascending
-  std::vector<Vec3> control;
-
-  Vec3 point(double t) const;
-  Vec3 derivative(double t) const;
-  Vec3 second_derivative(double t) const;
-};
 
 // The same curve as a cubic, from one of degree 3 or of degree 1 or 2 without inner knots.
 BSplineCurve as_cubic(const BSplineCurve& curve);

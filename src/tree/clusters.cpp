@@ -12,13 +12,13 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kLeastPoints = 12;  // of a cluster after a split, about
-constexpr double kOutOfRound = 0.15;      // rms of a tight cluster in radii, where that is more than delta
-constexpr double kDamping = 0.1;          // of slopes, in the sum of variances
-constexpr double kConverged = 1e-3;       // relative change of the energy
-constexpr int kRounds = 12;               // of splitting
+constexpr std::size_t kLeastPoints = 12;  // in each half of a cluster that is split, about
+constexpr double kOutOfRound = 0.15;      // rms of a tight cluster in radii, where that is more than ClusterOptions::delta
+constexpr double kDamping = 0.1;          // of the regression that gives an axis, in the sum of the points' variances
+constexpr double kConverged = 1e-3;       // relative change of the energy that ends Lloyd's iteration
+constexpr int kRounds = 12;               // of splitting, at most
 
-double energy(const Vec3& p, const Cylinder& c) {
+double energy(const Vec3& p, const BranchCylinder& c) {
   const Vec3 d = p - c.centre;
   const double along = dot(d, c.axis);
   const double off = norm(d - along * c.axis) - c.radius;
@@ -69,7 +69,7 @@ class Clustering {
 
   void fix_tight() {
     for (std::size_t c = 0; c < members_.size(); ++c) {
-      const Cylinder& cylinder = result_.cylinders[c];
+      const BranchCylinder& cylinder = result_.cylinders[c];
       if (result_.fixed[c] || members_[c].empty()) continue;
       const bool large = options_.max_points > 0 && members_[c].size() > options_.max_points;
       result_.fixed[c] = !large && cylinder.rms <= std::max(options_.delta, kOutOfRound * cylinder.radius);

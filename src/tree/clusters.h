@@ -19,7 +19,7 @@ struct ClusterOptions {
 
 struct Clusters {
   std::vector<Index> label;  // of each point; kNone where `start` has none
-  std::vector<Cylinder> cylinders;
+  std::vector<BranchCylinder> cylinders;
   std::vector<char> fixed;   // of each cluster: tight
 };
 

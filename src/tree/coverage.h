@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "bisector/tree.h"
 #include "core/geometry.h"
-#include "tree/loft.h"
 
 namespace bisector {
 

@@ -81,8 +81,8 @@ Circle least_squares_circle(const std::vector<Vector2d>& points, const Circle& b
 
 }  // namespace
 
-Cylinder fit_cylinder(const std::vector<Vec3>& points, Vec3 axis) {
-  Cylinder cylinder;
+BranchCylinder fit_cylinder(const std::vector<Vec3>& points, Vec3 axis) {
+  BranchCylinder cylinder;
   if (points.empty()) return cylinder;
   const Vector3d centre = mean(points);
   Vector3d z(axis.x, axis.y, axis.z);

@@ -7,7 +7,7 @@
 
 namespace bisector {
 
-struct Cylinder {
+struct BranchCylinder {
   Vec3 centre;                // on the axis, in the middle of the points along it
   Vec3 axis;                  // of length 1
   double radius = 0;          // least squares; at most twice the bounding one
@@ -19,6 +19,6 @@ struct Cylinder {
 // The cylinder of points along `axis`, or along their principal direction where it is zero. The thesis takes the
 // bounding circle for the cylinder; noise makes it too large and points on one side only move it off the axis, so here
 // it only bounds the circle of least squares. Points that are all equal give a cylinder without extent.
-Cylinder fit_cylinder(const std::vector<Vec3>& points, Vec3 axis = {});
+BranchCylinder fit_cylinder(const std::vector<Vec3>& points, Vec3 axis = {});
 
 }  // namespace bisector

@@ -19,8 +19,6 @@ struct Place {
   Vec3 position, tangent;
 };
 
-Vec3 normalised(const Vec3& a) { return (1 / norm(a)) * a; }
-
 // The curve's points, about its first so that chords of short steps are exact far from the origin, and directions.
 class Path {
  public:
@@ -37,7 +35,7 @@ class Path {
   Vec3 tangent(double t) const {
     for (double nudge = 0; nudge<0.1; nudge = nudge> 0 ? 4 * nudge : 1e-9) {
       const Vec3 d = curve_.derivative(t >= nudge ? t - nudge : t + nudge);
-      if (norm(d) > 1e-9 * length_) return normalised(d);
+      if (norm(d) > 1e-9 * length_) return unit(d);
     }
     return {0, 0, 1};
   }
@@ -51,7 +49,7 @@ Vec3 first_normal(const Vec3& tangent) {
   const Vec3 size{std::abs(tangent.x), std::abs(tangent.y), std::abs(tangent.z)};
   Vec3 axis;
   axis[size.x <= size.y && size.x <= size.z ? 0 : size.y <= size.z ? 1 : 2] = 1;
-  return normalised(cross(axis, tangent));
+  return unit(cross(axis, tangent));
 }
 
 Vec3 reflected(const Vec3& a, const Vec3& mirror) {
@@ -70,7 +68,7 @@ Vec3 reflect_twice(const Place& a, const Vec3& normal, const Place& b) {
     carried = reflected(half, b.tangent - tangent);
   }
   carried -= dot(carried, b.tangent) * b.tangent;
-  return norm(carried) > 1e-6 ? normalised(carried) : first_normal(b.tangent);
+  return norm(carried) > 1e-6 ? unit(carried) : first_normal(b.tangent);
 }
 
 Vec3 carry(const Path& path, const Place& a, const Vec3& normal, const Place& b, int halvings) {

@@ -4,11 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "tree/loft.h"
+#include "bisector/tree.h"
 
 namespace bisector {
-
-enum class IgesUnit { millimetre, centimetre, metre, inch };  // of the coordinates
 
 // One B-spline surface (entity 128, not rational) for each branch, clamped around the axis too, with its name (property
 // 406, form 15). Numbers have as many of 17 digits as it takes to read back the same bits. The dates in the file are

@@ -11,8 +11,8 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kLeastPoints = 8;  // a thinner slice starts no section of its own
-constexpr double kSectionLength = 2;     // in radii
+constexpr std::size_t kLeastPoints = 8;  // of a slice that starts a section of its own
+constexpr double kSectionLength = 2;     // in radii: long enough to tell an axis, short enough for a bend
 
 // What hangs together with the lowest points not farther than `width` above them.
 std::vector<Index> root_points(const std::vector<Vec3>& points, const Csr<Index>& neighbours,

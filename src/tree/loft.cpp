@@ -10,24 +10,34 @@
 #include <numbers>
 
 #include "bisector/error.h"
+#include "tree/bspline.h"
 #include "tree/frames.h"
 
 namespace bisector {
 namespace {
 
-constexpr std::size_t kSides = 10;                         // of the control polygons (thesis 3.4.2)
-constexpr double kLeastRadius = 0.01;                      // of the branch's largest
-constexpr std::array<double, 4> kLooser{0, 0.25, 0.5, 1};  // tolerances of the axis as shares of the radius
-constexpr double kNarrowing = 1.2;       // of the radius that an axis may take before a looser one is tried
-constexpr double kBend = 0.9;            // radius over the axis' radius of curvature, at most
+constexpr std::size_t kSides = 10;         // of the control polygons (thesis 3.4.2)
+constexpr double kLeastRadius = 0.01;      // of the branch's largest
+constexpr double kQuarter = 0.5522847498;  // of a circle's quadrant as a cubic: (4/3) tan(pi / 8)
+
+// The axis: fitted the less closely, the more its bends narrow the branch.
+constexpr std::array<double, 4> kLooser{0, 0.25, 0.5, 1};  // tolerances added, as shares of the radius
+constexpr double kNarrowing = 1.2;  // ratio of the radius to what bends leave of it, at most, before a looser axis is tried
+constexpr double kBend = 0.9;       // radius over the axis' radius of curvature, at most
+
+// The wall's rows: as many as keep the error of its sections.
 constexpr double kSectionError = 0.006;  // of the radius, in each direction across the axis
 constexpr std::size_t kRefinements = 6;  // of the rows
-constexpr std::size_t kMostRows = 200;   // of the wall, before the last refinement
-constexpr double kShrinking = 0.8;       // of the radius where the wall folds over
-constexpr int kShrinkings = 12;
-constexpr int kChecks = 4;                 // in each knot interval
-constexpr int kChordHalvings = 8;          // of a knot interval
-constexpr double kQuarter = 0.5522847498;  // of a circle's quadrant as a cubic: (4/3) tan(pi / 8)
+constexpr std::size_t kMostRows = 200;   // before the last refinement
+constexpr int kChecks = 4;               // places looked at in each knot interval
+
+// The radius is lowered where the wall folds over.
+constexpr double kShrinking = 0.8;  // ratio of one step
+constexpr int kShrinkings = 12;     // steps
+
+// The mesh.
+constexpr int kChordHalvings = 8;                  // of a knot interval, at most
+constexpr int kFewestSides = 6, kMostSides = 48;  // of a ring
 
 struct SurfacePoint {
   Vec3 position, in_u, in_v;
@@ -313,9 +323,8 @@ void add_stations(const BranchSurface& s, double a, double b, double tolerance, 
     const double v = static_cast<double>(j) / kSides;
     const Vec3 from = s.point(a, v), to = s.point(b, v);
     for (const double x : {0.25, 0.5, 0.75}) {
-      const Vec3 off = s.point(a + x * (b - a), v) - from, chord = to - from;
-      const double length = norm2(chord), foot = length > 0 ? std::clamp(dot(off, chord) / length, 0.0, 1.0) : 0;
-      error = std::max(error, norm(off - foot * chord));
+      const Vec3 p = s.point(a + x * (b - a), v);
+      error = std::max(error, norm((p - from) - nearest_parameter(p, from, to) * (to - from)));
     }
   }
   if (error <= tolerance || halvings == 0) {
@@ -329,8 +338,9 @@ void add_stations(const BranchSurface& s, double a, double b, double tolerance, 
 
 int sides_for(const BranchSurface& s, double tolerance) {
   const double largest = *std::max_element(s.radii.begin(), s.radii.end());
-  if (tolerance >= largest) return 6;
-  return static_cast<int>(std::clamp(std::ceil(std::numbers::pi / std::acos(1 - tolerance / largest)), 6.0, 48.0));
+  if (tolerance >= largest) return kFewestSides;
+  return static_cast<int>(std::clamp(std::ceil(std::numbers::pi / std::acos(1 - tolerance / largest)), double{kFewestSides},
+                                     double{kMostSides}));
 }
 
 }  // namespace

@@ -4,26 +4,10 @@
 #include <cstddef>
 #include <vector>
 
+#include "bisector/tree.h"
 #include "core/geometry.h"
-#include "tree/bspline.h"
 
 namespace bisector {
-
-// A closed surface of circular sections across an axis. Cubic in u (clamped) along the branch: [-1, 0] is the flat disk
-// at the base, from its centre outwards, [0, 1] the wall over the axis' parameter, [1, 2] the rounded tip; in [-1, 0]
-// and [1, 2] the first and last row are one point. Cubic in v (periodic: the last 3 columns repeat the first 3) around
-// the axis from 0 to 1. The normal, the derivative in u times that in v, points outwards. Control point (i, j) is
-// control[i * columns + j].
-struct BranchSurface {
-  BSplineCurve axis;                             // cubic
-  std::vector<double> radius_parameters, radii;  // the radius is piecewise linear in the axis' parameter
-  std::size_t rows = 0, columns = 0;
-  std::vector<double> knots_u, knots_v;  // rows + 4, columns + 4
-  std::vector<Vec3> control;
-
-  Vec3 point(double u, double v) const;
-  double radius(double t) const;  // of the table, at an axis parameter
-};
 
 // The branch whose axis is fitted to `points` (fit_curve) and whose radius runs through `radii`, one for each point;
 // none is made less than a hundredth of the largest. Control points lie on regular polygons across the axis in

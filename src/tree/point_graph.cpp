@@ -9,8 +9,10 @@
 #include <numeric>
 
 #include "bisector/error.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "spatial/kd_tree.h"
+#include "tree/polyline.h"
 
 namespace bisector {
 namespace {
@@ -94,19 +96,14 @@ void check_points(const std::vector<Vec3>& points) {
 
 Csr<Index> make_symmetric(const std::vector<Index>& nearest, std::size_t k) {
   const std::size_t n = nearest.size() / k;
-  Csr<Index> rows;
-  rows.offsets.assign(n + 1, 0);
-  for (std::size_t i = 0; i < n; ++i) rows.offsets[i + 1] += k;
-  for (const Index j : nearest) ++rows.offsets[j + 1];
-  std::partial_sum(rows.offsets.begin(), rows.offsets.end(), rows.offsets.begin());
-  rows.values.resize(rows.offsets.back());
-  std::vector<std::size_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t s = 0; s < k; ++s) {
-      const Index j = nearest[i * k + s];
-      rows.values[next[i]++] = j;
-      rows.values[next[j]++] = static_cast<Index>(i);
-    }
+  Csr<Index> rows = group_into_rows<Index>(n, [&](const auto& put) {
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t s = 0; s < k; ++s) {
+        const Index j = nearest[i * k + s];
+        put(i, j);
+        put(j, static_cast<Index>(i));
+      }
+  });
   Csr<Index> unique;
   unique.offsets.reserve(n + 1);
   unique.values.reserve(rows.values.size());
@@ -139,12 +136,6 @@ void find_components(PointGraph& graph) {
         }
     }
   }
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 bool before(const Bridge& a, const Bridge& b) {
@@ -183,7 +174,7 @@ PointGraph build_point_graph(const std::vector<Vec3>& points, std::size_t k) {
   });
   PointGraph graph;
   graph.neighbours = make_symmetric(nearest, k);
-  graph.spacing = median(reach);
+  graph.spacing = upper_median(reach);
   find_components(graph);
   return graph;
 }

@@ -57,6 +57,13 @@ inline double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+// The median; of an even number of values the upper of the two in the middle. There has to be one at least.
+inline double upper_median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // `count` points (at least 2), evenly along the line.
 std::vector<Vec3> resample_polyline(const std::vector<Vec3>& line, std::size_t count);
 

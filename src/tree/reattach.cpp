@@ -11,21 +11,18 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kWindow = 5;      // nodes of the axis that a radius is the median of
-constexpr double kFar = 3;              // of a base from its parent's surface, in radii: another parent is looked for
-constexpr double kTurn = 3;             // how much longer a gap counts across the direction than along it, times 1
-constexpr double kBetter = 0.6;         // of the gap to the present parent
-constexpr double kThinner = 0.7;        // than its child a parent may be, in its radii
-constexpr double kTangent = 6;          // length in radii that tells a direction
-constexpr double kSwapScore = 0.5;      // by which a child goes on straighter and thicker than its parent
-constexpr double kSwapLength = 0.6;     // of what it replaces
+constexpr std::size_t kWindow = 5;  // nodes of the axis that a radius is the median of
+constexpr double kTangent = 6;      // length in radii that tells a direction
 
-double median(std::vector<double>::const_iterator begin, std::vector<double>::const_iterator end) {
-  std::vector<double> values(begin, end);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+// Another parent is looked for where a base is far from its parent's surface.
+constexpr double kFar = 3;      // distance in radii of the base
+constexpr double kTurn = 3;     // what a gap across the base's direction counts more than one along it, in its length
+constexpr double kBetter = 0.6;  // cost of the gap to another parent over that to the present one, at most
+constexpr double kThinner = 0.7;  // radius of a parent over its child's, at least
+
+// A child becomes the rest of its parent's branch where it goes on straighter and thicker.
+constexpr double kSwapScore = 0.5;   // by which its score is higher, at least
+constexpr double kSwapLength = 0.6;  // its length over that of what it replaces, at least
 
 class Reattachment {
  public:
@@ -84,7 +81,8 @@ class Reattachment {
   };
 
   static double base_radius(const Limb& limb) {
-    return median(limb.radii.begin(), limb.radii.begin() + static_cast<std::ptrdiff_t>(std::min(kWindow, limb.radii.size())));
+    const auto count = static_cast<std::ptrdiff_t>(std::min(kWindow, limb.radii.size()));
+    return upper_median({limb.radii.begin(), limb.radii.begin() + count});
   }
 
   // Of the base of a limb; its first node may lie on the axis of its parent.
@@ -213,7 +211,7 @@ class Reattachment {
     if (height < kSwapLength * length) return false;
     const auto window = [&](std::size_t begin, std::size_t end) {
       const auto at = [&](std::size_t i) { return branch.radii.begin() + static_cast<std::ptrdiff_t>(i); };
-      return median(at(begin), at(std::max(end, begin + 1)));
+      return upper_median({at(begin), at(std::max(end, begin + 1))});
     };
     const double before = window(k > kWindow ? k - kWindow : 0, k);
     const double after = window(k, std::min(k + kWindow, branch.radii.size()));

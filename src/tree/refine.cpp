@@ -13,20 +13,32 @@
 namespace bisector {
 namespace {
 
-constexpr double kSurface = 2.2;           // points so many standard deviations of the noise off a surface belong to it
-constexpr double kOutOfRound = 0.1;        // and so many radii
-constexpr std::size_t kLeastPoints = 6;    // of a branch
-constexpr std::size_t kFewPoints = 2;      // if they are far from the parent
+// Which points belong to a surface: those within so many standard deviations of the noise, and so many radii, of it.
+constexpr double kSurface = 2.2;
+constexpr double kOutOfRound = 0.1;
+
+// Which branches stand out of their parent. Noise is in standard deviations of points off surfaces.
+constexpr std::size_t kLeastPoints = 6;  // outside the parent
+constexpr std::size_t kFewPoints = 2;    // that are enough if they are this many times as far outside as needed:
 constexpr double kFarProtrusion = 3;
-constexpr double kThickestTwig = 1;         // radius of a twig that may be lost, in standard deviations of the noise
-constexpr double kBump = 0.3;               // radii of the parent that forks and bark stick out
-constexpr double kLeastProtrusion = 1;     // of a branch, in radii of its own beyond the surface of its parent
-constexpr double kLeastSupport = 2;         // points of a node of the axis that may be the base of a child
-constexpr double kTangent = 6;              // length in radii that tells a branch's direction at its base
-constexpr double kOwnNoise = 1.2;           // the noise in a branch's radius, in the deviation of its own points, at most
-constexpr double kTwinShare = 0.6;          // of a branch's points on another's surface: it is a part of that
-constexpr std::size_t kTwinSamples = 64;
-constexpr double kLeastRadius = 0.3;       // of the noisy surface's: what noise can feign at most
+constexpr double kLeastProtrusion = 1;   // in the branch's own radii, beyond the surface of its parent
+constexpr double kThickestTwig = 1;      // the same in noise, whichever is less: thinner twigs may be lost
+constexpr double kBump = 0.3;            // in radii of the parent: forks and bark stick out so far
+
+// Which branch is a part of another, not its parent: most of its points lie on that one's surface, and few far from it.
+constexpr double kTwinShare = 0.6;
+constexpr std::size_t kFarShare = 10;    // one of the points in so many may be far
+constexpr std::size_t kTwinSamples = 64;  // points looked at
+
+// Where a branch starts on its parent.
+constexpr double kLeastSupport = 2;  // points of the node of the axis that is taken for the base
+constexpr double kTangent = 6;       // length in radii that tells the direction at the base
+constexpr int kRootSteps = 24;       // places looked at straight on backwards
+constexpr double kRootReach = 3;     // up to so many times the base's distance from the parent's axis
+
+// Radii.
+constexpr double kOwnNoise = 1.2;     // noise taken out of a radius, in the deviation of the branch's own points, at most
+constexpr double kLeastRadius = 0.3;  // of the noisy surface's: noise feigns no more than the rest
 
 class Refinement {
  public:
@@ -100,7 +112,7 @@ class Refinement {
   }
 
   // Radii without the noise in them, falling from base to tip and from parent to child.
-  void settle_radii() {
+  void denoise_radii() {
     for (std::size_t b = 0; b < limbs_.size(); ++b) {
       Limb& limb = limbs_[b];
       const double noise = std::min(options_.noise, kOwnNoise * deviation_[b]);  // rough bark tells nothing of twigs
@@ -300,7 +312,7 @@ class Refinement {
         far += foot.distance > radius + skin;
       }
       const double share = samples > 0 ? static_cast<double>(inside) / static_cast<double>(samples) : 0;
-      if (share > most && 10 * far <= samples) {
+      if (share > most && kFarShare * far <= samples) {
         most = share;
         twin = static_cast<Index>(q);
       }
@@ -415,11 +427,10 @@ class Refinement {
     }
     const Vec3 back = -unit(sum);
     PolylineFoot best = nearest_on_polyline(parent.axis, start);
-    const double farthest = 3 * best.distance;
+    const double farthest = kRootReach * best.distance;
     double least = best.distance;
-    constexpr int kSteps = 24;
-    for (int k = 1; k <= kSteps; ++k) {
-      const PolylineFoot foot = nearest_on_polyline(parent.axis, start + (farthest * k / kSteps) * back);
+    for (int k = 1; k <= kRootSteps; ++k) {
+      const PolylineFoot foot = nearest_on_polyline(parent.axis, start + (farthest * k / kRootSteps) * back);
       if (foot.distance < least) {
         least = foot.distance;
         best = foot;
@@ -456,7 +467,7 @@ std::vector<Limb> refine_limbs(const std::vector<Vec3>& points, const Csr<Index>
   refinement.fit_all();
   refinement.sprout();
   refinement.root_all();
-  refinement.settle_radii();
+  refinement.denoise_radii();
   return refinement.take();
 }
 

@@ -13,11 +13,13 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kNearClusters = 16;  // that are looked at across gaps
-constexpr double kTurn = 1.5;              // how much longer a link across an axis is than one along it, times 1
-constexpr double kGap = 3;                 // how much longer a gap is than a way along points
+constexpr std::size_t kNearClusters = 16;  // nearest clusters that gaps are measured to
+// What makes links longer, so that paths go straight on: the length added for a link across an axis, and for a gap, as a
+// multiple of its own.
+constexpr double kTurn = 1.5;
+constexpr double kGap = 3;
 
-double length_of(const ClusterLink& link, const std::vector<Cylinder>& cylinders) {
+double length_of(const ClusterLink& link, const std::vector<BranchCylinder>& cylinders) {
   return norm(link.junction - cylinders[link.from].centre) + norm(link.junction - cylinders[link.to].centre);
 }
 
@@ -72,7 +74,7 @@ const ClusterLink& link_between(const std::vector<ClusterLink>& links, Index a, 
 }  // namespace
 
 std::vector<ClusterLink> link_clusters(const std::vector<Vec3>& points, const Csr<Index>& neighbours,
-                                       const std::vector<Index>& label, const std::vector<Cylinder>& cylinders) {
+                                       const std::vector<Index>& label, const std::vector<BranchCylinder>& cylinders) {
   struct BoundaryPoint {
     Index from, to, point;
     auto key() const { return std::tie(from, to, point); }
@@ -102,13 +104,13 @@ std::vector<ClusterLink> link_clusters(const std::vector<Vec3>& points, const Cs
 }
 
 void link_across_gaps(const std::vector<Vec3>& points, const std::vector<Index>& label,
-                      const std::vector<Index>& component, const std::vector<Cylinder>& cylinders,
+                      const std::vector<Index>& component, const std::vector<BranchCylinder>& cylinders,
                       std::vector<ClusterLink>& links) {
   std::vector<std::vector<Index>> members(cylinders.size());
   for (std::size_t i = 0; i < points.size(); ++i)
     if (label[i] != kNone) members[label[i]].push_back(static_cast<Index>(i));
   std::vector<Vec3> centres;
-  for (const Cylinder& c : cylinders) centres.push_back(c.centre);
+  for (const BranchCylinder& c : cylinders) centres.push_back(c.centre);
   const PointSet set{centres};
   const KdTree tree(3, set);
   const std::size_t count = std::min(kNearClusters + 1, centres.size());
@@ -144,14 +146,14 @@ void link_across_gaps(const std::vector<Vec3>& points, const std::vector<Index>&
               links.end());
 }
 
-void weigh_links(const std::vector<Cylinder>& cylinders, std::vector<ClusterLink>& links) {
+void weigh_links(const std::vector<BranchCylinder>& cylinders, std::vector<ClusterLink>& links) {
   for (ClusterLink& link : links) {
-    const Cylinder& a = cylinders[link.from];
-    const Cylinder& b = cylinders[link.to];
+    const BranchCylinder& a = cylinders[link.from];
+    const BranchCylinder& b = cylinders[link.to];
     const Vec3 way = b.centre - a.centre;
     const double length = norm(way);
     if (!(length > 0)) continue;
-    const auto turn = [&](const Cylinder& c) {
+    const auto turn = [&](const BranchCylinder& c) {
       const double slender = std::min(1.0, c.length / std::max(2 * c.radius, 1e-300));
       return slender * (1 - std::abs(dot(c.axis, way)) / length);
     };
@@ -159,7 +161,7 @@ void weigh_links(const std::vector<Cylinder>& cylinders, std::vector<ClusterLink
   }
 }
 
-std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, const std::vector<Cylinder>& cylinders,
+std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, const std::vector<BranchCylinder>& cylinders,
                                         const std::vector<Index>& roots) {
   const Paths paths = paths_from_roots(links, cylinders.size(), roots);
   std::vector<SkeletonNode> nodes;
@@ -172,7 +174,7 @@ std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, c
       const ClusterLink* nearest = nullptr;
       for (const ClusterLink& l : links)
         if ((l.from == c || l.to == c) && (!nearest || l.length < nearest->length)) nearest = &l;
-      const Cylinder& root = cylinders[c];
+      const BranchCylinder& root = cylinders[c];
       const Vec3 way = nearest ? root.centre - nearest->junction : (-0.5 * std::max(root.length, root.radius)) * root.axis;
       nodes.push_back({root.centre + way, root.radius, kNone, kNone});
       node_of[c] = static_cast<Index>(nodes.size());

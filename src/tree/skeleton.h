@@ -27,22 +27,22 @@ struct ClusterLink {
 // Pairs of clusters that neighbouring points belong to, ascending; their length is that from centre to centre through
 // the junction (thesis 3.3.2). `label` is of each point, kNone for none.
 std::vector<ClusterLink> link_clusters(const std::vector<Vec3>& points, const Csr<Index>& neighbours,
-                                       const std::vector<Index>& label, const std::vector<Cylinder>& cylinders);
+                                       const std::vector<Index>& label, const std::vector<BranchCylinder>& cylinders);
 
 // Adds links between clusters near each other that belong to different components of the scan: where an occlusion has
 // cut a branch, its ends need not be where the gap is shortest. `component` is of each point.
 void link_across_gaps(const std::vector<Vec3>& points, const std::vector<Index>& label,
-                      const std::vector<Index>& component, const std::vector<Cylinder>& cylinders,
+                      const std::vector<Index>& component, const std::vector<BranchCylinder>& cylinders,
                       std::vector<ClusterLink>& links);
 
 // Makes links longer that turn off from the clusters' axes, and that cross gaps: where branches touch or a scan has
 // gaps, paths go straight on.
-void weigh_links(const std::vector<Cylinder>& cylinders, std::vector<ClusterLink>& links);
+void weigh_links(const std::vector<BranchCylinder>& cylinders, std::vector<ClusterLink>& links);
 
 // The tree of shortest paths from the root clusters, every parent before its children: centres, junctions between them,
 // and beyond the centre of each leaf and root the mirror image of its junction. Without loops by construction. Clusters
 // that no link leads to a root are left out.
-std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, const std::vector<Cylinder>& cylinders,
+std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, const std::vector<BranchCylinder>& cylinders,
                                         const std::vector<Index>& roots);
 
 }  // namespace bisector

@@ -1,18 +1,19 @@
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 
 #include "bisector/error.h"
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "tree/branches.h"
 #include "tree/clusters.h"
 #include "tree/level_sections.h"
+#include "tree/loft.h"
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
 #include "tree/refine.h"
@@ -21,24 +22,17 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kLeastPoints = 20;     // of a tree
-constexpr double kSliceSpacings = 3;         // thickness of the slices that clusters start from
-constexpr double kLeastSlice = 0.006;        // but at least so much of the unit cube
-constexpr double kSlender = 4;               // clusters so many times thicker than their rms tell the noise
-constexpr double kAxisTolerance = 0.3;       // of fitted curves, in the branch's median radius
+constexpr std::size_t kLeastPoints = 20;  // that a tree is made from
+constexpr double kSliceSpacings = 3;      // thickness of the slices that clusters start from, in spacings of the points
+constexpr double kLeastSlice = 0.006;     // their least thickness, in the unit cube
+constexpr double kThicker = 1.3;          // ratio of the slices' thickness to the last, while there are too many clusters
+constexpr double kSlender = 4;            // radius of a cluster over its rms from which on the rms is taken for the noise
+constexpr double kAxisTolerance = 0.3;    // distance of fitted axes from the nodes, in the branch's median radius
+constexpr double kLeastTip = 0.3;         // of the base radius: what tolerances of a pointed branch's mesh go by, at least
 
-class Stopwatch {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - start_).count();
-    start_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
+// A plate of points at the bottom that is taken for ground: how low, how many of the points, how wide beside the tree.
+constexpr double kPlateHeight = 0.02, kPlateWidth = 0.5;
+constexpr std::size_t kPlateShare = 10;  // one point in so many
 
 // The points that the tree is made from, in the unit cube.
 struct Scan {
@@ -103,15 +97,15 @@ Scan prepare(const std::vector<Vec3>& input, const TreeOptions& options, TreeRes
   return scan;
 }
 
-// A plate of points at the bottom is taken for the ground, which this does not remove by itself.
+// Points of the ground would become a branch; they are left out only below a height that the caller gives.
 void warn_of_ground(const Scan& scan, const Context& context) {
   const Box box = bounding_box(scan.points);
   std::vector<Vec3> low;
   for (const Vec3& p : scan.points)
-    if (p.z < 0.02 * box.hi.z) low.push_back(p);
+    if (p.z < kPlateHeight * box.hi.z) low.push_back(p);
   const Box plate = bounding_box(low);
   const double wide = std::min(plate.hi.x - plate.lo.x, plate.hi.y - plate.lo.y);
-  if (10 * low.size() > scan.points.size() && wide > 0.5 * std::max(box.hi.x, box.hi.y))
+  if (kPlateShare * low.size() > scan.points.size() && wide > kPlateWidth * std::max(box.hi.x, box.hi.y))
     context.warn(fmt::format("the lowest 2 % of the height hold {} of {} points, as wide as the tree: if they are the "
                              "ground, give its height",
                              low.size(), scan.points.size()));
@@ -160,7 +154,7 @@ Clusters make_clusters(const Scan& scan, const Network& network, const TreeOptio
   double width = std::max(kSliceSpacings * network.graph.spacing, kLeastSlice);
   LevelSections sections = level_sections(scan.points, network.neighbours, network.lowest, width);
   while (options.clusters > 0 && sections.count > options.clusters && width < 1) {
-    width *= 1.3;
+    width *= kThicker;
     sections = level_sections(scan.points, network.neighbours, network.lowest, width);
   }
   ClusterOptions cluster_options;
@@ -171,14 +165,11 @@ Clusters make_clusters(const Scan& scan, const Network& network, const TreeOptio
 }
 
 // Standard deviation of points off cylinders that are much thicker than it.
-double measure_noise(const std::vector<Cylinder>& cylinders) {
+double measure_noise(const std::vector<BranchCylinder>& cylinders) {
   std::vector<double> rms;
-  for (const Cylinder& c : cylinders)
+  for (const BranchCylinder& c : cylinders)
     if (c.rms > 0 && c.radius > kSlender * c.rms) rms.push_back(c.rms);
-  if (rms.empty()) return 0;
-  const auto middle = rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2);
-  std::nth_element(rms.begin(), middle, rms.end());
-  return *middle;
+  return rms.empty() ? 0 : upper_median(std::move(rms));
 }
 
 std::vector<Limb> rough_limbs(const Scan& scan, const Network& network, const Clusters& clusters,
@@ -262,9 +253,8 @@ void describe_branches(const std::vector<Limb>& limbs, TreeResult& result) {
 
 void loft(const std::vector<Limb>& limbs, TreeResult& result) {
   parallel_each(limbs.size(), [&](std::size_t b) {
-    std::vector<double> radii = limbs[b].radii;
-    std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2), radii.end());
-    result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, kAxisTolerance * radii[radii.size() / 2]);
+    const double tolerance = kAxisTolerance * upper_median(limbs[b].radii);
+    result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, tolerance);
   }, 1);
 }
 
@@ -273,7 +263,7 @@ void loft(const std::vector<Limb>& limbs, TreeResult& result) {
 TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
   check_options(options);
   TreeResult result;
-  Stopwatch total, watch;
+  Stopwatch watch;
   const auto phase = [&](const char* name, double fraction) {
     context.check();
     context.report({.phase = name, .fraction = fraction});
@@ -318,7 +308,7 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
       result.branch[i] = branch_of[p];
     }
   result.seconds.surfaces = watch.lap();
-  result.seconds.total = total.lap();
+  result.seconds.total = watch.seconds();
   return result;
 }
 
@@ -327,7 +317,7 @@ TriangleMesh tree_mesh(const TreeResult& tree, double tolerance) {
   std::vector<TriangleMesh> parts(tree.branches.size());
   parallel_each(parts.size(), [&](std::size_t b) {
     const TreeBranch& branch = tree.branches[b];
-    parts[b] = branch_mesh(branch.surface, tolerance * std::max(branch.tip_radius, 0.3 * branch.base_radius));
+    parts[b] = branch_mesh(branch.surface, tolerance * std::max(branch.tip_radius, kLeastTip * branch.base_radius));
   }, 1);
   TriangleMesh mesh;
   for (std::size_t b = 0; b < parts.size(); ++b) {

@@ -1,4 +1,4 @@
-#include "tree/tree_io.h"
+#include "bisector/tree.h"
 
 #include <fmt/format.h>
 
@@ -14,6 +14,7 @@
 #include "io/bytes.h"
 #include "io/files.h"
 #include "io/mesh_formats.h"
+#include "tree/iges.h"
 
 namespace bisector {
 namespace {

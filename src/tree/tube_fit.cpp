@@ -12,24 +12,30 @@
 namespace bisector {
 namespace {
 
-constexpr int kCentringSteps = 2;         // to the middle of the points
-constexpr int kSteps = 6;                 // of Gauss-Newton
-constexpr double kStationPoints = 10;     // between points of the axis, about
-constexpr std::size_t kStray = 4;         // segments that a foot may move along the axis in a step
+// Stations: the points of the axis that are fitted.
+constexpr double kStationPoints = 10;         // points of the scan between two, about
+constexpr double kLongest = 1.5;              // distance of two in the branch's thickness, where points are few
 constexpr std::size_t kMostStations = 120;
-constexpr std::size_t kLeastPoints = 6;   // for a fit
-constexpr double kTukey = 4.7;            // residuals beyond so many standard deviations do not count
-constexpr double kLongest = 1.5;             // step of the axis in the branch's thickness, where points are few
-constexpr double kAxisStiffness = 2;    // of second differences, in points of a station
-constexpr double kRadiusStiffness = 1;
-constexpr double kLeastSupport = 1;         // points of a station, for smoothness
-constexpr double kRadiusSlope = 0.02;     // of first differences of the radius
-constexpr double kCentring = 0.2;          // pull to the middle of the points, times the 4th power of residuals in radii
+constexpr std::size_t kLeastPoints = 6;       // of the scan, for a fit
+
+// Steps.
+constexpr int kCentringSteps = 2;  // to the middle of the points
+constexpr int kSteps = 6;          // of Gauss and Newton
+constexpr std::size_t kStray = 4;  // segments that a foot may move along the axis in a step
+
+// Weights, relative to one point of the scan at a station.
+constexpr double kTukey = 4.7;          // residuals beyond so many standard deviations do not count
+constexpr double kAxisStiffness = 2;    // of the axis' second differences
+constexpr double kRadiusStiffness = 1;  // of the radius' second differences
+constexpr double kRadiusSlope = 0.02;   // of the radius' first differences
+constexpr double kLeastSupport = 1;     // points that a station counts as having, at least, for smoothness
+constexpr double kCentring = 0.2;       // pull to the middle of the points, times the 4th power of residuals in radii
 constexpr double kLeastCentring = 0.001, kMostCentring = 1;
+
 // The largest radius, in the spread of points about their middle: that of a third of a circle where the points are near
 // the surface, that of less than half of one where they are a cloud.
 constexpr double kLargestRing = 1.9, kLargestCloud = 1.15;
-constexpr double kRing = 0.2, kCloud = 0.35;  // rms distance from the surface, in the spread
+constexpr double kRing = 0.2, kCloud = 0.35;  // rms distance from the surface, in the spread, up to and from which they are so
 
 // Sums of squares of linear forms of few unknowns, as the normal equations of least squares.
 class NormalEquations {

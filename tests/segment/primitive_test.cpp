@@ -8,12 +8,15 @@
 
 #include "bisector/error.h"
 #include "segment/primitive_fit.h"
+#include "support/primitive_parameters.h"
 #include "support/quadrics.h"
 
 namespace bisector {
 namespace {
 
 using test::KnownSurface;
+using test::parameters_of;
+using test::PrimitiveParameters;
 using test::SplitMix64;
 
 constexpr double kPi = std::numbers::pi;
@@ -49,14 +52,28 @@ Primitive primitive_of(const KnownSurface& s) {
   }
 }
 
+// A plane, sphere, cylinder, cone or torus.
+Primitive primitive_of(SurfaceType type, const Vec3& centre, const Vec3& axis, double radius, double minor_radius,
+                       double angle) {
+  switch (type) {
+    case SurfaceType::plane: return make_plane(axis, dot(axis, centre));
+    case SurfaceType::sphere: return make_sphere(centre, radius);
+    case SurfaceType::cylinder: return make_cylinder(centre, axis, radius);
+    case SurfaceType::cone: return make_cone(centre, axis, angle);
+    default: return make_torus(centre, axis, radius, minor_radius);
+  }
+}
+
 bool has_apex(SurfaceType type) { return type == SurfaceType::elliptic_cone || type == SurfaceType::plane_pair; }
 
 // Up to rounding.
 bool is_on(const Primitive& primitive, const Vec3& p, double scale) {
-  if (primitive.type <= SurfaceType::torus) return distance(primitive, p) < 1e-12 * scale;
+  const auto* general = std::get_if<GeneralQuadric>(&primitive);
+  if (!general) return distance(primitive, p) < 1e-12 * scale;
   Quadric terms;
-  for (std::size_t k = 0; k < 10; ++k) terms.c[k] = std::abs(primitive.quadric.c[k]);
-  return std::abs(primitive.quadric.value(p)) <= 1e-14 * terms.value({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  for (std::size_t k = 0; k < 10; ++k) terms.c[k] = std::abs(general->polynomial.c[k]);
+  return std::abs(value_of(general->polynomial, p)) <=
+         1e-14 * value_of(terms, {std::abs(p.x), std::abs(p.y), std::abs(p.z)});
 }
 
 // Points anywhere, at the centre, on the axes, in planes of symmetry, at centres of curvature, and on the surface.
@@ -101,12 +118,14 @@ TEST_P(EveryType, DistanceIsZeroOnTheSurface) {
   for (int i = 0; i < 10; ++i) {
     const KnownSurface s = test::random_surface(GetParam(), random);
     const Primitive primitive = primitive_of(s);
-    EXPECT_EQ(primitive.type, s.type);
+    EXPECT_EQ(type_of(primitive), s.type);
     for (int j = 0; j < 20; ++j) {
       const Vec3 p = s.world(s.point(random.range(-1, 1), random.range(-1, 1), j % 2));
       EXPECT_LT(distance(primitive, p), has_apex(s.type) ? 1e-7 : 1e-12);
-      if (s.type != SurfaceType::torus) {
-        EXPECT_LT(approximate_distance(primitive.quadric, primitive.quadric.second_order(), p), 1e-7);
+      if (const auto quadric = quadric_of(primitive)) {
+        EXPECT_LT(approximate_distance(*quadric, second_order_of(*quadric), p), 1e-7);
+      } else {
+        EXPECT_EQ(s.type, SurfaceType::torus);
       }
       EXPECT_LT(norm(foot_point(primitive, p) - p), 1e-10);
     }
@@ -120,7 +139,7 @@ TEST_P(EveryType, LocalCoordinatesChangeNothing) {
     const Vec3 origin = random_point(random, 100);
     const double scale = random.range(0.01, 50);
     const Primitive world = from_local(local, origin, scale);
-    EXPECT_EQ(world.type, local.type);
+    EXPECT_EQ(type_of(world), type_of(local));
     for (int j = 0; j < 10; ++j) {
       const Vec3 p = random_point(random, 4);
       EXPECT_NEAR(distance(world, origin + scale * p), scale * distance(local, p), 1e-10 * (100 + scale));
@@ -170,7 +189,7 @@ TEST(Primitive, GradientsOfRoundQuadricsAreUnit) {
       const Primitive primitive = primitive_of(s);
       const Vec3 p = s.world(s.point(random.range(-1, 1), random.range(0.1, 1), 0));
       const double unit = type == SurfaceType::cone ? norm(p - s.centre) : 1;
-      EXPECT_NEAR(norm(primitive.quadric.gradient(p)), unit, 1e-12);
+      EXPECT_NEAR(norm(gradient_of(*quadric_of(primitive), p)), unit, 1e-12);
     }
 }
 
@@ -185,7 +204,8 @@ TEST(Classify, FindsTypeAndParameters) {
       Quadric quadric = s.quadric;
       const double factor = random.range(-5, 5);
       for (double& c : quadric.c) c *= factor;
-      const Primitive found = classify(quadric, s.centre + random_point(random, 0.3 * scale), 2.5 * scale, 1e-6 * scale);
+      const Primitive primitive = classify(quadric, s.centre + random_point(random, 0.3 * scale), 2.5 * scale, 1e-6 * scale);
+      const PrimitiveParameters found = parameters_of(primitive);
       ASSERT_EQ(name_of(found.type), name_of(type)) << i;
 
       const Vec3 to_centre = found.centre - s.centre;
@@ -224,7 +244,7 @@ TEST(Classify, FindsTypeAndParameters) {
           if (type == SurfaceType::elliptic_cylinder || type == SurfaceType::hyperbolic_cylinder) {
             EXPECT_LT(along, 1e-4 * scale);
           } else if (type == SurfaceType::plane_pair) {
-            EXPECT_LT(distance(found, s.centre), 1e-5 * scale + (s.lengths[1] > 0 ? 0 : s.lengths[0]));
+            EXPECT_LT(distance(primitive, s.centre), 1e-5 * scale + (s.lengths[1] > 0 ? 0 : s.lengths[0]));
           } else if (type == SurfaceType::parabolic_cylinder) {
             EXPECT_LT(norm(to_centre - dot(to_centre, s.axes[1]) * s.axes[1]), 1e-4 * scale);
           } else {
@@ -245,12 +265,12 @@ TEST(Classify, TakesPlanePairsByDistance) {
     const double gap = std::pow(10.0, random.range(-4, -2));
     const double lambda = -random.range(0.5, 1);
     const Quadric quadric = test::placed(axes, centre, {1, lambda, 0}, 0, -gap * gap);
-    EXPECT_EQ(classify(quadric, centre, 1, 1.1 * gap).type, SurfaceType::plane_pair);
-    EXPECT_EQ(classify(quadric, centre, 1, 0.1 * gap).type, SurfaceType::hyperbolic_cylinder);
+    EXPECT_EQ(type_of(classify(quadric, centre, 1, 1.1 * gap)), SurfaceType::plane_pair);
+    EXPECT_EQ(type_of(classify(quadric, centre, 1, 0.1 * gap)), SurfaceType::hyperbolic_cylinder);
     // Far along the asymptote one plane is enough.
     const double slope = std::sqrt(-1 / lambda);
     const Vec3 far = centre + 100.0 * axes[0] + (100 * slope) * axes[1];
-    EXPECT_EQ(classify(quadric, far, 1, gap).type, SurfaceType::plane);
+    EXPECT_EQ(type_of(classify(quadric, far, 1, gap)), SurfaceType::plane);
   }
 }
 
@@ -266,7 +286,7 @@ TEST(Classify, KeepsToTheTolerance) {
       for (int j = 0; j < 50; ++j) {
         const Vec3 p = foot_point(exact, s.centre + random_point(random, 1));
         if (norm(p - s.centre) > 1.5) continue;
-        EXPECT_LT(norm(foot_point(simple, p) - p), 0.04) << name_of(type) << ' ' << name_of(simple.type);
+        EXPECT_LT(norm(foot_point(simple, p) - p), 0.04) << name_of(type) << ' ' << name_of(type_of(simple));
       }
     }
 }
@@ -280,12 +300,12 @@ TEST(Classify, QuadricsWithoutPointsAreFinite) {
     const double c = i % 8 < 4 ? 1 : 1e-12;
     const Quadric quadric = test::placed(axes, centre, {rank > 0 ? 1.0 : 0.0, rank > 1 ? 0.5 : 0.0, rank > 2 ? 0.3 : 0.0}, 0, c);
     const Primitive found = classify(quadric, centre, 1, 1e-6);
-    for (double x : found.quadric.c) EXPECT_TRUE(std::isfinite(x));
-    for (const Vec3& v : {found.centre, found.axis, foot_point(found, random_point(random, 3))})
+    for (double x : quadric_of(found)->c) EXPECT_TRUE(std::isfinite(x));
+    for (const Vec3& v : {parameters_of(found).centre, parameters_of(found).axis, foot_point(found, random_point(random, 3))})
       EXPECT_TRUE(std::isfinite(norm2(v)));
     EXPECT_TRUE(std::isfinite(distance(found, {1, 2, 3})));
   }
-  EXPECT_EQ(classify({}, {1, 2, 3}, 1, 0.1).type, SurfaceType::plane);
+  EXPECT_EQ(type_of(classify({}, {1, 2, 3}, 1, 0.1)), SurfaceType::plane);
 }
 
 // ---- Fits.
@@ -320,7 +340,8 @@ double squared_distance(const Primitive& primitive, const SurfaceSamples& sample
   return sum;
 }
 
-void expect_close(const Primitive& found, const Primitive& known, double tolerance) {
+void expect_close(const Primitive& found_one, const Primitive& known_one, double tolerance) {
+  const PrimitiveParameters found = parameters_of(found_one), known = parameters_of(known_one);
   ASSERT_EQ(found.type, known.type);
   EXPECT_NEAR(found.radius, known.radius, tolerance);
   EXPECT_NEAR(found.minor_radius, known.minor_radius, tolerance);
@@ -361,8 +382,9 @@ TEST_P(Fit, IsAsNearAsTheTruthUnderNoise) {
       EXPECT_LE(fit->squared_distance, truth * (1 + 1e-9));
       EXPECT_NEAR(fit->squared_distance, squared_distance(fit->primitive, samples), 1e-9 * truth);
       if (arc > 2) {
-        EXPECT_NEAR(fit->primitive.radius, primitive_of(s).radius, 0.1);
-        EXPECT_NEAR(fit->primitive.minor_radius, primitive_of(s).minor_radius, 0.1);
+        const PrimitiveParameters found = parameters_of(fit->primitive), known = parameters_of(primitive_of(s));
+        EXPECT_NEAR(found.radius, known.radius, 0.1);
+        EXPECT_NEAR(found.minor_radius, known.minor_radius, 0.1);
       }
     }
 }
@@ -374,16 +396,13 @@ TEST_P(Fit, IsALocalMinimum) {
     const SurfaceSamples samples = samples_of(test::random_surface(GetParam(), random), random, 100, 3, 0.02, 0.1);
     const auto fit = fit_primitive(GetParam(), samples);
     ASSERT_TRUE(fit);
-    const Primitive& best = fit->primitive;
+    const PrimitiveParameters best = parameters_of(fit->primitive);
     for (int j = 0; j < 60; ++j) {
       const double step = std::pow(10.0, -2 - j % 3);
       const Vec3 centre = best.centre + random_point(random, step), axis = best.axis + random_point(random, step);
       const double a = step * random.range(-1, 1), b = step * random.range(-1, 1);
-      const Primitive other = GetParam() == SurfaceType::plane      ? make_plane(axis, dot(axis, centre))
-                              : GetParam() == SurfaceType::sphere   ? make_sphere(centre, best.radius + a)
-                              : GetParam() == SurfaceType::cylinder ? make_cylinder(centre, axis, best.radius + a)
-                              : GetParam() == SurfaceType::cone     ? make_cone(centre, axis, best.angle + a)
-                                                                    : make_torus(centre, axis, best.radius + a, best.minor_radius + b);
+      const Primitive other =
+          primitive_of(GetParam(), centre, axis, best.radius + a, best.minor_radius + b, best.angle + a);
       EXPECT_GE(squared_distance(other, samples), fit->squared_distance * (1 - 1e-6));
     }
   }
@@ -421,14 +440,15 @@ TEST_P(Fit, FollowsScaleAndPlace) {
   for (const double scale : {1e-6, 1e6}) {
     const KnownSurface s = test::random_surface(GetParam(), random);
     SurfaceSamples samples = samples_of(s, random, 100, 3, 0, 0);
-    const Primitive known = primitive_of(s);
+    const PrimitiveParameters known = parameters_of(primitive_of(s));
     const Vec3 origin{3e4, -2e4, 1e4};
     for (Vec3& p : samples.points) p = scale * (p + origin);
     const auto fit = fit_primitive(GetParam(), samples);
     ASSERT_TRUE(fit);
-    EXPECT_NEAR(fit->primitive.radius, scale * known.radius, 1e-8 * scale);
-    EXPECT_NEAR(fit->primitive.minor_radius, scale * known.minor_radius, 1e-8 * scale);
-    EXPECT_NEAR(fit->primitive.angle, known.angle, 1e-8);
+    const PrimitiveParameters found = parameters_of(fit->primitive);
+    EXPECT_NEAR(found.radius, scale * known.radius, 1e-8 * scale);
+    EXPECT_NEAR(found.minor_radius, scale * known.minor_radius, 1e-8 * scale);
+    EXPECT_NEAR(found.angle, known.angle, 1e-8);
     for (const Vec3& p : samples.points) EXPECT_LT(distance(fit->primitive, p), 1e-8 * scale);
   }
 }
@@ -439,11 +459,11 @@ TEST_P(Fit, RefinesAStart) {
     const KnownSurface s = test::random_surface(GetParam(), random);
     const SurfaceSamples samples = samples_of(s, random, 100, 3, 0, 0);
     const Primitive known = primitive_of(s);
-    Primitive start = known;
-    start.centre += random_point(random, 0.05);
-    start.axis += random_point(random, 0.05);
-    start.axis *= 1 / norm(start.axis);
-    start.radius *= random.range(0.95, 1.05);
+    PrimitiveParameters p = parameters_of(known);
+    p.centre += random_point(random, 0.05);
+    p.axis += random_point(random, 0.05);
+    p.radius *= random.range(0.95, 1.05);
+    const Primitive start = primitive_of(p.type, p.centre, p.axis, p.radius, p.minor_radius, p.angle);
     const auto fit = refine_primitive(start, samples);
     ASSERT_TRUE(fit);
     expect_close(fit->primitive, known, 1e-9);
@@ -503,7 +523,7 @@ TEST(Fits, OfConesPointTheirAxisAtTheData) {
     const SurfaceSamples samples = samples_of(s, random, 100, 6, 0, 0);
     const auto fit = fit_primitive(SurfaceType::cone, samples);
     ASSERT_TRUE(fit);
-    EXPECT_LT(norm(fit->primitive.axis - s.axes[2]), 1e-9);
+    EXPECT_LT(norm(std::get<Cone>(fit->primitive).axis - s.axes[2]), 1e-9);
   }
 }
 

@@ -60,8 +60,8 @@ struct Patch {
   }
   // Taubin's first-order approximation of the squared distance, integrated (thesis appendix of chapter 2).
   double taubin(const Quadric& q) const {
-    return area() * sum([&](const Vec3& p) { return q.value(p) * q.value(p); }) /
-           sum([&](const Vec3& p) { return norm2(q.gradient(p)); });
+    return area() * sum([&](const Vec3& p) { return value_of(q, p) * value_of(q, p); }) /
+           sum([&](const Vec3& p) { return norm2(gradient_of(q, p)); });
   }
 };
 
@@ -85,7 +85,7 @@ TEST(Quadric, GradientIsTheDerivative) {
     const Quadric q = random_quadric(random);
     const Vec3 p = random_point(random, 2), d = random_point(random, 1);
     // Central differences of second-degree polynomials are exact.
-    EXPECT_NEAR(dot(q.gradient(p), d), q.value(p + 0.5 * d) - q.value(p - 0.5 * d), 1e-13);
+    EXPECT_NEAR(dot(gradient_of(q, p), d), value_of(q, p + 0.5 * d) - value_of(q, p - 0.5 * d), 1e-13);
   }
 }
 
@@ -94,8 +94,8 @@ TEST(Quadric, SecondOrderBoundsTheCurvature) {
   for (int i = 0; i < 100; ++i) {
     const Quadric q = random_quadric(random);
     const Vec3 p = random_point(random, 2), d = random_point(random, 1);
-    const double bend = q.value(p + d) - q.value(p) - dot(q.gradient(p), d);
-    EXPECT_LE(std::abs(bend), q.second_order() * norm2(d) + 1e-13);
+    const double bend = value_of(q, p + d) - value_of(q, p) - dot(gradient_of(q, p), d);
+    EXPECT_LE(std::abs(bend), second_order_of(q) * norm2(d) + 1e-13);
   }
 }
 
@@ -105,9 +105,9 @@ TEST(Quadric, LocalCoordinatesAreASubstitution) {
     const Quadric q = random_quadric(random);
     const Vec3 origin = random_point(random, 5), x = random_point(random, 5);
     const double scale = random.range(0.1, 10);
-    const double value = q.value(x), size = 1e-12 * (1 + std::abs(value)) * 1e3;
-    EXPECT_NEAR(to_local(q, origin, scale).value((1 / scale) * (x - origin)), value, size);
-    EXPECT_NEAR(from_local(q, origin, scale).value(origin + scale * x), value, size);
+    const double value = value_of(q, x), size = 1e-12 * (1 + std::abs(value)) * 1e3;
+    EXPECT_NEAR(value_of(to_local(q, origin, scale), (1 / scale) * (x - origin)), value, size);
+    EXPECT_NEAR(value_of(from_local(q, origin, scale), origin + scale * x), value, size);
   }
 }
 
@@ -117,7 +117,7 @@ TEST_P(EveryQuadric, ApproximateDistanceIsAtMostTheExactOne) {
   SplitMix64 random(4);
   for (int i = 0; i < 10; ++i) {
     const test::KnownSurface s = test::random_surface(GetParam(), random);
-    const double second_order = s.quadric.second_order();
+    const double second_order = second_order_of(s.quadric);
     for (int j = 0; j < 20; ++j) {
       const Vec3 p = s.centre + random_point(random, 2);
       const double d = approximate_distance(s.quadric, second_order, p);
@@ -125,7 +125,7 @@ TEST_P(EveryQuadric, ApproximateDistanceIsAtMostTheExactOne) {
       EXPECT_LE(d, norm(test::nearest_by_search(s, p) - p) + 1e-12);
       // Of first order: near the surface the two agree.
       const Vec3 on = s.world(s.point(random.range(-1, 1), random.range(-1, 1), 0));
-      const Vec3 gradient = s.quadric.gradient(on);
+      const Vec3 gradient = gradient_of(s.quadric, on);
       if (norm(gradient) < 1e-2) continue;
       const Vec3 off = on + (1e-6 / norm(gradient)) * gradient;
       EXPECT_NEAR(approximate_distance(s.quadric, second_order, off), 1e-6, 1e-8);
@@ -259,7 +259,7 @@ TEST(QuadricFit, FindsThePlanesThatTrianglesLieOn) {
     const QuadricFit fit = fit_quadric(patch.moments({}));
     ASSERT_TRUE(fit.valid);
     EXPECT_LT(fit.squared_distance, 1e-12);
-    const double second_order = fit.quadric.second_order();
+    const double second_order = second_order_of(fit.quadric);
     for (int j = 0; j < 20; ++j) {
       const Vec3 p = s.world(s.point(random.range(-1, 1), random.range(-1, 1), j % 2));
       EXPECT_LT(approximate_distance(fit.quadric, second_order, p), 1e-6);
@@ -277,7 +277,7 @@ TEST(QuadricFit, TendsToTheSurface) {
       const QuadricFit fit = fit_quadric(patch_of(s, -0.5, 1, n).moments(s.centre));
       ASSERT_TRUE(fit.valid);
       const Quadric local = to_local(fit.quadric, s.centre, 1);
-      const double second_order = local.second_order();
+      const double second_order = second_order_of(local);
       double worst = 0;
       for (int j = 0; j < 50; ++j) {
         const Vec3 p = s.world(s.point(-0.5 + 1.5 * random.unit(), -0.5 + 1.5 * random.unit(), 0)) - s.centre;
@@ -302,7 +302,7 @@ TEST(QuadricFit, OfAPlaneIsThePlaneOrNone) {
     EXPECT_LT(fit.squared_distance, 1e-12);
     if (!fit.valid) continue;
     for (const auto& [a, b, c] : patch.triangles)
-      EXPECT_LT(approximate_distance(fit.quadric, fit.quadric.second_order(), (1.0 / 3) * (a + b + c)), 1e-6);
+      EXPECT_LT(approximate_distance(fit.quadric, second_order_of(fit.quadric), (1.0 / 3) * (a + b + c)), 1e-6);
   }
 }
 

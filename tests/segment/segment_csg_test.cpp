@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "segment/segment.h"
+#include "bisector/segment.h"
 #include "support/csg.h"
 
 namespace bisector::test {
@@ -33,7 +33,7 @@ TEST(SegmentCsg, FindsEverySurfaceOfAPart) {
     for (std::size_t k = 0; k < regions.size(); ++k) {
       ASSERT_LT(regions[k], result.regions.size());
       const Primitive& found = result.regions[regions[k]].proxy;
-      EXPECT_EQ(found.type, model.primitives[k].type) << "surface " << k << ": " << name_of(found.type);
+      EXPECT_EQ(type_of(found), type_of(model.primitives[k])) << "surface " << k << ": " << name_of(type_of(found));
       EXPECT_LT(parameter_difference(model.primitives[k], found, diagonal), 1e-3 * diagonal) << "surface " << k;
     }
   }
@@ -48,8 +48,8 @@ TEST(SegmentCsg, FindsEverySurfaceOfANoisyPart) {
     const std::vector<Index> regions = matching_regions(model, result.labels);
     for (std::size_t k = 0; k < regions.size(); ++k) {
       ASSERT_LT(regions[k], result.regions.size());
-      const SurfaceType type = result.regions[regions[k]].proxy.type;
-      EXPECT_EQ(type, model.primitives[k].type) << "surface " << k << ": " << name_of(type);
+      const SurfaceType type = type_of(result.regions[regions[k]].proxy);
+      EXPECT_EQ(type, type_of(model.primitives[k])) << "surface " << k << ": " << name_of(type);
     }
   }
 }

@@ -1,4 +1,4 @@
-#include "segment/segment.h"
+#include "bisector/segment.h"
 
 #include <gtest/gtest.h>
 
@@ -71,7 +71,7 @@ TEST(Segment, FindsTheTwoPlanesOfAFold) {
   const SegmentResult result = segment(mesh, options);
   expect_sound(mesh, result);
   for (const SegmentRegion& region : result.regions) {
-    EXPECT_EQ(region.proxy.type, SurfaceType::plane);
+    EXPECT_EQ(type_of(region.proxy), SurfaceType::plane);
     EXPECT_LT(region.max, 1e-12);
     EXPECT_NEAR(region.area, 0.5, 1e-12);
   }
@@ -82,7 +82,7 @@ TEST(Segment, TwoPlanesAreNoQuadric) {
   SegmentOptions options;
   options.proxies = 1;
   const SegmentResult one = segment(open_strip(), options);
-  EXPECT_NE(one.regions[0].proxy.type, SurfaceType::plane_pair);
+  EXPECT_NE(type_of(one.regions[0].proxy), SurfaceType::plane_pair);
   EXPECT_GT(one.rms, 0.005);
 }
 
@@ -116,8 +116,8 @@ TEST(Segment, EveryStartIsSoundAndItsEnergyFalls) {
       expect_sound(model.mesh, result);
       expect_falling(result);
       for (const SegmentRegion& region : result.regions) {
-        EXPECT_TRUE(surfaces != SegmentSurfaces::planes || region.proxy.type == SurfaceType::plane);
-        EXPECT_TRUE(surfaces != SegmentSurfaces::quadrics || region.proxy.type != SurfaceType::torus);
+        EXPECT_TRUE(surfaces != SegmentSurfaces::planes || type_of(region.proxy) == SurfaceType::plane);
+        EXPECT_TRUE(surfaces != SegmentSurfaces::quadrics || type_of(region.proxy) != SurfaceType::torus);
       }
     }
 }

@@ -17,6 +17,7 @@
 #include "core/geometry.h"
 #include "mesh/topology.h"
 #include "support/models.h"
+#include "support/primitive_parameters.h"
 
 namespace bisector::test {
 namespace {
@@ -57,9 +58,8 @@ struct Piece {
     return 2 * pi * std::abs(radius * (rc * (to - from) + radius * (std::sin(to) - std::sin(from))));
   }
   Primitive primitive(const Frame& frame) const {
-    if (is_arc())
-      return rc == 0 ? make_sphere(frame.at(0, 0, zc), radius)
-                     : make_torus(frame.at(0, 0, zc), frame.z, rc, radius);
+    if (is_arc() && rc == 0) return make_sphere(frame.at(0, 0, zc), radius);
+    if (is_arc()) return make_torus(frame.at(0, 0, zc), frame.z, rc, radius);
     if (z0 == z1) return make_plane(frame.z, dot(frame.z, frame.at(0, 0, z0)));
     if (r0 == r1) return make_cylinder(frame.origin, frame.z, r0);
     const double apex = z0 - r0 * (z1 - z0) / (r1 - r0);
@@ -275,7 +275,8 @@ void orient_outward(TriangleMesh& mesh) {
 }
 
 // Perpendicular to the surface, to either side.
-Vec3 normal_at(const Primitive& s, const Vec3& p) {
+Vec3 normal_at(const Primitive& primitive, const Vec3& p) {
+  const PrimitiveParameters s = parameters_of(primitive);
   const Vec3 d = p - s.centre, radial = d - dot(d, s.axis) * s.axis;
   switch (s.type) {
     case SurfaceType::sphere: return unit(d);
@@ -336,7 +337,8 @@ double share_right(const CsgModel& model, const std::vector<Index>& labels) {
   return static_cast<double>(right) / static_cast<double>(labels.size());
 }
 
-double parameter_difference(const Primitive& a, const Primitive& b, double unit_length) {
+double parameter_difference(const Primitive& first, const Primitive& second, double unit_length) {
+  const PrimitiveParameters a = parameters_of(first), b = parameters_of(second);
   if (a.type != b.type) return std::numeric_limits<double>::infinity();
   const double side = dot(a.axis, b.axis) < 0 ? -1 : 1;
   const double turn = unit_length * norm(cross(a.axis, b.axis));

@@ -11,6 +11,7 @@
 #include "core/geometry.h"
 #include "mesh/topology.h"
 #include "support/csg.h"
+#include "support/primitive_parameters.h"
 
 namespace bisector::test {
 namespace {
@@ -35,7 +36,8 @@ double area(const TriangleMesh& mesh, std::size_t t) {
 }
 
 // From the definitions.
-double offset(const Primitive& s, const Vec3& p) {
+double offset(const Primitive& primitive, const Vec3& p) {
+  const PrimitiveParameters s = parameters_of(primitive);
   const Vec3 d = p - s.centre;
   const double along = dot(d, s.axis), beside = norm(d - along * s.axis);
   switch (s.type) {
@@ -85,12 +87,12 @@ TEST(CsgModels, HaveTheSurfacesAndAreasTheySay) {
     const CsgModel model = generator.make(20000, 0, 3);
     ASSERT_EQ(model.areas.size(), model.primitives.size());
     std::map<SurfaceType, std::size_t> found;
-    for (const Primitive& p : model.primitives) ++found[p.type];
+    for (const Primitive& p : model.primitives) ++found[type_of(p)];
     for (const auto& [type, least] : generator.least) EXPECT_GE(found[type], least) << name_of(type);
     std::vector<double> areas(model.areas.size(), 0);
     for (std::size_t t = 0; t < model.labels.size(); ++t) areas[model.labels[t]] += area(model.mesh, t);
     for (std::size_t r = 0; r < areas.size(); ++r) {
-      const bool flat = model.primitives[r].type == SurfaceType::plane;
+      const bool flat = std::holds_alternative<Plane>(model.primitives[r]);
       EXPECT_NEAR(areas[r], model.areas[r], 0.02 * model.areas[r]) << "surface " << r;
       EXPECT_LT(areas[r], (flat ? 1.02 : 1.002) * model.areas[r]) << "surface " << r;
     }

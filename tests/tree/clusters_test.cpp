@@ -39,10 +39,10 @@ std::vector<Vec3> cylinder_points(const Vec3& base, const Vec3& axis, double rad
   return points;
 }
 
-TEST(Cylinder, IsFoundFromPartOfIt) {
+TEST(BranchCylinder, IsFoundFromPartOfIt) {
   const Vec3 axis{0.6, 0, 0.8}, base{1e5, -3e5, 20};
   for (const double share : {1.0, 0.6, 0.4}) {
-    const Cylinder c = fit_cylinder(cylinder_points(base, axis, 0.5, 4, 2000, 0, share), axis);
+    const BranchCylinder c = fit_cylinder(cylinder_points(base, axis, 0.5, 4, 2000, 0, share), axis);
     EXPECT_NEAR(c.radius, 0.5, 1e-3) << share;
     EXPECT_NEAR(c.length, 4, 0.02);
     EXPECT_LT(c.rms, 1e-3);
@@ -51,29 +51,29 @@ TEST(Cylinder, IsFoundFromPartOfIt) {
   }
 }
 
-TEST(Cylinder, AxisIsThePrincipalDirectionUnlessGiven) {
+TEST(BranchCylinder, AxisIsThePrincipalDirectionUnlessGiven) {
   const Vec3 axis{0, 0.6, 0.8};
-  const Cylinder c = fit_cylinder(cylinder_points({}, axis, 0.2, 5, 3000));
+  const BranchCylinder c = fit_cylinder(cylinder_points({}, axis, 0.2, 5, 3000));
   EXPECT_GT(std::abs(dot(c.axis, axis)), 0.9999);
 }
 
 // Noise makes the bounding circle too large, the circle of least squares hardly.
-TEST(Cylinder, NoiseDoesNotMakeItThicker) {
+TEST(BranchCylinder, NoiseDoesNotMakeItThicker) {
   const double noise = 0.05;
-  const Cylinder c = fit_cylinder(cylinder_points({}, {0, 0, 1}, 0.5, 3, 4000, noise), {0, 0, 1});
+  const BranchCylinder c = fit_cylinder(cylinder_points({}, {0, 0, 1}, 0.5, 3, 4000, noise), {0, 0, 1});
   EXPECT_NEAR(c.radius, 0.5, 0.01);
   EXPECT_NEAR(c.rms, noise, 0.1 * noise);
   EXPECT_GT(c.bounding_radius, 0.5 + 2 * noise);
 }
 
-TEST(Cylinder, DegeneratePointsHaveFiniteOnes) {
+TEST(BranchCylinder, DegeneratePointsHaveFiniteOnes) {
   const std::vector<std::vector<Vec3>> clouds{{{1, 2, 3}},
                                               std::vector<Vec3>(9, Vec3{1, 2, 3}),
                                               {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {5, 5, 5}},
                                               {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {3, 2, 0}}};
   for (const auto& cloud : clouds)
     for (const Vec3& axis : {Vec3{}, Vec3{0, 0, 1}, Vec3{1, 1, 1}}) {
-      const Cylinder c = fit_cylinder(cloud, axis);
+      const BranchCylinder c = fit_cylinder(cloud, axis);
       EXPECT_TRUE(std::isfinite(c.radius) && std::isfinite(c.rms) && std::isfinite(norm(c.centre)));
       EXPECT_LE(c.radius, 2 * c.bounding_radius + 1e-12);
       EXPECT_NEAR(norm(c.axis), 1, 1e-12);
@@ -202,7 +202,7 @@ TEST(Clusters, HangTogetherAndAreTightWhereFixed) {
 TEST(Clusters, GoAroundAThickBranch) {
   const Prepared p = prepare(cylinder_points({0.5, 0.5, 0}, {0, 0, 1}, 0.05, 1, 15000, 0.001));
   const Clusters clusters = cluster_points(p.points, p.graph.neighbours, p.sections.section, p.sections.distance, {});
-  for (const Cylinder& c : clusters.cylinders) {
+  for (const BranchCylinder& c : clusters.cylinders) {
     EXPECT_NEAR(c.radius, 0.05, 0.005);
     EXPECT_NEAR(std::hypot(c.centre.x - 0.5, c.centre.y - 0.5), 0, 0.01);
   }

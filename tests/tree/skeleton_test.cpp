@@ -13,14 +13,14 @@
 namespace bisector {
 namespace {
 
-Cylinder at(const Vec3& centre, double radius = 0.1, const Vec3& axis = {0, 0, 1}) { return {centre, axis, radius, radius, 1, 0}; }
+BranchCylinder at(const Vec3& centre, double radius = 0.1, const Vec3& axis = {0, 0, 1}) { return {centre, axis, radius, radius, 1, 0}; }
 
 // A chain of points, each its own neighbour's neighbour, two to a cluster.
 struct Chain {
   std::vector<Vec3> points;
   Csr<Index> neighbours;
   std::vector<Index> label;
-  std::vector<Cylinder> cylinders;
+  std::vector<BranchCylinder> cylinders;
 };
 
 Chain make_chain(std::size_t clusters) {
@@ -74,7 +74,7 @@ TEST(ClusterLinks, GapsAreMeasuredBetweenNearestPoints) {
 
 // A branch goes on along its axis, though another cluster is nearer.
 TEST(ClusterLinks, WeighTurnsAndGaps) {
-  const std::vector<Cylinder> cylinders{at({0, 0, 0}), at({0, 0, 1}), at({1, 0, 0})};
+  const std::vector<BranchCylinder> cylinders{at({0, 0, 0}), at({0, 0, 1}), at({1, 0, 0})};
   std::vector<ClusterLink> links{{0, 1, {0, 0, 0.5}, 0, 1}, {0, 2, {0.5, 0, 0}, 0, 1}};
   weigh_links(cylinders, links);
   EXPECT_DOUBLE_EQ(links[0].length, 1);
@@ -86,7 +86,7 @@ TEST(ClusterLinks, WeighTurnsAndGaps) {
 
 // Three clusters that meet are a loop of links, of which paths leave one out (thesis Figure 3.3).
 TEST(Skeleton, HasNoLoop) {
-  const std::vector<Cylinder> cylinders{at({0, 0, 0}), at({0, 0, 1}), at({1, 0, 1}), at({0, 0, 2}), at({2, 0, 2}), at({9, 9, 9})};
+  const std::vector<BranchCylinder> cylinders{at({0, 0, 0}), at({0, 0, 1}), at({1, 0, 1}), at({0, 0, 2}), at({2, 0, 2}), at({9, 9, 9})};
   const std::vector<ClusterLink> links{{0, 1, {0, 0, 0.5}, 0, 1},   {0, 2, {0.5, 0, 0.5}, 0, 1.5}, {1, 2, {0.5, 0, 1}, 0, 1},
                                        {1, 3, {0, 0, 1.5}, 0, 1}, {2, 4, {1.5, 0, 1.5}, 0, 1.5}};
   const std::vector<SkeletonNode> nodes = make_skeleton(links, cylinders, {0});

@@ -1,4 +1,4 @@
-#include "tree/tree.h"
+#include "bisector/tree.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -22,7 +22,6 @@
 #include "support/models.h"
 #include "support/tree_model.h"
 #include "tree/coverage.h"
-#include "tree/tree_io.h"
 
 namespace bisector {
 namespace {

@@ -1,0 +1,121 @@
+// Reconstruction of the branches of a leafless tree from a laser scan (Yan Dong-Ming, Variational Shape Segmentation and Mesh
+// Generation, 2010, chapter 3).
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "bisector/context.h"
+#include "bisector/export.h"
+#include "bisector/mesh.h"
+
+namespace bisector {
+
+enum class TreeComponents {
+  bridge,   // parts of the scan that are apart are joined over their gaps
+  separate  // each becomes a tree of its own
+};
+
+struct TreeOptions {
+  std::size_t clusters = 0;            // at most; 0: as many as it takes
+  double delta = 0.004;                // a cluster is a cylinder if its points lie so near one, rms, in the unit cube
+  std::size_t max_cluster_points = 0;  // larger clusters are split; 0: only those that are no cylinders
+  double ground = -std::numeric_limits<double>::infinity();  // points below this height (z) are left out
+  TreeComponents components = TreeComponents::bridge;
+};
+
+// Clamped, parameter in [0, 1] (others are clamped to it). Degree 3, less where there are fewer than four control points.
+struct BSplineCurve {
+  int degree = 3;
+  std::vector<double> knots;  // control points + degree + 1, ascending
+  std::vector<Vec3> control;
+
+  BISECTOR_API Vec3 point(double t) const;
+  BISECTOR_API Vec3 derivative(double t) const;
+  BISECTOR_API Vec3 second_derivative(double t) const;
+};
+
+// A closed surface of circular sections across an axis. Cubic in u (clamped) along the branch: [-1, 0] is the flat disk
+// at the base, from its centre outwards, [0, 1] the wall over the axis' parameter, [1, 2] the rounded tip; in [-1, 0]
+// and [1, 2] the first and last row are one point. Cubic in v (periodic: the last 3 columns repeat the first 3) around
+// the axis from 0 to 1. The normal, the derivative in u times that in v, points outwards. Control point (i, j) is
+// control[i * columns + j].
+struct BranchSurface {
+  BSplineCurve axis;                             // cubic
+  std::vector<double> radius_parameters, radii;  // the radius is piecewise linear in the axis' parameter
+  std::size_t rows = 0, columns = 0;
+  std::vector<double> knots_u, knots_v;  // rows + 4, columns + 4
+  std::vector<Vec3> control;
+
+  BISECTOR_API Vec3 point(double u, double v) const;
+  BISECTOR_API double radius(double t) const;  // of the table, at an axis parameter
+};
+
+// A point of the final skeleton, on the axis of a branch. Nodes come parents first.
+struct TreeNode {
+  Vec3 position;
+  double radius = 0;
+  Index parent = kNone;  // node; kNone: a root
+  Index branch = 0;
+};
+
+struct TreeBranch {
+  std::vector<Index> nodes;  // from the root on the parent's axis (or the ground) to the tip
+  Index parent = kNone;      // branch, of a lower number; kNone: a trunk
+  int order = 0;             // 0: trunk, 1: branches on it, ...
+  double length = 0;         // of the axis
+  double base_radius = 0, tip_radius = 0;  // where the branch leaves its parent's surface, and at its end
+  double volume = 0, area = 0;             // of what is outside the parent, as cone frusta along the axis
+  std::size_t points = 0;    // that belong to it
+  BranchSurface surface;
+};
+
+struct TreeSeconds {
+  double graph = 0, clusters = 0, skeleton = 0, refine = 0, surfaces = 0, total = 0;
+};
+
+struct TreeResult {
+  // Of each point; kNone: none. A duplicate has its twin's.
+  std::vector<Index> cluster, branch;
+  std::size_t clusters = 0, fixed_clusters = 0;  // in all; tight cylinders
+  std::vector<TreeNode> skeleton;
+  std::vector<TreeBranch> branches;    // parents before children
+  std::size_t components = 0;          // of the scan
+  std::vector<double> bridges;         // lengths of the shortest gaps between them, if they were bridged
+  std::size_t ground_points = 0;       // below the ground, left out
+  std::size_t duplicate_points = 0;    // at the place of another
+  std::size_t small_component_points = 0;  // in components too small for a tree of their own, left out
+  double noise = 0;                    // standard deviation of points off thick branches
+  TreeSeconds seconds;
+};
+
+// `points`: z is up; any unit and origin. The same result for any number of threads. Throws Error for coordinates that
+// are not finite, fewer than 20 distinct points (above the ground), points that all lie on one line, and options out of
+// range.
+BISECTOR_API TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options = {},
+                                         const Context& context = {});
+
+// The surfaces of all branches; a triangle's label is its branch. Each branch is closed; children reach into their
+// parents. `tolerance` is the largest chord error in radii of the branch.
+BISECTOR_API TriangleMesh tree_mesh(const TreeResult& tree, double tolerance = 0.05);
+
+enum class IgesUnit { millimetre, centimetre, metre, inch };  // of the coordinates
+
+// The surfaces as .obj (a group branch_K for each branch K), .ply (face property `label`), .off, .stl or, as B-spline
+// surfaces named branch_K, .igs and .iges, where `unit` is that of the coordinates. Throws Error.
+BISECTOR_API void write_tree(const std::string& path, const TreeResult& tree, const TriangleMesh& mesh,
+                             IgesUnit unit = IgesUnit::metre);
+
+// The skeleton as binary PLY: vertices with `radius`, `branch` and `order`, and the element `edge`. Throws Error.
+BISECTOR_API void write_skeleton(const std::string& path, const TreeResult& tree);
+
+// The points as binary PLY with `label`, their branch (-1: none), and its colour. Throws Error.
+BISECTOR_API void write_tree_labels(const std::string& path, const std::vector<Vec3>& points, const TreeResult& tree);
+
+// Points and surfaces side by side, seen from the side, as PNG; branches have the same colours in both. Throws Error.
+BISECTOR_API void write_tree_preview(const std::string& path, const std::vector<Vec3>& points, const TreeResult& tree,
+                                     const TriangleMesh& mesh);
+
+}  // namespace bisector
