@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "bisector/io.h"
-#include "core/parallel.h"
 #include "bisector/tree.h"
+#include "core/parallel.h"
 
 namespace {
 
