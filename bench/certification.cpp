@@ -87,28 +87,29 @@ void run_once(Options options) {
   options.device.precision = rung == "double" ? Precision::double_ : Precision::single;
   options.device.double_rung = rung != "single-only";
   const std::unique_ptr<Backend> backend = make_device_backend(surface, options.device, NeighbourSource::nearest);
-  CellMoments moments;
+  Diagram diagram;
+  const CellMoments& moments = diagram.moments;
   const Stopwatch cold_watch;
-  backend->evaluate(seeds, moments);
+  EvaluationReport report = backend->evaluate(seeds, Want::moments, diagram);
   const double cold = cold_watch.seconds();
   std::string warm = "-";
   if (seeds.size() < kMany) {
-    backend->evaluate({seeds.begin(), seeds.end() - 1}, moments);
+    backend->evaluate({seeds.begin(), seeds.end() - 1}, Want::moments, diagram);
     const Stopwatch watch;
-    backend->evaluate(seeds, moments);
+    report = backend->evaluate(seeds, Want::moments, diagram);
     warm = fmt::format("{:.2f}", watch.seconds());
   }
   // After all that counts for the memory: the CPU needs less.
-  CellMoments reference;
-  CpuBackend(surface, NeighbourSource::nearest).evaluate(seeds, reference);
-  const bool same = moments.triangles.offsets == reference.triangles.offsets &&
-                    moments.triangles.values == reference.triangles.values;
-  const Certification& c = moments.certification;
+  Diagram reference;
+  CpuBackend(surface, NeighbourSource::nearest).evaluate(seeds, Want::moments, reference);
+  const bool same = moments.triangles.offsets == reference.moments.triangles.offsets &&
+                    moments.triangles.values == reference.moments.triangles.values;
+  const Certification& c = report.certification;
   const double share = static_cast<double>(c.cpu) / static_cast<double>(c.pairs);
   const double missing = std::abs(moments.mass - surface.mass) / surface.mass;
   fmt::print("{},{},{},{},{},{},{},{},{},{:.5f} %,{},{:.1e},{:.2f},{}{}\n", std::filesystem::path(model).stem().string(),
              seeds.size(), pattern, rung, c.pairs, c.uncertain, c.wider, c.doubled, c.cpu, 100 * share,
-             same ? "yes" : "NO", missing, cold, warm, device_phases(moments.seconds.device));
+             same ? "yes" : "NO", missing, cold, warm, device_phases(report.seconds.device));
 }
 
 // The row of run_once() in a new process, and its peak resident memory. Must come before the first loop of this process.

@@ -123,7 +123,9 @@ void measure(const std::string& path, const Options& options, Table& table, std:
   for (const std::size_t count : options.seeds) {
     const std::vector<Vec3> sites = random_sites(solid, count);
     std::vector<double> total, neighbours, surface, clip, delaunay, ratio;
-    CellMoments moments;
+    Diagram diagram;
+    const CellMoments& moments = diagram.moments;
+    Certification certification;
     std::string on;
     for (std::size_t r = 0; r < options.repeat; ++r) {
       // Its own triangulation right before each: what slows one of the two slows the other.
@@ -131,14 +133,15 @@ void measure(const std::string& path, const Options& options, Table& table, std:
       const std::unique_ptr<SolidBackend> backend = backend_of(solid, options);
       on = backend->description().kind;
       // A device has its kernels compiled and its memory allocated by a diagram of other seeds.
-      if (on != "cpu" && count > 1) backend->evaluate({sites.begin(), sites.end() - 1}, moments);
+      if (on != "cpu" && count > 1) backend->evaluate({sites.begin(), sites.end() - 1}, Want::moments, diagram);
       const Stopwatch watch;
-      backend->evaluate(sites, moments);
+      const EvaluationReport report = backend->evaluate(sites, Want::moments, diagram);
       total.push_back(watch.seconds());
       ratio.push_back(total.back() / delaunay.back());
-      neighbours.push_back(moments.seconds.delaunay + moments.seconds.neighbours);
-      surface.push_back(moments.seconds.pairs);
-      clip.push_back(moments.seconds.clip);
+      certification = report.certification;
+      neighbours.push_back(report.seconds.delaunay + report.seconds.neighbours);
+      surface.push_back(report.seconds.pairs);
+      clip.push_back(report.seconds.clip);
       const double missing = std::abs(moments.mass - solid.mass);
       if (!(missing <= backend->mass_tolerance() * solid.mass))
         throw Error(fmt::format("{}, {} sites: the masses sum to {:.17g}, the volume is {:.17g}", path, count, moments.mass, solid.mass));
@@ -153,8 +156,8 @@ void measure(const std::string& path, const Options& options, Table& table, std:
                           std::to_string(count), std::to_string(boundary_sites), on, milliseconds(median(total)),
                           milliseconds(median(neighbours)), milliseconds(median(surface)), milliseconds(median(clip)),
                           milliseconds(median(delaunay)), fmt::format("{:.2f}", median(ratio)),
-                          std::to_string(moments.certification.pairs), std::to_string(moments.certification.uncertain),
-                          std::to_string(moments.certification.wider),
+                          std::to_string(certification.pairs), std::to_string(certification.uncertain),
+                          std::to_string(certification.wider),
                           fmt::format("{:.1e}", std::abs(moments.mass - solid.mass) / solid.mass)});
   }
 }

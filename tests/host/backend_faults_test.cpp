@@ -109,23 +109,17 @@ std::vector<Vec3> moved(std::vector<Vec3> seeds) {
   return seeds;
 }
 
-Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
-  Diagram d;
-  backend.evaluate(seeds, d.moments, d.polygons);
-  return d;
-}
-
 Diagram cpu_diagram(const Surface& surface, const std::vector<Vec3>& seeds) {
   return test::diagram_of(surface, seeds, NeighbourSource::nearest);
 }
 
 // Combinatorics that are the CPU's, and moments that are so to rounding, or to the bit in double precision.
-void expect_parity(const Surface& surface, const Diagram& reference, const Diagram& found, Precision precision) {
+void expect_parity(const Surface& surface, const Diagram& reference, const Evaluated& found, Precision precision) {
   const Parity parity = compare(reference.moments, reference.polygons, found.moments, found.polygons, surface);
   EXPECT_TRUE(parity.same_pairs && parity.same_labels && parity.same_dual);
   EXPECT_EQ(found.moments.triangles.offsets, reference.moments.triangles.offsets);
   EXPECT_EQ(found.moments.triangles.values, reference.moments.triangles.values);
-  EXPECT_EQ(found.moments.certification.pairs, reference.polygons.pairs.size());
+  EXPECT_EQ(found.report.certification.pairs, reference.polygons.pairs.size());
   const double cells = precision == Precision::double_ ? 1e-12 : 1e-5;
   EXPECT_LE(parity.mass_error, cells);
   EXPECT_LE(parity.centroid_error, cells);
@@ -153,8 +147,7 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 
 // What a run of a backend gives: cold, then warm with moved seeds, then with polygons.
 struct Results {
-  CellMoments cold, warm;
-  Diagram last;
+  Evaluated cold, warm, last;
   int evaluations = 0;  // that were done
 };
 
@@ -165,11 +158,11 @@ struct FaultProblem {
   Diagram reference_first = cpu_diagram(surface, first), reference_second = cpu_diagram(surface, second);
 
   void run(Backend& backend, Results& results) const {
-    backend.evaluate(first, results.cold);
+    results.cold.report = backend.evaluate(first, Want::moments, results.cold);
     ++results.evaluations;
-    backend.evaluate(second, results.warm);
+    results.warm.report = backend.evaluate(second, Want::moments, results.warm);
     ++results.evaluations;
-    backend.evaluate(first, results.last.moments, results.last.polygons);
+    results.last.report = backend.evaluate(first, Want::polygons, results.last);
     ++results.evaluations;
   }
 };
@@ -201,11 +194,11 @@ class EveryCall : public Faultless, public testing::WithParamInterface<Precision
     host::log_fallible_calls(&names);
     const auto backend = make(problem);
     std::vector<std::size_t> ends{names.size()};
-    backend->evaluate(problem.first, results.cold);
+    results.cold = evaluated(*backend, problem.first, Want::moments);
     ends.push_back(names.size());
-    backend->evaluate(problem.second, results.warm);
+    results.warm = evaluated(*backend, problem.second, Want::moments);
     ends.push_back(names.size());
-    backend->evaluate(problem.first, results.last.moments, results.last.polygons);
+    results.last = evaluated(*backend, problem.first, Want::polygons);
     ends.push_back(names.size());
     host::log_fallible_calls(nullptr);
     made_ = ends.front();
@@ -219,8 +212,8 @@ class EveryCall : public Faultless, public testing::WithParamInterface<Precision
 
   void expect_right(const FaultProblem& problem, const Results& results) const {
     expect_parity(problem.surface, problem.reference_first, results.last, GetParam());
-    EXPECT_TRUE(same_bits(results.cold, results.last.moments));
-    EXPECT_EQ(results.warm.triangles.values, problem.reference_second.moments.triangles.values);
+    EXPECT_TRUE(same_bits(results.cold.moments, results.last.moments));
+    EXPECT_EQ(results.warm.moments.triangles.values, problem.reference_second.moments.triangles.values);
   }
 
   std::size_t made_ = 0;            // calls until the backend is made
@@ -233,7 +226,7 @@ TEST_P(EveryCall, LeavesAsDeviceError) {
   Results right;
   const std::vector<Point> points = sites_of(problem, right);
   expect_right(problem, right);
-  const Certification& rungs = right.cold.certification;
+  const Certification& rungs = right.cold.report.certification;
   EXPECT_GT(rungs.wider, 0u);
   EXPECT_GT(rungs.cpu, 0u);
   if (GetParam() == Precision::single && has_double()) {
@@ -262,8 +255,8 @@ TEST_P(EveryCall, LeavesAsDeviceError) {
       ADD_FAILURE() << "not a DeviceError: " << error.what();
     }
     // What came before it is right, and there are no polygons.
-    EXPECT_TRUE(results.evaluations < 1 || same_bits(results.cold, right.cold));
-    EXPECT_TRUE(results.evaluations < 2 || same_bits(results.warm, right.warm));
+    EXPECT_TRUE(results.evaluations < 1 || same_bits(results.cold.moments, right.cold.moments));
+    EXPECT_TRUE(results.evaluations < 2 || same_bits(results.warm.moments, right.warm.moments));
     EXPECT_EQ(results.evaluations, std::ranges::upper_bound(ends_.begin() + 1, ends_.end(), point.call) - ends_.begin() - 1);
     EXPECT_TRUE(results.last.polygons.pairs.empty() && results.last.polygons.labels.empty());
   }
@@ -294,13 +287,13 @@ TEST_P(EveryCall, FallsBackOnce) {
       EXPECT_TRUE(same_bits(found, fell ? cpu_has : device_has));
     };
     Results results;
-    backend.evaluate(problem.first, results.cold);
-    expect_one(results.cold, right.cold, problem.reference_first.moments);
-    backend.evaluate(problem.second, results.warm);
-    expect_one(results.warm, right.warm, problem.reference_second.moments);
-    backend.evaluate(problem.first, results.last.moments, results.last.polygons);
+    results.cold = evaluated(backend, problem.first, Want::moments);
+    expect_one(results.cold.moments, right.cold.moments, problem.reference_first.moments);
+    results.warm = evaluated(backend, problem.second, Want::moments);
+    expect_one(results.warm.moments, right.warm.moments, problem.reference_second.moments);
+    results.last = evaluated(backend, problem.first, Want::polygons);
     expect_same_diagram(results.last, problem.reference_first);
-    EXPECT_EQ(results.last.moments.seconds.device.clip, 0);
+    EXPECT_EQ(results.last.report.seconds.device.clip, 0);
     EXPECT_EQ(backend.description().kind, "cpu");
     EXPECT_TRUE(has(backend.description().fallback, points[k].name)) << backend.description().fallback;
     ASSERT_EQ(warnings.size(), 1u);
@@ -371,14 +364,14 @@ TEST(WithoutDouble, IsSingleAndUncertainPairsReachTheCpu) {
   for (const Precision precision : {Precision::automatic, Precision::single}) {
     const auto backend = host::make_vulkan_backend(problem.surface, device_without_double(), with_precision(precision));
     EXPECT_EQ(backend->description().precision, "single");
-    const Diagram found = diagram_of(*backend, problem.first);
+    const Evaluated found = diagram_of(*backend, problem.first);
     expect_parity(problem.surface, problem.reference_first, found, Precision::single);
-    EXPECT_EQ(found.moments.certification.doubled, 0u);
-    EXPECT_GT(found.moments.certification.cpu, 0u);
+    EXPECT_EQ(found.report.certification.doubled, 0u);
+    EXPECT_GT(found.report.certification.cpu, 0u);
     if (!has_double()) continue;
     const auto better = device_backend(problem.surface, with_precision(Precision::single));
-    const Certification rungs = diagram_of(*better, problem.first).moments.certification;
-    EXPECT_LT(rungs.cpu, found.moments.certification.cpu);
+    const Certification rungs = diagram_of(*better, problem.first).report.certification;
+    EXPECT_LT(rungs.cpu, found.report.certification.cpu);
     VulkanOptions options = with_precision(Precision::single);
     options.double_rung = false;
     const auto off = device_backend(problem.surface, options);
@@ -397,7 +390,7 @@ TEST_P(Room, Grows) {
   std::vector<Vec3> seeds = random_seeds(mesh, 500, 33);
   for (const Vec3& x : hard_seeds(mesh, 1)) seeds.push_back(x);
   const Diagram reference = cpu_diagram(surface, seeds);
-  const Diagram roomy = diagram_of(*device_backend(surface, with_precision(GetParam())), seeds);
+  const Evaluated roomy = diagram_of(*device_backend(surface, with_precision(GetParam())), seeds);
   expect_parity(surface, reference, roomy, GetParam());
   const auto check = [&](const char* what, const host::Rooms& rooms) {
     SCOPED_TRACE(what);
@@ -406,10 +399,10 @@ TEST_P(Room, Grows) {
     const auto backend = device_backend(surface, options);
     for (const char* round : {"cold", "warm"}) {
       SCOPED_TRACE(round);
-      const Diagram found = diagram_of(*backend, seeds);
+      const Evaluated found = diagram_of(*backend, seeds);
       EXPECT_TRUE(same_bits(found.moments, roomy.moments));
       expect_parity(surface, reference, found, GetParam());
-      EXPECT_EQ(found.moments.certification.cpu, roomy.moments.certification.cpu);
+      EXPECT_EQ(found.report.certification.cpu, roomy.report.certification.cpu);
     }
   };
   const host::Rooms plenty;
@@ -450,8 +443,7 @@ TEST_P(Room, EndsAtWhatTheDeviceBinds) {
       VulkanOptions options = with_precision(GetParam());
       options.rooms = {10'000, 64, 64, 64};
       const auto backend = host::make_vulkan_backend(surface, std::move(device), options);
-      CellMoments moments;
-      backend->evaluate(seeds, moments);
+      evaluated(*backend, seeds, Want::moments);
     });
     EXPECT_TRUE(has(text, device_name()) && has(text, "--device cpu")) << text;
   }
@@ -474,9 +466,9 @@ TEST_P(Room, PolygonsWithManyCorners) {
     for (const NeighbourSource source : {NeighbourSource::nearest, NeighbourSource::delaunay}) {
       VulkanOptions options = with_precision(GetParam());
       options.neighbours = source;
-      const Diagram found = diagram_of(*device_backend(surface, options), seeds);
+      const Evaluated found = diagram_of(*device_backend(surface, options), seeds);
       expect_parity(surface, reference, found, GetParam());
-      const Certification& rungs = found.moments.certification;
+      const Certification& rungs = found.report.certification;
       EXPECT_TRUE(sides <= 16 || rungs.wider > 0 || rungs.cpu > 0);
       EXPECT_TRUE(sides <= 48 || rungs.cpu > 0);
     }
@@ -501,11 +493,11 @@ TEST_P(Room, CellsWithManyNeighbours) {
     SCOPED_TRACE(source == NeighbourSource::nearest ? "nearest" : "delaunay");
     VulkanOptions options = with_precision(GetParam());
     options.neighbours = source;
-    const Diagram found = diagram_of(*device_backend(surface, options), seeds);
+    const Evaluated found = diagram_of(*device_backend(surface, options), seeds);
     expect_parity(surface, reference, found, GetParam());
     // llvmpipe's loops end early, which must be noticed.
     if (device_name().starts_with("llvmpipe")) {
-      EXPECT_GT(found.moments.certification.cpu, 0u);
+      EXPECT_GT(found.report.certification.cpu, 0u);
     }
   }
 }

@@ -60,16 +60,8 @@ std::vector<Vec3> hard_seeds(const TetMesh& mesh) {
   return seeds;
 }
 
-struct Results {
-  CellMoments moments;
-  RestrictedPolygons polygons;
-  ClippedPolyhedra polyhedra;
-};
-
-Results evaluated(SolidBackend& backend, const std::vector<Vec3>& seeds) {
-  Results results;
-  backend.evaluate(seeds, results.moments, results.polygons, results.polyhedra);
-  return results;
+Evaluated evaluated(Backend& backend, const std::vector<Vec3>& seeds) {
+  return test::evaluated(backend, seeds, Want::polygons | Want::polyhedra);
 }
 
 void expect_same_polyhedra(const ClippedPolyhedra& a, const ClippedPolyhedra& b) {
@@ -96,14 +88,14 @@ TEST_P(SolidFaults, LeaveAsDeviceErrorOrFallBack) {
   SKIP_WITHOUT_DEVICE(processor_of(GetParam()));
   constexpr std::size_t kPoints = 4;
   CpuSolidBackend cpu(solid_, NeighbourSource::nearest);
-  const Results expected = evaluated(cpu, seeds_);
+  const Evaluated expected = evaluated(cpu, seeds_);
   host::inject_fault(Fault::none, 0);
   auto right = device_backend(solid_, with_precision(GetParam()));
   const std::size_t made = host::fallible_calls();
-  const Results results = evaluated(*right, seeds_);
+  const Evaluated results = evaluated(*right, seeds_);
   const std::size_t calls = host::fallible_calls();
   expect_same_polyhedra(results.polyhedra, expected.polyhedra);
-  EXPECT_GT(results.moments.certification.cpu, 0u);
+  EXPECT_GT(results.report.certification.cpu, 0u);
   ASSERT_GT(calls, made + kPoints);
   for (std::size_t k = 0; k < kPoints; ++k) {
     const std::size_t call = made + (calls - made) * k / kPoints;
@@ -122,7 +114,7 @@ TEST_P(SolidFaults, LeaveAsDeviceErrorOrFallBack) {
     FallbackSolidBackend backend(device_backend(solid_, with_precision(GetParam())), NeighbourSource::nearest, context);
     EXPECT_EQ(&backend.solid(), &solid_);
     host::inject_fault(fault, call - made);
-    const Results found = evaluated(backend, seeds_);
+    const Evaluated found = evaluated(backend, seeds_);
     expect_same_polyhedra(found.polyhedra, expected.polyhedra);
     EXPECT_TRUE(bisector::same_bits(found.moments, expected.moments));
     EXPECT_EQ(warnings.size(), 1u);
@@ -139,16 +131,16 @@ TEST_P(SolidFaults, RoomGrows) {
                                       {plenty.batch_pairs, plenty.table, plenty.proposals, 64}},
       all{{20, 16, 16, 16}};
   for (const InnerCells inner : {InnerCells::whole, InnerCells::clipped}) {
-    const Results roomy = evaluated(*device_backend(solid_, with_precision(GetParam()), inner), seeds_);
+    const Evaluated roomy = evaluated(*device_backend(solid_, with_precision(GetParam()), inner), seeds_);
     for (const host::Rooms& rooms : inner == InnerCells::whole ? each : all) {
       VulkanOptions options = with_precision(GetParam());
       options.rooms = rooms;
       const auto backend = device_backend(solid_, options, inner);
       for (int round = 0; round < 2; ++round) {
-        const Results found = evaluated(*backend, seeds_);
+        const Evaluated found = evaluated(*backend, seeds_);
         EXPECT_TRUE(bisector::same_bits(found.moments, roomy.moments));
-        EXPECT_EQ(found.moments.certification.pairs, roomy.moments.certification.pairs);
-        EXPECT_EQ(found.moments.certification.cpu, roomy.moments.certification.cpu);
+        EXPECT_EQ(found.report.certification.pairs, roomy.report.certification.pairs);
+        EXPECT_EQ(found.report.certification.cpu, roomy.report.certification.cpu);
         expect_same_polyhedra(found.polyhedra, roomy.polyhedra);
       }
     }
@@ -164,8 +156,7 @@ TEST_P(SolidFaults, RoomEndsAtWhatTheDeviceBinds) {
       host::limit_storage_range(*device, range);
       VulkanOptions options = with_precision(GetParam());
       options.rooms = {1000, 64, 64, 64};
-      CellMoments moments;
-      host::make_vulkan_solid_backend(solid_, std::move(device), options)->evaluate(seeds_, moments);
+      test::evaluated(*host::make_vulkan_solid_backend(solid_, std::move(device), options), seeds_, Want::moments);
     });
     EXPECT_TRUE(has(text, "--device cpu") && !has(text, "\n")) << text;
   }
@@ -186,14 +177,14 @@ TEST_P(SolidFaults, PolyhedraWithManyFacets) {
       seeds.push_back(centre + random.range(0.4, 0.4004) * Vec3{r * std::cos(angle), r * std::sin(angle), z});
     }
     CpuSolidBackend cpu(solid, NeighbourSource::nearest);
-    const Results expected = evaluated(cpu, seeds);
+    const Evaluated expected = evaluated(cpu, seeds);
     // The inner cell is whole, and last.
     EXPECT_EQ(expected.polyhedra.pairs.back().cell, 0u);
     EXPECT_EQ(expected.polyhedra.labels.size() - expected.polyhedra.label_offsets[expected.polyhedra.pairs.size() - 1],
               static_cast<std::size_t>(facets));
-    const Results found = evaluated(*device_backend(solid, with_precision(GetParam())), seeds);
+    const Evaluated found = evaluated(*device_backend(solid, with_precision(GetParam())), seeds);
     expect_same_polyhedra(found.polyhedra, expected.polyhedra);
-    EXPECT_EQ(found.moments.certification.cpu > 0, facets > 60);
+    EXPECT_EQ(found.report.certification.cpu > 0, facets > 60);
   }
 }
 
@@ -211,11 +202,11 @@ TEST(SolidWithoutDouble, IsSingleAndUncertainPairsReachTheCpu) {
   EXPECT_TRUE(has(text, "double precision") && has(text, "--precision single")) << text;
   const auto backend = host::make_vulkan_solid_backend(solid, poor(), {});
   EXPECT_EQ(backend->description().precision, "single");
-  const Results found = evaluated(*backend, seeds);
+  const Evaluated found = evaluated(*backend, seeds);
   CpuSolidBackend cpu(solid, NeighbourSource::nearest);
   expect_same_polyhedra(found.polyhedra, evaluated(cpu, seeds).polyhedra);
-  EXPECT_EQ(found.moments.certification.doubled, 0u);
-  EXPECT_GT(found.moments.certification.cpu, 0u);
+  EXPECT_EQ(found.report.certification.doubled, 0u);
+  EXPECT_GT(found.report.certification.cpu, 0u);
   EXPECT_NEAR(found.moments.mass, solid.mass, 1e-6 * solid.mass);
 }
 

@@ -237,7 +237,7 @@ void expect_parity(const Problem& problem, const Setup& setup) {
   std::vector<CellMoments> first_run;
   for (const SeedSet& set : problem.sets) {
     SCOPED_TRACE(set.name);
-    Diagram found = diagram_of(*backend, set.seeds);
+    Evaluated found = diagram_of(*backend, set.seeds);
     expect_parity(problem.surface, set.reference, found, setup.processor);
     if (&set == &problem.sets.front()) {
       SCOPED_TRACE("a fresh object and one thread");
@@ -250,9 +250,7 @@ void expect_parity(const Problem& problem, const Setup& setup) {
   // Once more in another order, so that what is kept from the last diagram is never the same.
   for (std::size_t k = problem.sets.size(); k-- > 0;) {
     SCOPED_TRACE(problem.sets[k].name + " again");
-    CellMoments again;
-    backend->evaluate(problem.sets[k].seeds, again);
-    expect_same_moments(again, first_run[k]);
+    expect_same_moments(evaluated(*backend, problem.sets[k].seeds, Want::moments).moments, first_run[k]);
   }
   EXPECT_EQ(backend->description().fallback, "");
 }
@@ -436,9 +434,9 @@ TEST_P(Certified, FewPairsReachTheCpu) {
   options.double_rung = false;
   const std::unique_ptr<Backend> backend =
       host::make_vulkan_backend(surface, host::Device::open(device_for(processor).value()), options);
-  const Diagram found = diagram_of(*backend, seeds);
+  const Evaluated found = diagram_of(*backend, seeds);
   expect_parity(surface, test::diagram_of(surface, seeds, NeighbourSource::nearest), found, processor);
-  const Certification& counts = found.moments.certification;
+  const Certification& counts = found.report.certification;
   EXPECT_EQ(counts.doubled, 0u);
   EXPECT_LE(counts.wider, counts.pairs);
   const double most = (processor == Processor::single ? 2e-3 : 1e-4) * (grid ? 10 : 1);

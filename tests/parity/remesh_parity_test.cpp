@@ -108,7 +108,7 @@ void expect_same_run(const RemeshResult& a, const RemeshResult& b) {
 Diagram expect_same_diagram_of(const PreparedCase& problem, const Setup& setup, Backend& backend,
                                const std::vector<Vec3>& seeds) {
   const Diagram reference = test::diagram_of(problem.surface, seeds, NeighbourSource::nearest);
-  const Diagram found = diagram_of(backend, seeds);
+  const Evaluated found = diagram_of(backend, seeds);
   expect_parity(problem.surface, reference, found, setup.processor);
   const BallReport want = check_ball_property(problem.surface, reference.polygons);
   const BallReport got = check_ball_property(problem.surface, found.polygons);

@@ -138,16 +138,8 @@ std::vector<Vec3> first_of(const std::vector<Vec3>& seeds, std::ptrdiff_t count)
   return {seeds.begin(), seeds.begin() + count};
 }
 
-struct SolidDiagram {
-  CellMoments moments;
-  RestrictedPolygons polygons;
-  ClippedPolyhedra polyhedra;
-};
-
-SolidDiagram diagram_of(SolidBackend& backend, const std::vector<Vec3>& seeds) {
-  SolidDiagram d;
-  backend.evaluate(seeds, d.moments, d.polygons, d.polyhedra);
-  return d;
+Evaluated solid_diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
+  return evaluated(backend, seeds, Want::polygons | Want::polyhedra);
 }
 
 struct SeedSet {
@@ -200,12 +192,12 @@ void expect_same_polyhedra(const ClippedPolyhedra& a, const ClippedPolyhedra& b)
   EXPECT_TRUE(dual_tets(a) == dual_tets(b)) << "duals differ";
 }
 
-void expect_parity(const Solid& solid, const SolidDiagram& reference, const SolidDiagram& found, Processor processor) {
+void expect_parity(const Solid& solid, const Evaluated& reference, const Evaluated& found, Processor processor) {
   expect_same_polyhedra(reference.polyhedra, found.polyhedra);
   EXPECT_EQ(found.moments.triangles.offsets, reference.moments.triangles.offsets);
   EXPECT_EQ(found.moments.triangles.values, reference.moments.triangles.values);
   EXPECT_EQ(found.polygons.labels, reference.polygons.labels);
-  EXPECT_EQ(found.moments.certification.pairs, found.polyhedra.pairs.size());
+  EXPECT_EQ(found.report.certification.pairs, found.polyhedra.pairs.size());
   EXPECT_EQ(count_untiled(solid, found.polyhedra), 0u);
   const Tolerance tolerance = tolerance_of(processor);
   EXPECT_NEAR(found.moments.energy, reference.moments.energy, tolerance.cells * reference.moments.energy);
@@ -217,7 +209,7 @@ void expect_parity(const Solid& solid, const SolidDiagram& reference, const Soli
   EXPECT_LE(parity.sum_error, tolerance.sum);
   if (processor != Processor::single) {
     EXPECT_TRUE(parity.bitwise) << "not the CPU's bits";
-    EXPECT_EQ(found.moments.certification.doubled, 0u);
+    EXPECT_EQ(found.report.certification.doubled, 0u);
   }
 }
 
@@ -258,15 +250,14 @@ TEST_P(Solids, AreTheCpus) {
     const std::vector<SeedSet> sets = seed_sets(mesh, model.seeds, uniform && inner == InnerCells::whole);
     for (const SeedSet& set : sets) {
       SCOPED_TRACE(set.name);
-      SolidDiagram found = diagram_of(*backend, set.seeds);
-      expect_parity(solid, diagram_of(cpu, set.seeds), found, setup.processor);
+      Evaluated found = solid_diagram_of(*backend, set.seeds);
+      expect_parity(solid, solid_diagram_of(cpu, set.seeds), found, setup.processor);
       first_run.push_back(std::move(found.moments));
     }
     // Some once more in another order, so that what is kept from the last diagram is never the same.
     for (std::size_t k = std::min<std::size_t>(sets.size(), 4); k-- > 0;) {
       SCOPED_TRACE(sets[k].name + " again");
-      CellMoments again;
-      backend->evaluate(sets[k].seeds, again);
+      const CellMoments again = evaluated(*backend, sets[k].seeds, Want::moments).moments;
       EXPECT_TRUE(bisector::same_bits(again, first_run[k]));
     }
   }
@@ -302,7 +293,7 @@ TEST_P(SolidParities, DegenerateDiagramsAreTheCpus) {
     const Solid solid(mesh);
     CpuSolidBackend cpu(solid, NeighbourSource::nearest);
     const std::unique_ptr<SolidBackend> backend = backend_of(solid, GetParam(), InnerCells::whole);
-    expect_parity(solid, diagram_of(cpu, seeds), diagram_of(*backend, seeds), GetParam().processor);
+    expect_parity(solid, solid_diagram_of(cpu, seeds), solid_diagram_of(*backend, seeds), GetParam().processor);
   }
 }
 
@@ -317,7 +308,7 @@ TEST_P(SolidParities, WhatIsKeptBetweenDiagramsDoesNotShow) {
   const auto check = [&](const std::vector<Vec3>& seeds, const char* what) {
     SCOPED_TRACE(what);
     CpuSolidBackend cpu(solid, NeighbourSource::nearest);
-    expect_parity(solid, diagram_of(cpu, seeds), diagram_of(*backend, seeds), GetParam().processor);
+    expect_parity(solid, solid_diagram_of(cpu, seeds), solid_diagram_of(*backend, seeds), GetParam().processor);
   };
   std::vector<Vec3> seeds = seeds_in(mesh, 150, 45);
   check(seeds, "start");
@@ -337,11 +328,10 @@ TEST_P(SolidParities, GridsStayOnTheDevice) {
   const TetMesh mesh = shaken_crate(2);
   const Solid solid(mesh);
   const std::unique_ptr<SolidBackend> backend = make_backend(solid, options_of(GetParam()));
-  CellMoments moments;
-  backend->evaluate(grid_in(mesh, 7), moments);
-  EXPECT_NEAR(moments.mass, solid.mass, tolerance_of(GetParam().processor).sum * solid.mass);
+  const Evaluated found = evaluated(*backend, grid_in(mesh, 7), Want::moments);
+  EXPECT_NEAR(found.moments.mass, solid.mass, tolerance_of(GetParam().processor).sum * solid.mass);
   if (GetParam().processor != Processor::cpu) {
-    EXPECT_LT(10 * moments.certification.cpu, moments.certification.pairs);
+    EXPECT_LT(10 * found.report.certification.cpu, found.report.certification.pairs);
   }
 }
 
@@ -351,7 +341,7 @@ TEST_P(SolidParities, SeedsOutOfReachAreTheCpus) {
   const std::unique_ptr<SolidBackend> backend = make_backend(solid, options_of(GetParam()));
   const std::vector<Vec3> seeds{{0.3, 0.4, 0.5}, {1e15, 0, 0}, {0.7, 0.6, 0.4}};
   CpuSolidBackend cpu(solid, NeighbourSource::nearest);
-  expect_same_polyhedra(diagram_of(cpu, seeds).polyhedra, diagram_of(*backend, seeds).polyhedra);
+  expect_same_polyhedra(solid_diagram_of(cpu, seeds).polyhedra, solid_diagram_of(*backend, seeds).polyhedra);
 }
 
 }  // namespace

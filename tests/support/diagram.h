@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "backend/backend.h"
 #include "core/parallel.h"
 #include "voronoi/dual.h"
 #include "voronoi/restricted.h"
@@ -28,6 +29,21 @@ inline Diagram diagram_of(RestrictedVoronoi& voronoi, const std::vector<Vec3>& s
 inline Diagram diagram_of(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source) {
   RestrictedVoronoi voronoi(surface);
   return diagram_of(voronoi, seeds, source);
+}
+
+// A backend's diagram, and what its evaluation reported.
+struct Evaluated : Diagram {
+  EvaluationReport report;
+};
+
+inline Evaluated evaluated(Backend& backend, const std::vector<Vec3>& seeds, Want want) {
+  Evaluated result;
+  result.report = backend.evaluate(seeds, want, result);
+  return result;
+}
+
+inline Evaluated diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
+  return evaluated(backend, seeds, Want::polygons);
 }
 
 inline bool same_bits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }

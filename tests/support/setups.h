@@ -80,12 +80,6 @@ inline ComputeOptions options_of(const Setup& setup) {
 #define SKIP_WITHOUT_DEVICE(processor) \
   if (!device_for(processor)) GTEST_SKIP() << "no Vulkan device for this"
 
-inline Diagram diagram_of(Backend& backend, const std::vector<Vec3>& seeds) {
-  Diagram d;
-  backend.evaluate(seeds, d.moments, d.polygons);
-  return d;
-}
-
 // What the reported vertices give, which the moments do not show. Vertices are rounded at the size of the coordinates.
 inline void expect_same_areas(const Surface& surface, const Diagram& reference, const Diagram& found, double tolerance) {
   const double rounding = 1e-15 * (norm(surface.box.lo) + norm(surface.box.hi));
@@ -109,7 +103,7 @@ inline void expect_same_areas(const Surface& surface, const Diagram& reference, 
   EXPECT_LE(worst, tolerance);
 }
 
-inline void expect_parity(const Surface& surface, const Diagram& reference, const Diagram& found, Processor processor) {
+inline void expect_parity(const Surface& surface, const Diagram& reference, const Evaluated& found, Processor processor) {
   const Parity parity = compare(reference.moments, reference.polygons, found.moments, found.polygons, surface);
   EXPECT_TRUE(parity.same_pairs);
   EXPECT_TRUE(parity.same_labels);
@@ -127,9 +121,9 @@ inline void expect_parity(const Surface& surface, const Diagram& reference, cons
   if (processor != Processor::single) {
     EXPECT_TRUE(parity.bitwise) << "not the CPU's bits";
   }
-  EXPECT_EQ(found.moments.certification.pairs, reference.polygons.pairs.size());
+  EXPECT_EQ(found.report.certification.pairs, reference.polygons.pairs.size());
   if (processor != Processor::single) {
-    EXPECT_EQ(found.moments.certification.doubled, 0u);
+    EXPECT_EQ(found.report.certification.doubled, 0u);
   }
 }
 
