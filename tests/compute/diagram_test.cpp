@@ -21,7 +21,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 DiagramOptions on_cpu() {
   DiagramOptions options;
-  options.compute.device = "cpu";
+  options.compute.device.kind = DeviceRequest::Kind::cpu;
   return options;
 }
 
@@ -159,8 +159,8 @@ TEST(SurfaceDiagram, BadInputIsRefused) {
   wrong = mesh;
   wrong.vertices[2] = wrong.vertices[1];
   EXPECT_THROW(compute_diagram(wrong, {}, seeds, on_cpu()), Error);
-  DiagramOptions options;
-  options.compute.device = "abacus";
+  DiagramOptions options = on_cpu();
+  options.compute.precision = Precision::single;
   EXPECT_THROW(compute_diagram(mesh, {}, seeds, options), Error);
 }
 
