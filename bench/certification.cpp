@@ -1,5 +1,5 @@
-// How many pairs climb which rung of certification, time and memory: for each kind of seeds and precision in a process of its
-// own.
+// How many pairs climb which rung of certification, time and memory: for each kind of seeds and precision in a process
+// of its own.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -19,9 +19,9 @@
 #include "backend/cpu_backend.h"
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "common.h"
 #include "core/geometry.h"
 #include "io/files.h"
-#include "common.h"
 
 namespace {
 
@@ -39,8 +39,8 @@ struct Options {
   bool once = false;  // the first of each list, in this process
 };
 
-// Layers through the bounding box, as many in each direction as give about that many seeds. If they are dyadic, they lie at whole
-// multiples of powers of two, so that far more ties are exact, and may reach beyond the box.
+// Layers through the bounding box, as many in each direction as give about that many seeds. If they are dyadic, they
+// lie at whole multiples of powers of two, so that far more ties are exact, and may reach beyond the box.
 std::vector<Vec3> grid_seeds(const TriangleMesh& mesh, std::size_t count, bool dyadic) {
   const int n = std::max(2, static_cast<int>(std::lround(std::cbrt(static_cast<double>(count)))));
   Box box{mesh.vertices.front(), mesh.vertices.front()};
@@ -107,12 +107,14 @@ void run_once(Options options) {
   const Certification& c = report.certification;
   const double share = static_cast<double>(c.cpu) / static_cast<double>(c.pairs);
   const double missing = std::abs(moments.mass - surface.mass) / surface.mass;
-  fmt::print("{},{},{},{},{},{},{},{},{},{:.5f} %,{},{:.1e},{:.2f},{}{}\n", std::filesystem::path(model).stem().string(),
-             seeds.size(), pattern, rung, c.pairs, c.uncertain, c.wider, c.doubled, c.cpu, 100 * share,
-             same ? "yes" : "NO", missing, cold, warm, device_phases(report.seconds.device));
+  fmt::print("{},{},{},{},{},{},{},{},{},{:.5f} %,{},{:.1e},{:.2f},{}{}\n",
+             std::filesystem::path(model).stem().string(), seeds.size(), pattern, rung, c.pairs, c.uncertain, c.wider,
+             c.doubled, c.cpu, 100 * share, same ? "yes" : "NO", missing, cold, warm,
+             device_phases(report.seconds.device));
 }
 
-// The row of run_once() in a new process, and its peak resident memory. Must come before the first loop of this process.
+// The row of run_once() in a new process, and its peak resident memory. Must come before the first loop of this
+// process.
 std::vector<std::string> row_of(const std::vector<std::string>& arguments) {
   std::vector<std::string> words = arguments;
   std::vector<char*> pointers;
@@ -147,15 +149,18 @@ std::vector<std::string> row_of(const std::vector<std::string>& arguments) {
 
 void run(const Options& options) {
   if (options.once) return run_once(options);
-  Table table{{"model", "seeds", "pattern", "precision", "pairs", "uncertain", "wider", "doubled", "cpu", "share on the CPU",
-               "CPU's pairs", "mass error", "first", "later", "transfer", "grid", "neighbours", "owners", "clip", "sort", "sum",
-               "memory"}, {}};
+  Table table{{"model",    "seeds", "pattern",          "precision",   "pairs",      "uncertain", "wider",
+               "doubled",  "cpu",   "share on the CPU", "CPU's pairs", "mass error", "first",     "later",
+               "transfer", "grid",  "neighbours",       "owners",      "clip",       "sort",      "sum",
+               "memory"},
+              {}};
   fmt::print("{}\ndevice: {}; memory in MiB, times in s\n\n", describe_machine(), describe_device(options.device));
   for (const std::string& model : options.models)
     for (const std::string& pattern : options.patterns)
       for (const std::string& rung : options.rungs) {
-        table.rows.push_back(row_of({"bench_certification", model, "--once", "--seeds", std::to_string(options.seeds),
-                                     "--patterns", pattern, "--rungs", rung, "--device", word_of(options.device.device)}));
+        table.rows.push_back(
+            row_of({"bench_certification", model, "--once", "--seeds", std::to_string(options.seeds), "--patterns",
+                    pattern, "--rungs", rung, "--device", word_of(options.device.device)}));
         std::fprintf(stderr, "%s, %s, %s: done\n", model.c_str(), pattern.c_str(), rung.c_str());
       }
   fmt::print("{}", table.markdown());
@@ -172,9 +177,11 @@ int main(int argc, char** argv) {
   app.add_option("MESH", options.models, "surfaces; default: examples/smooth.off");
   app.add_option("--seeds", options.seeds, "about how many")->check(CLI::Range(2, 100'000'000));
   app.add_option("--patterns", options.patterns, "random, grid, dyadic")
-      ->delimiter(',')->check(CLI::IsMember({"random", "grid", "dyadic"}));
+      ->delimiter(',')
+      ->check(CLI::IsMember({"random", "grid", "dyadic"}));
   app.add_option("--rungs", options.rungs, "double; single; single-only, without the double rung")
-      ->delimiter(',')->check(CLI::IsMember({"double", "single", "single-only"}));
+      ->delimiter(',')
+      ->check(CLI::IsMember({"double", "single", "single-only"}));
   add_device(app, options.device.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
   app.add_option("--json", options.json, "the same as JSON");

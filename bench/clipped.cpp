@@ -1,5 +1,5 @@
-// Cold evaluations of clipped Voronoi diagrams, in the shape of the thesis' Table 5.1, beside CGAL's Delaunay triangulation of the
-// same seeds.
+// Cold evaluations of clipped Voronoi diagrams, in the shape of the thesis' Table 5.1, beside CGAL's Delaunay
+// triangulation of the same seeds.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -14,14 +14,14 @@
 
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "common.h"
 #include "compute/compute.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "delaunay_time.h"
 #include "io/files.h"
 #include "tetmesh/check_surface.h"
 #include "tetmesh/tetgen.h"
-#include "common.h"
-#include "delaunay_time.h"
 
 namespace {
 
@@ -47,8 +47,8 @@ std::vector<Vec3> random_sites(const Solid& solid, std::size_t count) {
   std::vector<Vec3> sites(count);
   for (Vec3& x : sites) {
     const double at = random.uniform() * total;
-    const std::size_t t = std::min<std::size_t>(static_cast<std::size_t>(std::upper_bound(below.begin(), below.end(), at) - below.begin()),
-                                                below.size() - 1);
+    const std::size_t t = std::min<std::size_t>(
+        static_cast<std::size_t>(std::upper_bound(below.begin(), below.end(), at) - below.begin()), below.size() - 1);
     double u[3] = {random.uniform(), random.uniform(), random.uniform()};
     std::sort(u, u + 3);
     const auto& q = solid.mesh.vertices;
@@ -80,30 +80,38 @@ std::string svg(const std::vector<Line>& lines) {
   }
   constexpr double kLeft = 70, kTop = 20, kWidth = 480, kHeight = 360;
   const auto x = [&](double seeds) { return kLeft + kWidth * std::log(seeds / lo[0]) / std::log(hi[0] / lo[0]); };
-  const auto y = [&](double seconds) { return kTop + kHeight * (1 - std::log(seconds / lo[1]) / std::log(hi[1] / lo[1])); };
-  std::string out = "<svg xmlns='http://www.w3.org/2000/svg' width='720' height='440' font-family='sans-serif' font-size='12'>\n"
-                    "<rect width='720' height='440' fill='white'/>\n";
+  const auto y = [&](double seconds) {
+    return kTop + kHeight * (1 - std::log(seconds / lo[1]) / std::log(hi[1] / lo[1]));
+  };
+  std::string out =
+      "<svg xmlns='http://www.w3.org/2000/svg' width='720' height='440' font-family='sans-serif' font-size='12'>\n"
+      "<rect width='720' height='440' fill='white'/>\n";
   for (double at = lo[0]; at <= hi[0] * 1.001; at *= 10)
-    out += fmt::format("<path d='M{:.1f} {} v{}' stroke='#ddd'/><text x='{:.1f}' y='{}' text-anchor='middle'>{:.0f}</text>\n", x(at),
-                       kTop, kHeight, x(at), kTop + kHeight + 18, at);
+    out += fmt::format(
+        "<path d='M{:.1f} {} v{}' stroke='#ddd'/><text x='{:.1f}' y='{}' text-anchor='middle'>{:.0f}</text>\n", x(at),
+        kTop, kHeight, x(at), kTop + kHeight + 18, at);
   for (double at = lo[1]; at <= hi[1] * 1.001; at *= 10)
-    out += fmt::format("<path d='M{} {:.1f} h{}' stroke='#ddd'/><text x='{}' y='{:.1f}' text-anchor='end'>{:g} s</text>\n", kLeft,
-                       y(at), kWidth, kLeft - 6, y(at) + 4, at);
+    out +=
+        fmt::format("<path d='M{} {:.1f} h{}' stroke='#ddd'/><text x='{}' y='{:.1f}' text-anchor='end'>{:g} s</text>\n",
+                    kLeft, y(at), kWidth, kLeft - 6, y(at) + 4, at);
   const char* colours[] = {"#1b6ca8", "#c8553d", "#3a7d44", "#8e5ea2", "#b8860b", "#444444"};
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const char* colour = colours[l % std::size(colours)];
     const auto polyline = [&](const std::vector<double>& values, const char* style) {
       out += fmt::format("<polyline fill='none' stroke='{}' stroke-width='1.5' {} points='", colour, style);
-      for (std::size_t k = 0; k < values.size(); ++k) out += fmt::format("{:.1f},{:.1f} ", x(lines[l].seeds[k]), y(values[k]));
+      for (std::size_t k = 0; k < values.size(); ++k)
+        out += fmt::format("{:.1f},{:.1f} ", x(lines[l].seeds[k]), y(values[k]));
       out += "'/>\n";
     };
     polyline(lines[l].total, "");
     polyline(lines[l].delaunay, "stroke-dasharray='4 3'");
-    out += fmt::format("<text x='{}' y='{}' fill='{}'>{}</text>\n", kLeft + kWidth + 14, kTop + 14 + 18 * static_cast<double>(l), colour,
-                       lines[l].model);
+    out += fmt::format("<text x='{}' y='{}' fill='{}'>{}</text>\n", kLeft + kWidth + 14,
+                       kTop + 14 + 18 * static_cast<double>(l), colour, lines[l].model);
   }
-  return out + fmt::format("<text x='{}' y='{}' text-anchor='middle'>sites (dashed: CGAL's Delaunay triangulation)</text>\n</svg>\n",
-                           kLeft + kWidth / 2, kTop + kHeight + 40);
+  return out +
+         fmt::format(
+             "<text x='{}' y='{}' text-anchor='middle'>sites (dashed: CGAL's Delaunay triangulation)</text>\n</svg>\n",
+             kLeft + kWidth / 2, kTop + kHeight + 40);
 }
 
 std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Options& options) {
@@ -144,7 +152,8 @@ void measure(const std::string& path, const Options& options, Table& table, std:
       clip.push_back(report.seconds.clip);
       const double missing = std::abs(moments.mass - solid.mass);
       if (!(missing <= backend->mass_tolerance() * solid.mass))
-        throw Error(fmt::format("{}, {} sites: the masses sum to {:.17g}, the volume is {:.17g}", path, count, moments.mass, solid.mass));
+        throw Error(fmt::format("{}, {} sites: the masses sum to {:.17g}, the volume is {:.17g}", path, count,
+                                moments.mass, solid.mass));
       std::fprintf(stderr, "%s, %zu sites: round %zu of %zu\n", name.c_str(), count, r + 1, options.repeat);
     }
     std::size_t boundary_sites = 0;
@@ -152,13 +161,13 @@ void measure(const std::string& path, const Options& options, Table& table, std:
     lines.back().seeds.push_back(static_cast<double>(count));
     lines.back().total.push_back(median(total));
     lines.back().delaunay.push_back(median(delaunay));
-    table.rows.push_back({name, std::to_string(solid.mesh.tets.size()), std::to_string(solid.boundary.mesh.triangles.size()),
-                          std::to_string(count), std::to_string(boundary_sites), on, milliseconds(median(total)),
-                          milliseconds(median(neighbours)), milliseconds(median(surface)), milliseconds(median(clip)),
-                          milliseconds(median(delaunay)), fmt::format("{:.2f}", median(ratio)),
-                          std::to_string(certification.pairs), std::to_string(certification.uncertain),
-                          std::to_string(certification.wider),
-                          fmt::format("{:.1e}", std::abs(moments.mass - solid.mass) / solid.mass)});
+    table.rows.push_back(
+        {name, std::to_string(solid.mesh.tets.size()), std::to_string(solid.boundary.mesh.triangles.size()),
+         std::to_string(count), std::to_string(boundary_sites), on, milliseconds(median(total)),
+         milliseconds(median(neighbours)), milliseconds(median(surface)), milliseconds(median(clip)),
+         milliseconds(median(delaunay)), fmt::format("{:.2f}", median(ratio)), std::to_string(certification.pairs),
+         std::to_string(certification.uncertain), std::to_string(certification.wider),
+         fmt::format("{:.1e}", std::abs(moments.mass - solid.mass) / solid.mass)});
   }
 }
 
@@ -167,8 +176,9 @@ void run(const Options& options) {
   fmt::print("{}\n", describe_machine());
   if (!is_cpu(options.device.device)) fmt::print("device: {}\n", describe_device(options.device));
   fmt::print("{} threads; solids prepared once, not counted; times in ms\n\n", options.threads);
-  Table table{{"model", "|T|", "|S|", "|X|", "|X_b|", "backend", "total", "neighbours", "surface", "clip", "CGAL", "ratio", "pairs",
-               "uncertain", "wider", "mass error"}, {}};
+  Table table{{"model", "|T|", "|S|", "|X|", "|X_b|", "backend", "total", "neighbours", "surface", "clip", "CGAL",
+               "ratio", "pairs", "uncertain", "wider", "mass error"},
+              {}};
   std::vector<Line> lines;
   for (const std::string& model : options.models) measure(model, options, table, lines);
   fmt::print("{}", table.markdown());

@@ -10,8 +10,8 @@
 #include <thread>
 
 #include "backend/cpu_backend.h"
-#include "mesh/sampling.h"
 #include "host/passes/vulkan_backend.h"
+#include "mesh/sampling.h"
 
 namespace bisector::bench {
 
@@ -84,7 +84,8 @@ void add_device(CLI::App& app, DeviceRequest& device) {
   cli::add_parsed(&app, "--device", device, parse_device, "cpu, vulkan, vulkan:INDEX or vulkan:UUID");
 }
 
-std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options, NeighbourSource source) {
+std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options,
+                                             NeighbourSource source) {
   if (is_cpu(options.device)) return std::make_unique<CpuBackend>(surface, source);
   host::VulkanOptions vulkan;
   vulkan.precision = options.precision;

@@ -9,9 +9,9 @@
 
 #include "cli/parsed_option.h"
 #include "cli/words.h"
+#include "compute/compute.h"
 #include "core/geometry.h"
 #include "core/stopwatch.h"
-#include "compute/compute.h"
 
 namespace bisector::bench {
 
@@ -47,7 +47,8 @@ void add_device_options(CLI::App& app, DeviceOptions& options);
 inline bool is_cpu(const DeviceRequest& device) { return device.kind == DeviceRequest::Kind::cpu; }
 
 // Throws Error and DeviceError as bisector::make_backend() does. Not for an automatic request.
-std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options, NeighbourSource source);
+std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options,
+                                             NeighbourSource source);
 std::string describe_device(const DeviceOptions& options);
 
 std::string describe_model(const std::string& path, const TriangleMesh& mesh);

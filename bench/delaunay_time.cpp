@@ -22,8 +22,7 @@ using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data
 double delaunay_seconds(const std::vector<Vec3>& seeds) {
   std::vector<std::pair<Kernel::Point_3, Index>> points;
   points.reserve(seeds.size());
-  for (const Vec3& x : seeds)
-    points.emplace_back(Kernel::Point_3(x.x, x.y, x.z), static_cast<Index>(points.size()));
+  for (const Vec3& x : seeds) points.emplace_back(Kernel::Point_3(x.x, x.y, x.z), static_cast<Index>(points.size()));
   const Stopwatch watch;
   const Delaunay triangulation(points.begin(), points.end());
   const double seconds = watch.seconds();

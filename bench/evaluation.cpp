@@ -16,11 +16,11 @@
 #include "backend/cpu_backend.h"
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "common.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
-#include "io/files.h"
-#include "common.h"
 #include "delaunay_time.h"
+#include "io/files.h"
 
 namespace {
 
@@ -46,8 +46,8 @@ struct Run {
   EvaluationReport report;
 };
 
-// From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which has
-// compiled its kernels and got its memory.
+// From seeds to a gradient: on the CPU with nothing kept from before, on a device after a diagram of other seeds, which
+// has compiled its kernels and got its memory.
 Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSource source, unsigned threads,
              Backend* device) {
   const ThreadLimit limit(threads);
@@ -65,8 +65,8 @@ Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSo
   const double missing = std::abs(run.diagram.moments.mass - surface.mass);
   run.total = watch.seconds();
   if (!(missing <= (device ? device->mass_tolerance() : 1e-12) * surface.mass))
-    throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(), run.diagram.moments.mass,
-                            surface.mass));
+    throw Error(fmt::format("{} seeds: the masses sum to {:.17g}, the area is {:.17g}", seeds.size(),
+                            run.diagram.moments.mass, surface.mass));
   return run;
 }
 
@@ -74,12 +74,22 @@ std::unique_ptr<Backend> device_of(const Surface& surface, const Options& option
   return is_cpu(options.device.device) ? nullptr : make_device_backend(surface, options.device, source);
 }
 
-// Peak resident memory, in MiB, of a process that reads the model and evaluates once. Must come before the first loop of
-// this process: a new process counts what its parent held.
+// Peak resident memory, in MiB, of a process that reads the model and evaluates once. Must come before the first loop
+// of this process: a new process counts what its parent held.
 double peak_memory(const Options& options, std::size_t seeds, const std::string& source, unsigned threads) {
-  std::vector<std::string> words{"bench_evaluation", options.model, "--once", "--seeds", std::to_string(seeds), "--sources",
-                                 source, "--threads", std::to_string(threads), "--device", word_of(options.device.device),
-                                 "--precision", std::string(cli::kPrecisionWords.word_of(options.device.precision))};
+  std::vector<std::string> words{"bench_evaluation",
+                                 options.model,
+                                 "--once",
+                                 "--seeds",
+                                 std::to_string(seeds),
+                                 "--sources",
+                                 source,
+                                 "--threads",
+                                 std::to_string(threads),
+                                 "--device",
+                                 word_of(options.device.device),
+                                 "--precision",
+                                 std::string(cli::kPrecisionWords.word_of(options.device.precision))};
   if (!options.device.double_rung) words.insert(words.end(), {"--double-rung", "off"});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -114,7 +124,8 @@ struct Series {
     owners.push_back(phases.pairs);
     clip.push_back(phases.clip);
     ratio.push_back(run.total / delaunay);
-    if (gradient_norm != 0 && run.gradient_norm != gradient_norm) throw Error("the gradient differs from the last run's");
+    if (gradient_norm != 0 && run.gradient_norm != gradient_norm)
+      throw Error("the gradient differs from the last run's");
     gradient_norm = run.gradient_norm;
     mass = run.diagram.moments.mass;
     energy = run.diagram.moments.energy;
@@ -124,7 +135,8 @@ struct Series {
 
 void require_same(const Series& a, const Series& b) {
   if (a.mass != b.mass || a.energy != b.energy || a.gradient_norm != b.gradient_norm)
-    throw Error(fmt::format("{} with {} threads and {} with {} threads differ", a.source, a.threads, b.source, b.threads));
+    throw Error(
+        fmt::format("{} with {} threads and {} with {} threads differ", a.source, a.threads, b.source, b.threads));
 }
 
 std::string milliseconds(double seconds) { return fmt::format("{:.{}f}", 1e3 * seconds, seconds < 0.1 ? 2 : 0); }
@@ -146,15 +158,16 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
   for (const Series& s : series) {
     require_same(s, series.front());
     // The first number of threads of the same source.
-    const Series& base = *std::find_if(series.begin(), series.end(), [&](const Series& b) { return b.source == s.source; });
+    const Series& base =
+        *std::find_if(series.begin(), series.end(), [&](const Series& b) { return b.source == s.source; });
     const EvaluationReport& m = s.last;
-    table.rows.push_back({std::to_string(count), s.source, std::to_string(s.threads), milliseconds(median(s.total)),
-                          milliseconds(median(s.neighbours)), milliseconds(median(s.owners)), milliseconds(median(s.clip)),
-                          milliseconds(median(delaunay)), fmt::format("{:.2f}", median(s.ratio)),
-                          fmt::format("{:.2f}", median(base.total) / median(s.total)),
-                          fmt::format("{:.0f}", s.memory), std::to_string(m.certification.pairs),
-                          std::to_string(m.certification.uncertain), std::to_string(m.certification.wider),
-                          fmt::format("{:.1e}", std::abs(s.mass - surface.mass) / surface.mass)});
+    table.rows.push_back(
+        {std::to_string(count), s.source, std::to_string(s.threads), milliseconds(median(s.total)),
+         milliseconds(median(s.neighbours)), milliseconds(median(s.owners)), milliseconds(median(s.clip)),
+         milliseconds(median(delaunay)), fmt::format("{:.2f}", median(s.ratio)),
+         fmt::format("{:.2f}", median(base.total) / median(s.total)), fmt::format("{:.0f}", s.memory),
+         std::to_string(m.certification.pairs), std::to_string(m.certification.uncertain),
+         std::to_string(m.certification.wider), fmt::format("{:.1e}", std::abs(s.mass - surface.mass) / surface.mass)});
     if (is_cpu(options.device.device)) continue;
     const DeviceSeconds& d = m.seconds.device;
     std::vector<std::string>& row = table.rows.back();
@@ -192,12 +205,13 @@ void run(const Options& options) {
   const Surface surface(std::move(mesh));
   fmt::print("surface prepared once in {:.0f} ms, not counted below; times in ms, memory in MiB\n\n",
              1e3 * preparing.seconds());
-  Table table{{"seeds", "source", "threads", "total", "neighbours", "owners", "clip", "CGAL", "ratio", "speed-up", "memory",
-               "pairs", "uncertain", "wider", "mass error"}, {}};
+  Table table{{"seeds", "source", "threads", "total", "neighbours", "owners", "clip", "CGAL", "ratio", "speed-up",
+               "memory", "pairs", "uncertain", "wider", "mass error"},
+              {}};
   if (!is_cpu(options.device.device)) {
     fmt::print("device: {}\n\n", describe_device(options.device));
-    for (const char* name : {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort",
-                             "d. sum"})
+    for (const char* name :
+         {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort", "d. sum"})
       table.columns.push_back(name);
   }
   for (std::size_t k = 0; k < all.size(); ++k) measure(surface, options, options.seeds[k], std::move(all[k]), table);
@@ -213,7 +227,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Times one cold evaluation of a restricted Voronoi diagram beside CGAL's Delaunay triangulation."};
   app.add_option("MESH", options.model, "the surface; default: examples/smooth.off");
   app.add_option("--seeds", options.seeds, "counts, area-uniform random seeds")->delimiter(',');
-  app.add_option("--repeat", options.repeat, "runs of each; half as many from 500,000 seeds on")->check(CLI::Range(1, 1000));
+  app.add_option("--repeat", options.repeat, "runs of each; half as many from 500,000 seeds on")
+      ->check(CLI::Range(1, 1000));
   app.add_option("--threads", options.threads, "numbers of threads")->delimiter(',')->check(CLI::Range(1, 1024));
   app.add_option("--sources", options.sources, cli::kNeighbourWords.list())
       ->delimiter(',')

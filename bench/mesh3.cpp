@@ -34,8 +34,8 @@ TetMesh mesh_3(const TriangleMesh& surface, const FeatureGraph& features, double
     lines.push_back(std::move(line));
   }
   domain.add_features(lines.begin(), lines.end());
-  // Circumradii of equilateral triangles and regular tetrahedra are 0.58 and 0.61 edges; meshes have edges of all lengths below.
-  // The distance hardly binds, so that the boundary is as fine as the inside.
+  // Circumradii of equilateral triangles and regular tetrahedra are 0.58 and 0.61 edges; meshes have edges of all
+  // lengths below. The distance hardly binds, so that the boundary is as fine as the inside.
   const Criteria criteria(CGAL::parameters::edge_size = edge, CGAL::parameters::facet_angle = 25,
                           CGAL::parameters::facet_size = 0.7 * edge, CGAL::parameters::facet_distance = 0.2 * edge,
                           CGAL::parameters::cell_radius_edge_ratio = 2, CGAL::parameters::cell_size = 0.75 * edge);

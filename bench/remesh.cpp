@@ -1,4 +1,5 @@
-// A whole remesh with default options, beside CGAL's Delaunay triangulation of 100,000 random seeds of the same surface.
+// A whole remesh with default options, beside CGAL's Delaunay triangulation of 100,000 random seeds of the same
+// surface.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -10,11 +11,11 @@
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "bisector/quality.h"
+#include "common.h"
 #include "core/parallel.h"
+#include "delaunay_time.h"
 #include "io/files.h"
 #include "remesh/remesh.h"
-#include "common.h"
-#include "delaunay_time.h"
 
 namespace {
 
@@ -63,12 +64,13 @@ void run(Options options) {
       s.diagram.push_back(phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
       s.ratio.push_back(s.total.back() / (0.5 * (before + after)));
       delaunay.insert(delaunay.end(), {before, after});
-      std::fprintf(stderr, "random seed %llu: round %zu of %zu\n", static_cast<unsigned long long>(s.random_seed), r + 1,
-                   options.repeat);
+      std::fprintf(stderr, "random seed %llu: round %zu of %zu\n", static_cast<unsigned long long>(s.random_seed),
+                   r + 1, options.repeat);
     }
 
-  Table table{{"random seed", "total", "in diagrams", "CGAL 100 k", "ratio", "evaluations", "q_ave", "q_min", "theta_min_ave",
-               "theta_min", "theta_below_30", "valence6", "distance_rms", "topology"}, {}};
+  Table table{{"random seed", "total", "in diagrams", "CGAL 100 k", "ratio", "evaluations", "q_ave", "q_min",
+               "theta_min_ave", "theta_min", "theta_below_30", "valence6", "distance_rms", "topology"},
+              {}};
   for (const Series& s : all) {
     const QualityReport q = measure_quality(s.last.mesh);
     table.rows.push_back({std::to_string(s.random_seed), fmt::format("{:.2f}", median(s.total)),

@@ -16,15 +16,15 @@
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "bisector/quality.h"
+#include "bisector/segment.h"
+#include "common.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "io/files.h"
 #include "segment/proxy.h"
 #include "segment/quadric_fit.h"
-#include "bisector/segment.h"
 #include "segment/segment_domain.h"
-#include "common.h"
 #include "vsa.h"
 
 namespace {
@@ -91,7 +91,8 @@ TriangleMesh shuffled(const TriangleMesh& mesh, std::uint64_t seed) {
   for (Vec3& p : result.vertices)
     p = std::cos(angle) * p + std::sin(angle) * cross(axis, p) + (1 - std::cos(angle)) * dot(axis, p) * axis + shift;
   for (std::size_t i = result.triangles.size(); i > 1; --i)
-    std::swap(result.triangles[i - 1], result.triangles[static_cast<std::size_t>(random.uniform() * static_cast<double>(i))]);
+    std::swap(result.triangles[i - 1],
+              result.triangles[static_cast<std::size_t>(random.uniform() * static_cast<double>(i))]);
   for (Triangle& t : result.triangles)
     std::rotate(t.begin(), t.begin() + static_cast<int>(3 * random.uniform()), t.end());
   result.face_of_triangle.clear();
@@ -126,14 +127,15 @@ void add_run(Table& table, const Options& options, const std::string& name, cons
   TriangleMesh projected{result.projected, mesh.triangles};
   const double share = evaluation_seconds(mesh) * static_cast<double>(result.evaluations) / total;
   const SegmentSeconds& s = result.seconds;
-  table.rows.push_back({name, std::to_string(mesh.triangles.size()), surfaces_word(options), start_word(options),
-                        std::to_string(result.regions.size()), fmt::format("{:.2f}", total),
-                        fmt::format("{:.2f}", s.start), fmt::format("{:.2f}", s.lloyd + s.improve),
-                        fmt::format("{:.3f}", s.smooth + s.classify + s.project), percent(result.rms_before, diagonal),
-                        percent(result.rms, diagonal), fmt::format("{:.4f}", measure_distance(projected, mesh).rms),
-                        options.segment.surfaces == SegmentSurfaces::planes ? percent(planar_rms(mesh, result.labels), diagonal) : "",
-                        fmt::format("{:.2f}", result.border_after / result.border_before),
-                        std::to_string(result.iterations), fmt::format("{:.2f}", share)});
+  table.rows.push_back(
+      {name, std::to_string(mesh.triangles.size()), surfaces_word(options), start_word(options),
+       std::to_string(result.regions.size()), fmt::format("{:.2f}", total), fmt::format("{:.2f}", s.start),
+       fmt::format("{:.2f}", s.lloyd + s.improve), fmt::format("{:.3f}", s.smooth + s.classify + s.project),
+       percent(result.rms_before, diagonal), percent(result.rms, diagonal),
+       fmt::format("{:.4f}", measure_distance(projected, mesh).rms),
+       options.segment.surfaces == SegmentSurfaces::planes ? percent(planar_rms(mesh, result.labels), diagonal) : "",
+       fmt::format("{:.2f}", result.border_after / result.border_before), std::to_string(result.iterations),
+       fmt::format("{:.2f}", share)});
 }
 
 void add_peers(Table& table, const Options& options, const std::string& name, const TriangleMesh& mesh,
@@ -166,18 +168,17 @@ void add_spread(Table& table, const Options& options, const std::string& name, c
   std::vector<double> errors, totals, regions;
   for (std::size_t k = 0; k < options.spread; ++k) {
     wanted.random_seed = k + 1;
-    const SegmentResult result = wanted.start == SegmentStart::random ? segment(mesh, wanted)
-                                                                        : segment(shuffled(mesh, k + 1), wanted);
+    const SegmentResult result =
+        wanted.start == SegmentStart::random ? segment(mesh, wanted) : segment(shuffled(mesh, k + 1), wanted);
     errors.push_back(result.rms);
     totals.push_back(result.seconds.total);
     std::fprintf(stderr, "%s, %s: %zu of %zu\n", name.c_str(), start_word(options).c_str(), k + 1, options.spread);
   }
   const double diagonal = diagonal_of(mesh);
-  table.rows.push_back({name, surfaces_word(options), start_word(options), std::to_string(proxies), std::to_string(options.spread),
-                        percent(*std::min_element(errors.begin(), errors.end()), diagonal),
-                        percent(median(errors), diagonal),
-                        percent(*std::max_element(errors.begin(), errors.end()), diagonal),
-                        fmt::format("{:.2f}", median(totals))});
+  table.rows.push_back(
+      {name, surfaces_word(options), start_word(options), std::to_string(proxies), std::to_string(options.spread),
+       percent(*std::min_element(errors.begin(), errors.end()), diagonal), percent(median(errors), diagonal),
+       percent(*std::max_element(errors.begin(), errors.end()), diagonal), fmt::format("{:.2f}", median(totals))});
 }
 
 void run(const Options& options) {
@@ -187,8 +188,9 @@ void run(const Options& options) {
   if (options.spread > 0)
     table.columns = {"model", "surfaces", "start", "proxies", "runs", "rms least", "rms median", "rms most", "total"};
   else
-    table.columns = {"model", "triangles", "surfaces", "start", "regions", "total", "starting", "Lloyd", "post",
-                     "rms unsmoothed", "rms", "projected", "to planes", "border", "iterations", "evaluation share"};
+    table.columns = {"model",     "triangles", "surfaces",   "start",           "regions", "total",
+                     "starting",  "Lloyd",     "post",       "rms unsmoothed",  "rms",     "projected",
+                     "to planes", "border",    "iterations", "evaluation share"};
   for (std::size_t k = 0; k < options.models.size(); ++k) {
     const TriangleMesh mesh = read_mesh(options.models[k]);
     const std::string name = std::filesystem::path(options.models[k]).stem();

@@ -10,16 +10,16 @@
 #include <vector>
 
 #include "bisector/error.h"
-#include "core/parallel.h"
-#include "bisector/quality.h"
 #include "bisector/io.h"
-#include "mesh/tet_quality.h"
-#include "mesh/tet_topology.h"
-#include "remesh/remesh.h"
-#include "tetmesh/check_surface.h"
+#include "bisector/quality.h"
 #include "bisector/tetmesh.h"
 #include "common.h"
+#include "core/parallel.h"
+#include "mesh/tet_quality.h"
+#include "mesh/tet_topology.h"
 #include "mesh3.h"
+#include "remesh/remesh.h"
+#include "tetmesh/check_surface.h"
 #if BISECTOR_TETGEN
 #include "tetgen_pq.h"
 #endif
@@ -29,8 +29,8 @@ namespace {
 using namespace bisector;
 using namespace bisector::bench;
 
-constexpr int kTrials = 4;           // of a peer, to meet the number of vertices
-constexpr double kNearEnough = 0.05; // of the number
+constexpr int kTrials = 4;            // of a peer, to meet the number of vertices
+constexpr double kNearEnough = 0.05;  // of the number
 
 struct Options {
   std::string model = BISECTOR_DEFAULT_MODEL, density = "uniform", csv, json;
@@ -48,7 +48,8 @@ struct Result {
 
 TriangleMesh surface_of(const TetMesh& mesh) { return boundary_surface(mesh); }
 
-// A mesher with an edge length, called until it gives the wanted number of vertices; the seconds are those of the last call.
+// A mesher with an edge length, called until it gives the wanted number of vertices; the seconds are those of the last
+// call.
 template <class Mesher>
 Result meet_count(const std::string& name, std::size_t wanted, double edge, const Mesher& mesher) {
   Result result{name, {}, 0};
@@ -57,42 +58,45 @@ Result meet_count(const std::string& name, std::size_t wanted, double edge, cons
     result.mesh = mesher(edge);
     result.seconds = watch.seconds();
     const double ratio = static_cast<double>(result.mesh.vertices.size()) / static_cast<double>(wanted);
-    std::fprintf(stderr, "%s: edge %g, %zu vertices, %.1f s\n", name.c_str(), edge, result.mesh.vertices.size(), result.seconds);
+    std::fprintf(stderr, "%s: edge %g, %zu vertices, %.1f s\n", name.c_str(), edge, result.mesh.vertices.size(),
+                 result.seconds);
     if (std::abs(ratio - 1) < kNearEnough) break;
     edge *= std::cbrt(ratio);
   }
   return result;
 }
 
-std::vector<std::string> row(const Result& result, const TriangleMesh& input, double rms_of_remesh, double input_volume) {
+std::vector<std::string> row(const Result& result, const TriangleMesh& input, double rms_of_remesh,
+                             double input_volume) {
   const TetQualityReport q = measure_tet_quality(result.mesh);
   const TriangleMesh boundary = surface_of(result.mesh);
   const QualityReport s = measure_quality(boundary);
   const DistanceReport d = measure_distance(boundary, input);
-  std::vector<std::string> cells{result.name,
-                                 std::to_string(result.mesh.vertices.size()),
-                                 std::to_string(boundary.vertices.size()),
-                                 std::to_string(result.mesh.tets.size()),
-                                 std::to_string(q.inverted + q.zero_volume),
-                                 fmt::format("{:.2f}", q.dihedral_min),
-                                 fmt::format("{:.1f}", q.dihedral_max),
-                                 fmt::format("{:.4f}", q.radius_ratio_mean),
-                                 fmt::format("{:.3f}", q.radius_ratio_min),
-                                 fmt::format("{:.2f}", s.theta_min),
-                                 fmt::format("{:.2f}", s.theta_min_free),
-                                 fmt::format("{:.4f}", d.rms),
-                                 rms_of_remesh > 0 ? fmt::format("{:.2f}", d.rms / rms_of_remesh) : "",
-                                 fmt::format("{:+.3f}", 100 * (q.volume / input_volume - 1)),
-                                 s.topology.manifold && s.topology.closed ? fmt::format("{}", s.topology.euler) : "no manifold",
-                                 fmt::format("{:.1f}", result.seconds)};
+  std::vector<std::string> cells{
+      result.name,
+      std::to_string(result.mesh.vertices.size()),
+      std::to_string(boundary.vertices.size()),
+      std::to_string(result.mesh.tets.size()),
+      std::to_string(q.inverted + q.zero_volume),
+      fmt::format("{:.2f}", q.dihedral_min),
+      fmt::format("{:.1f}", q.dihedral_max),
+      fmt::format("{:.4f}", q.radius_ratio_mean),
+      fmt::format("{:.3f}", q.radius_ratio_min),
+      fmt::format("{:.2f}", s.theta_min),
+      fmt::format("{:.2f}", s.theta_min_free),
+      fmt::format("{:.4f}", d.rms),
+      rms_of_remesh > 0 ? fmt::format("{:.2f}", d.rms / rms_of_remesh) : "",
+      fmt::format("{:+.3f}", 100 * (q.volume / input_volume - 1)),
+      s.topology.manifold && s.topology.closed ? fmt::format("{}", s.topology.euler) : "no manifold",
+      fmt::format("{:.1f}", result.seconds)};
   return cells;
 }
 
 void run(const Options& options) {
   const TriangleMesh input = check_surface(read_mesh(options.model));
   const FeatureGraph features = detect_features(input);
-  fmt::print("{}\n{}\n{} vertices, Bisector on {} thread{}\n\n", describe_machine(), describe_model(options.model, input),
-             options.vertices, options.threads, options.threads == 1 ? "" : "s");
+  fmt::print("{}\n{}\n{} vertices, Bisector on {} thread{}\n\n", describe_machine(),
+             describe_model(options.model, input), options.vertices, options.threads, options.threads == 1 ? "" : "s");
 
   TetOptions tet;
   tet.vertices = options.vertices;
@@ -127,9 +131,24 @@ void run(const Options& options) {
   }
 
   Table table;
-  table.columns = {"mesher", "vertices", "boundary", "tets", "bad", "dihedral_min", "dihedral_max", "radius_ratio_mean",
-                   "radius_ratio_min", "theta_min", "theta_min_free", "rms %", "rms / remesh", "volume %", "Euler", "s"};
-  for (const Result& result : results) table.rows.push_back(row(result, input, result.name == "Bisector" ? rms : 0, ours.volume));
+  table.columns = {"mesher",
+                   "vertices",
+                   "boundary",
+                   "tets",
+                   "bad",
+                   "dihedral_min",
+                   "dihedral_max",
+                   "radius_ratio_mean",
+                   "radius_ratio_min",
+                   "theta_min",
+                   "theta_min_free",
+                   "rms %",
+                   "rms / remesh",
+                   "volume %",
+                   "Euler",
+                   "s"};
+  for (const Result& result : results)
+    table.rows.push_back(row(result, input, result.name == "Bisector" ? rms : 0, ours.volume));
   fmt::print("{}\nremesh with as many boundary vertices: rms {:.4f} %\n", table.markdown(), rms);
   if (!options.csv.empty()) std::ofstream(options.csv) << table.csv();
   if (!options.json.empty()) std::ofstream(options.json) << table.json();

@@ -36,7 +36,8 @@ TetMesh tetgen_pq(const TriangleMesh& surface, double edge) {
     mesh.vertices.push_back({out.pointlist[3 * v], out.pointlist[3 * v + 1], out.pointlist[3 * v + 2]});
   for (int t = 0; t < out.numberoftetrahedra; ++t) {
     const int* v = out.tetrahedronlist + 4 * t;
-    mesh.tets.push_back({static_cast<Index>(v[0]), static_cast<Index>(v[1]), static_cast<Index>(v[2]), static_cast<Index>(v[3])});
+    mesh.tets.push_back(
+        {static_cast<Index>(v[0]), static_cast<Index>(v[1]), static_cast<Index>(v[2]), static_cast<Index>(v[3])});
   }
   return mesh;
 }

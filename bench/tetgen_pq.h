@@ -5,8 +5,8 @@
 
 namespace bisector::bench {
 
-// TetGen -pq (radius-edge ratio 2) of a closed surface, with volumes of at most that of a regular tetrahedron of edge length
-// `edge`.
+// TetGen -pq (radius-edge ratio 2) of a closed surface, with volumes of at most that of a regular tetrahedron of edge
+// length `edge`.
 TetMesh tetgen_pq(const TriangleMesh& surface, double edge);
 
 }  // namespace bisector::bench

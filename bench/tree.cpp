@@ -27,8 +27,8 @@ constexpr ThesisRow kThesis[]{{"hetre", 34542, 80, 26, 5.94, 0.015, 1.1},
 
 void print_row(const std::string& model, std::size_t points, std::size_t clusters, std::size_t branches,
                double segmentation, double branching, double modelling) {
-  fmt::print("| {} | {} | {} | {} | {:.3g} | {:.3g} | {:.3g} |\n", model, points, clusters, branches, segmentation, branching,
-             modelling);
+  fmt::print("| {} | {} | {} | {} | {:.3g} | {:.3g} | {:.3g} |\n", model, points, clusters, branches, segmentation,
+             branching, modelling);
 }
 
 }  // namespace
@@ -42,14 +42,18 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   try {
     const ThreadLimit limit(threads);
-    fmt::print("| scan | points | clusters | branches | segmentation s | branching s | modelling s |\n|---|---|---|---|---|---|---|\n");
+    fmt::print(
+        "| scan | points | clusters | branches | segmentation s | branching s | modelling s "
+        "|\n|---|---|---|---|---|---|---|\n");
     for (const ThesisRow& r : kThesis)
-      print_row(fmt::format("{} (thesis)", r.model), r.points, r.clusters, r.branches, r.segmentation, r.branching, r.modelling);
+      print_row(fmt::format("{} (thesis)", r.model), r.points, r.clusters, r.branches, r.segmentation, r.branching,
+                r.modelling);
     for (const std::string& scan : scans) {
       const std::vector<Vec3> points = read_points(scan);
       const TreeResult tree = reconstruct_tree(points);
       const TreeSeconds& s = tree.seconds;
-      print_row(scan, points.size(), tree.clusters, tree.branches.size(), s.graph + s.clusters, s.skeleton + s.refine, s.surfaces);
+      print_row(scan, points.size(), tree.clusters, tree.branches.size(), s.graph + s.clusters, s.skeleton + s.refine,
+                s.surfaces);
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "bench_tree: {}\n", error.what());

@@ -16,9 +16,10 @@ using Points = boost::property_map<Mesh, boost::vertex_point_t>::type;
 template <class Metric>
 std::vector<Index> regions(Mesh& mesh, const Metric& metric, std::size_t proxies, std::size_t iterations) {
   namespace np = CGAL::parameters;
-  CGAL::Variational_shape_approximation<Mesh, Points, Metric> approximation(mesh, get(CGAL::vertex_point, mesh), metric);
-  approximation.initialize_seeds(np::seeding_method(CGAL::Surface_mesh_approximation::HIERARCHICAL)
-                                     .max_number_of_proxies(proxies));
+  CGAL::Variational_shape_approximation<Mesh, Points, Metric> approximation(mesh, get(CGAL::vertex_point, mesh),
+                                                                            metric);
+  approximation.initialize_seeds(
+      np::seeding_method(CGAL::Surface_mesh_approximation::HIERARCHICAL).max_number_of_proxies(proxies));
   approximation.run(iterations);
   const auto map = mesh.add_property_map<Mesh::Face_index, std::size_t>("f:region", 0).first;
   approximation.proxy_map(map);

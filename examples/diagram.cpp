@@ -1,5 +1,5 @@
-// Computes the Voronoi diagram of seeds restricted to a surface: which triangles each cell meets, how large the cells are, and
-// the dual triangles. Usage: diagram IN SEEDS.xyz PAIRS.txt DUAL.off
+// Computes the Voronoi diagram of seeds restricted to a surface: which triangles each cell meets, how large the cells
+// are, and the dual triangles. Usage: diagram IN SEEDS.xyz PAIRS.txt DUAL.off
 #include <bisector/diagram.h>
 #include <bisector/error.h>
 #include <bisector/io.h>

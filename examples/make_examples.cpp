@@ -54,8 +54,15 @@ double blend(double a, double b, double k) {
 
 // The tail's axis: a Catmull-Rom curve that leaves at the back, swings out and comes up again to the shoulder.
 std::vector<Vec3> tail_axis() {
-  const std::array<Vec3, 9> control{{{6, 14, -14}, {0, 10, -26}, {-11, 7, -39}, {-26, 11, -44}, {-36, 25, -37},
-                                     {-36, 42, -23}, {-25, 53, -9}, {-10, 53, 0}, {4, 50, 4}}};
+  const std::array<Vec3, 9> control{{{6, 14, -14},
+                                     {0, 10, -26},
+                                     {-11, 7, -39},
+                                     {-26, 11, -44},
+                                     {-36, 25, -37},
+                                     {-36, 42, -23},
+                                     {-25, 53, -9},
+                                     {-10, 53, 0},
+                                     {4, 50, 4}}};
   constexpr int kSteps = 8;
   std::vector<Vec3> axis;
   for (std::size_t i = 1; i + 2 < control.size(); ++i)
@@ -71,15 +78,15 @@ std::vector<Vec3> tail_axis() {
 // Below zero inside. y is up, the cat looks along +z; x is its left.
 double cat(const Vec3& p) {
   static const std::vector<Vec3> tail = tail_axis();
-  const Vec3 m{std::abs(p.x), p.y, p.z};  // limbs in pairs
-  double d = limb(p, {0, 22, -12}, {0, 48, 4}, 20, 13);                               // body
-  d = blend(d, ball(m, {14, 14, -11}, {11, 14, 16}), 8);                              // haunches
-  d = blend(d, limb(m, {7, 44, 11}, {8.7, 5, 22}, 6.5, 4.4), 7);                      // fore legs
-  d = blend(d, ball(m, {8.8, 4, 25.5}, {4.8, 4, 6.5}), 3);                            // fore paws
-  d = blend(d, ball(m, {16, 4, 0}, {5.4, 4, 9}), 4);                                  // hind paws
+  const Vec3 m{std::abs(p.x), p.y, p.z};                          // limbs in pairs
+  double d = limb(p, {0, 22, -12}, {0, 48, 4}, 20, 13);           // body
+  d = blend(d, ball(m, {14, 14, -11}, {11, 14, 16}), 8);          // haunches
+  d = blend(d, limb(m, {7, 44, 11}, {8.7, 5, 22}, 6.5, 4.4), 7);  // fore legs
+  d = blend(d, ball(m, {8.8, 4, 25.5}, {4.8, 4, 6.5}), 3);        // fore paws
+  d = blend(d, ball(m, {16, 4, 0}, {5.4, 4, 9}), 4);              // hind paws
   double head = ball(p, {0, 69, 11}, {16, 13.5, 14});
-  head = blend(head, ball(m, {4.2, 63.5, 22.5}, {5, 4.2, 4.6}), 4);                   // muzzle
-  head = blend(head, limb(m, {8.5, 78, 9}, {12.3, 88, 7.5}, 6.5, 2.8), 4);            // ears
+  head = blend(head, ball(m, {4.2, 63.5, 22.5}, {5, 4.2, 4.6}), 4);         // muzzle
+  head = blend(head, limb(m, {8.5, 78, 9}, {12.3, 88, 7.5}, 6.5, 2.8), 4);  // ears
   d = blend(d, head, 9);
   double t = limb(p, tail[0], tail[1], 6, 6);
   for (std::size_t i = 1; i + 1 < tail.size(); ++i) t = std::min(t, limb(p, tail[i], tail[i + 1], 6, 6));

@@ -1,5 +1,5 @@
-// Divides a mesh into the planes, quadrics and tori that it is made of, moves its vertices onto them and writes a group of faces
-// for each. Usage: segment IN OUT.obj ERROR, where ERROR is in percent of the bounding box's diagonal
+// Divides a mesh into the planes, quadrics and tori that it is made of, moves its vertices onto them and writes a group
+// of faces for each. Usage: segment IN OUT.obj ERROR, where ERROR is in percent of the bounding box's diagonal
 #include <bisector/error.h>
 #include <bisector/io.h>
 #include <bisector/segment.h>

@@ -1,4 +1,5 @@
-// The cells of a Voronoi diagram cut up by the triangles or tetrahedra of its domain, and the dual triangles: plain data.
+// The cells of a Voronoi diagram cut up by the triangles or tetrahedra of its domain, and the dual triangles: plain
+// data.
 #pragma once
 
 #include <array>
@@ -15,7 +16,8 @@ enum class NeighbourSource {
   delaunay,  // Delaunay 1-ring; falls back to `nearest` for seeds in a plane
 };
 
-// Labels of polygon edges: a seed (the edge is shared with its cell), or edge k of the triangle, from corner k to corner k + 1.
+// Labels of polygon edges: a seed (the edge is shared with its cell), or edge k of the triangle, from corner k to
+// corner k + 1.
 inline constexpr Index kEdgeLabel = 0x80000000u;
 inline bool is_edge(Index label) { return label & kEdgeLabel; }
 
@@ -30,32 +32,34 @@ struct RestrictedPolygons {
   };
   std::vector<Pair> pairs;
   std::vector<std::size_t> offsets{0};  // polygon k has the entries offsets[k] .. offsets[k + 1)
-  // Entry e: the counter-clockwise polygon's vertex and the label of the edge that starts there. The vertex is where the
-  // preceding label and this one meet.
+  // Entry e: the counter-clockwise polygon's vertex and the label of the edge that starts there. The vertex is where
+  // the preceding label and this one meet.
   std::vector<Index> labels;
   std::vector<Vec3> vertices;
 };
 
-// The non-empty intersections of cells and tetrahedra, sorted by (tetrahedron, cell). Where the density is uniform, cells that do
-// not meet the boundary are not cut up: they have the tetrahedron kNone and come last. A polyhedron is kept in dual form: the labels
-// of its facets, ascending (facets of the tetrahedron after seeds), and its vertices as triples of positions in that list.
+// The non-empty intersections of cells and tetrahedra, sorted by (tetrahedron, cell). Where the density is uniform,
+// cells that do not meet the boundary are not cut up: they have the tetrahedron kNone and come last. A polyhedron is
+// kept in dual form: the labels of its facets, ascending (facets of the tetrahedron after seeds), and its vertices as
+// triples of positions in that list.
 struct ClippedPolyhedra {
   struct Pair {
     Index tet, cell;
   };
   std::vector<Pair> pairs;
-  std::vector<std::size_t> label_offsets{0};   // of pair k: label_offsets[k] .. label_offsets[k + 1)
+  std::vector<std::size_t> label_offsets{0};  // of pair k: label_offsets[k] .. label_offsets[k + 1)
   std::vector<Index> labels;
   std::vector<std::size_t> vertex_offsets{0};  // likewise
-  // The three planes of a vertex, counter-clockwise around it seen from outside, the first the least; sorted in each pair.
+  // The three planes of a vertex, counter-clockwise around it seen from outside, the first the least; sorted in each
+  // pair.
   std::vector<std::array<std::uint16_t, 3>> triples;
-  std::vector<Vec3> vertices;                  // where the planes of each triple meet
+  std::vector<Vec3> vertices;  // where the planes of each triple meet
 };
 
 // The restricted Delaunay triangulation.
 struct Dual {
-  // Triples of seeds whose cells share a vertex of the diagram, each oriented as the surface at its first such vertex. Sorted as
-  // ascending triples, without repeats.
+  // Triples of seeds whose cells share a vertex of the diagram, each oriented as the surface at its first such vertex.
+  // Sorted as ascending triples, without repeats.
   std::vector<Triangle> triangles;
   // How many vertices of the diagram each triple has; 1 where the topological ball property holds.
   std::vector<Index> multiplicity;

@@ -24,7 +24,7 @@ struct DeviceRequest {
   enum class Kind {
     automatic,  // the best GPU, or the CPU if there is none or it fails
     cpu,
-    vulkan,     // the Vulkan device that `index` or `uuid` names, or else the best one, and no other
+    vulkan,  // the Vulkan device that `index` or `uuid` names, or else the best one, and no other
   };
 
   Kind kind = Kind::automatic;
@@ -47,27 +47,28 @@ struct ComputeOptions {
 
 // A Vulkan device as `bisector devices` lists it.
 struct DeviceDescription {
-  unsigned index = 0;        // in the loader's order
-  std::string uuid;          // 32 hexadecimal digits in groups of 8-4-4-4-12
+  unsigned index = 0;  // in the loader's order
+  std::string uuid;    // 32 hexadecimal digits in groups of 8-4-4-4-12
   std::string name;
-  std::string kind;          // "discrete", "integrated", "virtual", "software" or "other"
-  std::string driver;        // name and version
-  std::string api;           // "1.3.230"
-  std::uint64_t memory = 0;  // bytes, of the largest device-local heap
-  bool float64 = false;      // double precision that passed the self-test
+  std::string kind;                   // "discrete", "integrated", "virtual", "software" or "other"
+  std::string driver;                 // name and version
+  std::string api;                    // "1.3.230"
+  std::uint64_t memory = 0;           // bytes, of the largest device-local heap
+  bool float64 = false;               // double precision that passed the self-test
   std::vector<std::string> features;  // optional ones that Bisector uses: "float64", ...
-  std::string rejected;      // why it cannot be used; empty if it can
+  std::string rejected;               // why it cannot be used; empty if it can
 };
 
 struct DeviceList {
   std::vector<DeviceDescription> devices;
-  std::string problem;       // why there are none: no loader, no driver, built without Vulkan
+  std::string problem;  // why there are none: no loader, no driver, built without Vulkan
 };
 
 // Never throws for lack of a loader, a driver or a device.
 BISECTOR_API DeviceList list_devices();
 
-// The best usable device of a list that is not software; nothing if there is none. With `double_` only those count that have it.
+// The best usable device of a list that is not software; nothing if there is none. With `double_` only those count that
+// have it.
 BISECTOR_API std::optional<DeviceRequest> best_gpu(DeviceList list, Precision precision = Precision::automatic);
 
 struct BackendDescription {

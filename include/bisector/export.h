@@ -1,5 +1,5 @@
-// Marks what leaves the library; everything else is hidden. Classes that are thrown carry the mark, too: a handler in another
-// shared object then recognises them.
+// Marks what leaves the library; everything else is hidden. Classes that are thrown carry the mark, too: a handler in
+// another shared object then recognises them.
 #pragma once
 
 #if defined(__GNUC__)

@@ -21,8 +21,8 @@ enum class FeatureKind : std::uint8_t {
 
 // A maximal chain of feature edges without a corner inside.
 struct FeatureCurve {
-  std::vector<Index> vertices;  // mesh vertices in order; a closed curve does not repeat its first
-  bool closed = false;          // if not, both ends are corners, perhaps the same one
+  std::vector<Index> vertices;             // mesh vertices in order; a closed curve does not repeat its first
+  bool closed = false;                     // if not, both ends are corners, perhaps the same one
   FeatureKind kind = FeatureKind::crease;  // of all its edges
 };
 
@@ -40,15 +40,15 @@ enum class FeatureMode {
 
 struct FeatureOptions {
   FeatureMode mode = FeatureMode::automatic;
-  double angle = 40;         // degrees, in (0, 180); with FeatureMode::degrees
-  double corner_angle = 50;  // degrees, in (0, 180): a curve that turns by more has a corner there
+  double angle = 40;                        // degrees, in (0, 180); with FeatureMode::degrees
+  double corner_angle = 50;                 // degrees, in (0, 180): a curve that turns by more has a corner there
   std::vector<std::array<Index, 2>> given;  // edges to take whatever the mode; either vertex first
 };
 
 // Finds the features of a mesh. Any soup is allowed, but duplicated vertices make borders: weld first (repair.h).
-// Whether two triangles are oriented alike does not matter. Exactly collinear triangles, and slivers that are thinner than 1e-4
-// of the bounding box's diagonal and 0.02 of their length, have no normal of their own: an edge beside one is compared
-// with what lies beyond it.
+// Whether two triangles are oriented alike does not matter. Exactly collinear triangles, and slivers that are thinner
+// than 1e-4 of the bounding box's diagonal and 0.02 of their length, have no normal of their own: an edge beside one is
+// compared with what lies beyond it.
 //
 // Borders and edges of more than two triangles are features in every mode, since borders of a result must lie on those
 // of the input. Edges between labels and TriangleMesh::feature_edges count in all modes but `none`.

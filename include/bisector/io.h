@@ -1,5 +1,5 @@
-// Mesh files. Surfaces: OFF, OBJ, PLY (ASCII and binary) and STL (ASCII and binary). Tetrahedra: Medit .mesh, Gmsh .msh,
-// VTK .vtk and .vtu.
+// Mesh files. Surfaces: OFF, OBJ, PLY (ASCII and binary) and STL (ASCII and binary). Tetrahedra: Medit .mesh, Gmsh
+// .msh, VTK .vtk and .vtu.
 #pragma once
 
 #include <array>
@@ -46,8 +46,8 @@ BISECTOR_API void write_mesh(const std::string& path, const TriangleMesh& mesh, 
 struct PolygonMesh {
   std::vector<Vec3> vertices;
   Csr<Index> polygons;
-  std::vector<Index> labels;                       // one per polygon, or empty; property "label"
-  std::vector<std::array<unsigned char, 3>> colours;  // one per polygon, or empty: red, green, blue
+  std::vector<Index> labels;                             // one per polygon, or empty; property "label"
+  std::vector<std::array<unsigned char, 3>> colours;     // one per polygon, or empty: red, green, blue
   std::vector<std::array<Index, 2>> feature_edges = {};  // element "edge", or empty
 };
 BISECTOR_API void write_polygons(const std::string& path, const PolygonMesh& mesh);

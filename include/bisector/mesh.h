@@ -1,5 +1,5 @@
-// Points, triangle meshes, tetrahedral meshes and sparse rows: plain data without arithmetic, so that results never depend on
-// how the including program is compiled.
+// Points, triangle meshes, tetrahedral meshes and sparse rows: plain data without arithmetic, so that results never
+// depend on how the including program is compiled.
 #pragma once
 
 #include <array>
@@ -39,11 +39,12 @@ using Tetrahedron = std::array<Index, 4>;
 // Tetrahedra over shared vertices. Facet k of a tetrahedron is the one opposite its corner k.
 struct TetMesh {
   std::vector<Vec3> vertices;
-  std::vector<Tetrahedron> tets;  // det(b - a, c - a, d - a) > 0 unless said otherwise
+  std::vector<Tetrahedron> tets;           // det(b - a, c - a, d - a) > 0 unless said otherwise
   std::vector<std::int32_t> regions = {};  // of each tetrahedron, e.g. its material; or empty
-  std::vector<Triangle> boundary = {};     // marked triangles, on the boundary counter-clockwise seen from outside; or empty
-  std::vector<std::int32_t> boundary_labels = {};       // of each marked triangle, or empty
-  std::vector<std::array<Index, 2>> feature_edges = {}; // edges marked as features
+  std::vector<Triangle> boundary =
+      {};  // marked triangles, on the boundary counter-clockwise seen from outside; or empty
+  std::vector<std::int32_t> boundary_labels = {};        // of each marked triangle, or empty
+  std::vector<std::array<Index, 2>> feature_edges = {};  // edges marked as features
 };
 
 // Compressed sparse rows: row i is values[offsets[i] .. offsets[i + 1]).

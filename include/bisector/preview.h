@@ -11,10 +11,10 @@
 namespace bisector {
 
 struct PreviewOptions {
-  int width = 1200, height = 900;         // pixels
-  double azimuth = 30, elevation = 20;    // of the camera about the model's centre, degrees; y is up
-  bool edges = true;                      // draw polygon edges
-  bool outlines = false;                  // draw the lines where the colour changes
+  int width = 1200, height = 900;                     // pixels
+  double azimuth = 30, elevation = 20;                // of the camera about the model's centre, degrees; y is up
+  bool edges = true;                                  // draw polygon edges
+  bool outlines = false;                              // draw the lines where the colour changes
   std::vector<std::array<unsigned char, 3>> colours;  // per polygon; empty: one neutral colour
 };
 

@@ -28,17 +28,17 @@ struct MeshTopology {
 BISECTOR_API MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
 struct QualityReport {
-  double q_min = 0, q_ave = 0;           // Q = 6/sqrt(3) S/(p h): area, half-perimeter, longest edge; 1 is equilateral
-  double theta_min = 0;                  // smallest angle, degrees
-  double theta_min_ave = 0;              // mean over triangles of their smallest angle, degrees
-  double theta_max = 0;                  // largest angle, degrees
-  double theta_below_30 = 0;             // percent of triangles with an angle under 30 degrees
+  double q_min = 0, q_ave = 0;  // Q = 6/sqrt(3) S/(p h): area, half-perimeter, longest edge; 1 is equilateral
+  double theta_min = 0;         // smallest angle, degrees
+  double theta_min_ave = 0;     // mean over triangles of their smallest angle, degrees
+  double theta_max = 0;         // largest angle, degrees
+  double theta_below_30 = 0;    // percent of triangles with an angle under 30 degrees
   // The same without what two of mesh.feature_edges impose on a triangle: its Q, and the angle between them.
   double q_min_free = 0, theta_min_free = 0, theta_max_free = 0;
-  double valence6 = 0;                   // fraction of interior vertices with six neighbours
+  double valence6 = 0;                              // fraction of interior vertices with six neighbours
   double edge_min = 0, edge_ave = 0, edge_max = 0;  // lengths, in the mesh's unit
   double area = 0;
-  std::size_t zero_area = 0;             // triangles without area: Q 0, angles 0 and 180, left out of the two means
+  std::size_t zero_area = 0;  // triangles without area: Q 0, angles 0 and 180, left out of the two means
   MeshTopology topology;
 };
 
@@ -59,7 +59,7 @@ struct DistanceReport {
   // two one-sided values; `max`, over the samples and vertices of both sides, is the Hausdorff distance from below.
   double mean = 0, rms = 0, max = 0;
   double rms_to_reference = 0, rms_from_reference = 0;
-  std::size_t samples = 0;   // on each side
+  std::size_t samples = 0;  // on each side
 };
 
 // Area-uniform stratified samples plus the vertices of each side; reproducible from `random_seed`, for any thread

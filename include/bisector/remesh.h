@@ -56,23 +56,23 @@ struct RemeshOptions {
   // One of these three. Counts are at least 4; edge_length is the wanted mean, in the mesh's unit.
   std::size_t vertices = 0;
   double edge_length = 0;
-  std::vector<Vec3> seeds;                 // start from these, in one level; topology control may add as many as it takes
+  std::vector<Vec3> seeds;  // start from these, in one level; topology control may add as many as it takes
 
   SizingOptions sizing;
   FeatureOptions features;
   std::uint64_t random_seed = 1;
-  int iterations = 100;                    // at most, per level; fewer on the coarsest and the finest of several
-  double tolerance = 1e-6;                 // a level ends when the energy falls by less than this share per step
-  int levels = 0;                          // of the multilevel start; 0: as many as the count allows, at most 3
+  int iterations = 100;     // at most, per level; fewer on the coarsest and the finest of several
+  double tolerance = 1e-6;  // a level ends when the energy falls by less than this share per step
+  int levels = 0;           // of the multilevel start; 0: as many as the count allows, at most 3
   Energy energy = Energy::automatic;
   TopologyControl topology = TopologyControl::enforce;
-  double min_angle = 40;                   // degrees; goal of the final pass (improve.h), 0: none
-  bool fit = false;                        // move the result's vertices off the surface, nearer to it on both sides (fit.h)
-  // Length within which borders are joined (weld.h). Without a value vertices of borders at the same point are joined, if that
-  // closes borders and makes no edge non-manifold.
+  double min_angle = 40;  // degrees; goal of the final pass (improve.h), 0: none
+  bool fit = false;       // move the result's vertices off the surface, nearer to it on both sides (fit.h)
+  // Length within which borders are joined (weld.h). Without a value vertices of borders at the same point are joined,
+  // if that closes borders and makes no edge non-manifold.
   std::optional<double> weld;
   ComputeOptions compute;
-  unsigned threads = 0;                    // 0: all cores
+  unsigned threads = 0;  // 0: all cores
 };
 
 // What the final pass did to bad triangles and irregular vertices.
@@ -91,9 +91,9 @@ struct FitReport {
     double to_reference = 0, from_reference = 0;
   };
   Distance before, after;
-  int iterations = 0;         // steps taken
-  std::size_t damped = 0;     // vertices that the quality of a triangle held back in the last step
-  std::size_t restored = 0;   // vertices put back because triangles would have intersected
+  int iterations = 0;        // steps taken
+  std::size_t damped = 0;    // vertices that the quality of a triangle held back in the last step
+  std::size_t restored = 0;  // vertices put back because triangles would have intersected
 };
 
 // A cell, edge or vertex of the diagram that breaks the topological ball property.
@@ -104,7 +104,7 @@ struct TopologyFault {
 };
 struct RemeshSeconds {
   double total = 0, prepare = 0, lbfgs = 0, features = 0, topology = 0, improve = 0, fit = 0, extract = 0;
-  DiagramSeconds diagrams;        // of the optimiser, summed over its evaluations
+  DiagramSeconds diagrams;  // of the optimiser, summed over its evaluations
 };
 
 struct FeatureResult {
@@ -115,8 +115,8 @@ struct FeatureResult {
 };
 
 struct RemeshResult {
-  // The restricted Delaunay triangulation of the seeds that own a cell. Its feature_edges are the edges along the input's
-  // features; labels are those of the input's triangles in which its dual vertices lie.
+  // The restricted Delaunay triangulation of the seeds that own a cell. Its feature_edges are the edges along the
+  // input's features; labels are those of the input's triangles in which its dual vertices lie.
   TriangleMesh mesh;
   std::vector<SeedPlace> places;  // of mesh's vertices
   MeshTopology topology;          // of mesh
@@ -126,19 +126,19 @@ struct RemeshResult {
   std::size_t divided = 0;        // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
   std::vector<TopologyFault> faults;  // where it fails; indices are those of mesh's vertices, kNone if none
   FeatureResult features;
-  bool noisy = false;             // the input's normals were taken for noise
-  WeldResult welded;              // without the mesh
-  std::size_t wanted = 0;         // vertices
-  double edge_length = 0;         // aimed at where the density is 1
+  bool noisy = false;      // the input's normals were taken for noise
+  WeldResult welded;       // without the mesh
+  std::size_t wanted = 0;  // vertices
+  double edge_length = 0;  // aimed at where the density is 1
   ImproveReport improved;
   FitReport fitted;
-  int iterations = 0;             // accepted steps, all levels
+  int iterations = 0;  // accepted steps, all levels
   int evaluations = 0;
-  double energy = 0;              // CVT energy of the final seeds
-  double gradient_norm = 0;       // Euclidean norm over all seeds (tangential where constrained)
-  Certification certification;    // of the final diagram
-  std::size_t untiled = 0;        // triangles that fail the tiling check of the final diagram: 0, or the run is wrong
-  BackendDescription device;      // that computed the final diagram
+  double energy = 0;            // CVT energy of the final seeds
+  double gradient_norm = 0;     // Euclidean norm over all seeds (tangential where constrained)
+  Certification certification;  // of the final diagram
+  std::size_t untiled = 0;      // triangles that fail the tiling check of the final diagram: 0, or the run is wrong
+  BackendDescription device;    // that computed the final diagram
   RemeshSeconds seconds;
 };
 

@@ -33,8 +33,8 @@ struct WeldResult {
 BISECTOR_API WeldResult weld(const TriangleMesh& mesh, double tolerance);
 
 // Turns triangles over so that neighbours across edges of two triangles run in opposite directions there, wherever that
-// can be had; each part that hangs together in this way keeps the orientation of most of its triangles. Every index must
-// be below `vertex_count`.
+// can be had; each part that hangs together in this way keeps the orientation of most of its triangles. Every index
+// must be below `vertex_count`.
 BISECTOR_API void orient(std::vector<Triangle>& triangles, std::size_t vertex_count);
 
 }  // namespace bisector

@@ -1,5 +1,5 @@
-// Variational segmentation of a mesh into regions of planes, quadrics and tori (Yan Dong-Ming, Variational Shape Segmentation
-// and Mesh Generation, 2010, chapter 2).
+// Variational segmentation of a mesh into regions of planes, quadrics and tori (Yan Dong-Ming, Variational Shape
+// Segmentation and Mesh Generation, 2010, chapter 2).
 #pragma once
 
 #include <array>
@@ -37,8 +37,8 @@ enum class SurfaceType {
 // In lower case, words joined by '_', as in reports.
 BISECTOR_API const char* name_of(SurfaceType type);
 
-// The zero set of c0 + c1 x + c2 y + c3 z + c4 x^2 + c5 xy + c6 xz + c7 y^2 + c8 yz + c9 z^2. A plane has c4 = ... = c9 = 0.
-// The scale of c is of no meaning.
+// The zero set of c0 + c1 x + c2 y + c3 z + c4 x^2 + c5 xy + c6 xz + c7 y^2 + c8 yz + c9 z^2. A plane has c4 = ... = c9
+// = 0. The scale of c is of no meaning.
 struct Quadric {
   std::array<double, 10> c{};
 };
@@ -75,11 +75,11 @@ struct Torus {
 
 // A quadric of another type, in canonical form: an equation in x, y, z along `axes` from `centre`, with lengths a, b, c
 // (0 where the equation has none).
-//   ellipsoid, hyperboloids      x^2/a^2 + y^2/b^2 + z^2/c^2 = 1, a >= b >= c; x^2/a^2 + y^2/b^2 - z^2/c^2 = +-1, a >= b
-//   elliptic cone                x^2/a^2 + y^2/b^2 = z^2, c = 1: ratios
-//   paraboloids                  x^2/(2a) +- y^2/(2b) = z: radii of curvature at the vertex
-//   elliptic, hyperbolic, parabolic cylinder  x^2/a^2 +- y^2/b^2 = 1, x^2/(2a) = z (rulings along y)
-//   plane pair                   x^2/a^2 = y^2/b^2, a^2 + b^2 = 1: ratios; or parallel ones x^2 = a^2
+//   ellipsoid, hyperboloids      x^2/a^2 + y^2/b^2 + z^2/c^2 = 1, a >= b >= c; x^2/a^2 + y^2/b^2 - z^2/c^2 = +-1, a >=
+//   b elliptic cone                x^2/a^2 + y^2/b^2 = z^2, c = 1: ratios paraboloids                  x^2/(2a) +-
+//   y^2/(2b) = z: radii of curvature at the vertex elliptic, hyperbolic, parabolic cylinder  x^2/a^2 +- y^2/b^2 = 1,
+//   x^2/(2a) = z (rulings along y) plane pair                   x^2/a^2 = y^2/b^2, a^2 + b^2 = 1: ratios; or parallel
+//   ones x^2 = a^2
 struct GeneralQuadric {
   SurfaceType type = SurfaceType::ellipsoid;  // ellipsoid to plane_pair
   Quadric polynomial;                         // with a gradient of about length 1 on the surface
@@ -95,11 +95,12 @@ BISECTOR_API SurfaceType type_of(const Primitive& primitive);
 // The surface's polynomial, with a gradient of about length 1 on the surface; a torus has none of second degree.
 BISECTOR_API std::optional<Quadric> quadric_of(const Primitive& primitive);
 
-// Distance to the surface: exact for plane, sphere, cylinder, cone (both nappes) and torus; for general quadrics Taubin's
-// second-order approximation (1993), which lies between 0 and the exact one.
+// Distance to the surface: exact for plane, sphere, cylinder, cone (both nappes) and torus; for general quadrics
+// Taubin's second-order approximation (1993), which lies between 0 and the exact one.
 BISECTOR_API double distance(const Primitive& primitive, const Vec3& p);
 
-// The nearest point of the surface; one of them where several are equally near, p itself if the surface has no real point.
+// The nearest point of the surface; one of them where several are equally near, p itself if the surface has no real
+// point.
 BISECTOR_API Vec3 foot_point(const Primitive& primitive, const Vec3& p);
 
 enum class SegmentSurfaces {
@@ -116,15 +117,15 @@ enum class SegmentStart {
 
 struct SegmentOptions {
   std::size_t proxies = 0;  // regions wanted, or 0: as many as `error` takes
-  double error = 0.1;       // without `proxies`: root mean square distance to the proxies at most, percent of the diagonal of
-                            // the vertices' bounding box
+  double error = 0.1;  // without `proxies`: root mean square distance to the proxies at most, percent of the diagonal
+                       // of the vertices' bounding box
   SegmentSurfaces surfaces = SegmentSurfaces::all;
   SegmentStart start = SegmentStart::merging;
-  int iterations = 30;      // Lloyd steps at most, each time
-  double smooth = 1;        // weight of the borders' length; 0: borders are left as they are. Halved where the root mean
-                            // square distance would grow by more than 5 percent
-  int fuzzy_rings = 1;      // triangles so many steps from a border may change sides
-  bool project = false;     // move the vertices onto the proxies
+  int iterations = 30;   // Lloyd steps at most, each time
+  double smooth = 1;     // weight of the borders' length; 0: borders are left as they are. Halved where the root mean
+                         // square distance would grow by more than 5 percent
+  int fuzzy_rings = 1;   // triangles so many steps from a border may change sides
+  bool project = false;  // move the vertices onto the proxies
   std::uint64_t random_seed = 1;  // of the random start
 };
 
@@ -144,21 +145,22 @@ struct SegmentResult {
   std::vector<Index> labels;           // region of each triangle, in descending order of area
   std::vector<SegmentRegion> regions;  // connected through edges, each of at least one triangle
   double rms = 0;                      // over the whole mesh, a length
-  // The sum of squared distances times areas, of the mesh scaled to unit longest side, before and after each step of each
-  // Lloyd iteration.
+  // The sum of squared distances times areas, of the mesh scaled to unit longest side, before and after each step of
+  // each Lloyd iteration.
   std::vector<std::vector<double>> energies;
-  int iterations = 0;                  // Lloyd steps in all
+  int iterations = 0;  // Lloyd steps in all
   std::size_t insertions = 0, merges = 0, teleportations = 0, deletions = 0;
-  std::size_t evaluations = 0;         // distances of a triangle to a proxy
+  std::size_t evaluations = 0;                 // distances of a triangle to a proxy
   double border_before = 0, border_after = 0;  // length of the borders between regions before and after smoothing
-  double rms_before = 0;               // before smoothing, a length
-  double smooth = 0;                   // the weight that borders were smoothed with
-  std::vector<Vec3> projected;         // the vertices on the proxies, with SegmentOptions::project; shared ones averaged
+  double rms_before = 0;                       // before smoothing, a length
+  double smooth = 0;                           // the weight that borders were smoothed with
+  std::vector<Vec3> projected;  // the vertices on the proxies, with SegmentOptions::project; shared ones averaged
   SegmentSeconds seconds;
 };
 
 // Any mesh: open, non-manifold, of several components (each needs a region of its own), with triangles of no area.
 // Throws Error for a mesh without area, fewer proxies than components, more than triangles, and options out of range.
-BISECTOR_API SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context = {});
+BISECTOR_API SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options,
+                                   const Context& context = {});
 
 }  // namespace bisector

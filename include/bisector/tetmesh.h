@@ -28,7 +28,8 @@ struct TetSizingOptions {
   // tetrahedra (in which these lengths are linear), or of the surface that they were made of, and edges are as long as
   // its power -1/5. Gradation must not be 0.
   SizingOptions field;
-  SizeSamples sizes;  // if not empty, instead of the field's kind: edge lengths, up to a common factor if a count is asked for
+  SizeSamples
+      sizes;  // if not empty, instead of the field's kind: edge lengths, up to a common factor if a count is asked for
 };
 
 struct TetOptions {
@@ -48,14 +49,14 @@ struct TetOptions {
   // point.
   std::optional<double> weld;
   ComputeOptions compute;
-  unsigned threads = 0;      // 0: all cores
+  unsigned threads = 0;  // 0: all cores
 };
 
 // The shapes of the tetrahedra of a mesh.
 struct TetShapes {
-  double dihedral_min = 0, dihedral_max = 0;  // degrees
+  double dihedral_min = 0, dihedral_max = 0;           // degrees
   double radius_ratio_min = 0, radius_ratio_mean = 0;  // 3 r_in / R_circ
-  std::size_t below = 0;                      // tetrahedra with a dihedral angle below the goal
+  std::size_t below = 0;                               // tetrahedra with a dihedral angle below the goal
 };
 
 // What the removal of slivers did.
@@ -75,31 +76,33 @@ struct TetResult {
   // The boundary's vertices first; boundary triangles with the labels of the input's, feature edges, and regions.
   TetMesh mesh;
   std::size_t boundary_vertices = 0;
-  RemeshResult boundary;          // without its mesh
-  bool delaunay = false;          // the tetrahedra were Delaunay before slivers were removed
-  std::size_t steiner_points = 0; // vertices that TetGen had to add, where they were not
-  std::size_t refused_sites = 0;  // sites inside that could not become vertices then
+  RemeshResult boundary;           // without its mesh
+  bool delaunay = false;           // the tetrahedra were Delaunay before slivers were removed
+  std::size_t steiner_points = 0;  // vertices that TetGen had to add, where they were not
+  std::size_t refused_sites = 0;   // sites inside that could not become vertices then
   TetImproveReport improved;
-  MeshTopology input_topology;    // of the solid's boundary
-  double volume = 0;              // of the solid
+  MeshTopology input_topology;  // of the solid's boundary
+  double volume = 0;            // of the solid
   std::size_t background_tets = 0;
-  std::size_t boundary_sites = 0; // whose cells met the boundary at the end of the unconstrained phase
-  std::size_t wanted = 0;         // vertices
-  double edge_length = 0;         // aimed at
-  int iterations = 0;             // accepted steps, all phases
+  std::size_t boundary_sites = 0;  // whose cells met the boundary at the end of the unconstrained phase
+  std::size_t wanted = 0;          // vertices
+  double edge_length = 0;          // aimed at
+  int iterations = 0;              // accepted steps, all phases
   int evaluations = 0;
-  double energy = 0;              // CVT energy of the final seeds, before slivers were removed
+  double energy = 0;  // CVT energy of the final seeds, before slivers were removed
   double gradient_norm = 0;
-  Certification certification;    // of the final diagram
-  std::size_t untiled = 0;        // tetrahedra and cells that fail the tiling check of the final diagram: 0, or the run is wrong
-  BackendDescription device;      // that computed the final diagram
+  Certification certification;  // of the final diagram
+  std::size_t untiled =
+      0;  // tetrahedra and cells that fail the tiling check of the final diagram: 0, or the run is wrong
+  BackendDescription device;  // that computed the final diagram
   TetSeconds seconds;
 };
 
 // Meshes the inside of a closed surface. Throws Error if it is open, not manifold or crosses itself, on options that
 // contradict each other or the input, and if Bisector was built without TetGen; DeviceError if the device asked for is
 // missing or fails; Cancelled.
-BISECTOR_API TetResult tetrahedralise(const TriangleMesh& surface, const TetOptions& options, const Context& context = {});
+BISECTOR_API TetResult tetrahedralise(const TriangleMesh& surface, const TetOptions& options,
+                                      const Context& context = {});
 
 // Meshes the domain of a tetrahedral mesh anew, whose boundary must be a surface as above. Each tetrahedron of the
 // result has the region in which its centroid lies; interfaces between regions are not kept otherwise.

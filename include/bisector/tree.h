@@ -1,5 +1,5 @@
-// Reconstruction of the branches of a leafless tree from a laser scan (Yan Dong-Ming, Variational Shape Segmentation and Mesh
-// Generation, 2010, chapter 3).
+// Reconstruction of the branches of a leafless tree from a laser scan (Yan Dong-Ming, Variational Shape Segmentation
+// and Mesh Generation, 2010, chapter 3).
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,8 @@ struct TreeOptions {
   TreeComponents components = TreeComponents::bridge;
 };
 
-// Clamped, parameter in [0, 1] (others are clamped to it). Degree 3, less where there are fewer than four control points.
+// Clamped, parameter in [0, 1] (others are clamped to it). Degree 3, less where there are fewer than four control
+// points.
 struct BSplineCurve {
   int degree = 3;
   std::vector<double> knots;  // control points + degree + 1, ascending
@@ -62,13 +63,13 @@ struct TreeNode {
 };
 
 struct TreeBranch {
-  std::vector<Index> nodes;  // from the root on the parent's axis (or the ground) to the tip
-  Index parent = kNone;      // branch, of a lower number; kNone: a trunk
-  int order = 0;             // 0: trunk, 1: branches on it, ...
-  double length = 0;         // of the axis
+  std::vector<Index> nodes;                // from the root on the parent's axis (or the ground) to the tip
+  Index parent = kNone;                    // branch, of a lower number; kNone: a trunk
+  int order = 0;                           // 0: trunk, 1: branches on it, ...
+  double length = 0;                       // of the axis
   double base_radius = 0, tip_radius = 0;  // where the branch leaves its parent's surface, and at its end
   double volume = 0, area = 0;             // of what is outside the parent, as cone frusta along the axis
-  std::size_t points = 0;    // that belong to it
+  std::size_t points = 0;                  // that belong to it
   BranchSurface surface;
 };
 
@@ -81,13 +82,13 @@ struct TreeResult {
   std::vector<Index> cluster, branch;
   std::size_t clusters = 0, fixed_clusters = 0;  // in all; tight cylinders
   std::vector<TreeNode> skeleton;
-  std::vector<TreeBranch> branches;    // parents before children
-  std::size_t components = 0;          // of the scan
-  std::vector<double> bridges;         // lengths of the shortest gaps between them, if they were bridged
-  std::size_t ground_points = 0;       // below the ground, left out
-  std::size_t duplicate_points = 0;    // at the place of another
+  std::vector<TreeBranch> branches;        // parents before children
+  std::size_t components = 0;              // of the scan
+  std::vector<double> bridges;             // lengths of the shortest gaps between them, if they were bridged
+  std::size_t ground_points = 0;           // below the ground, left out
+  std::size_t duplicate_points = 0;        // at the place of another
   std::size_t small_component_points = 0;  // in components too small for a tree of their own, left out
-  double noise = 0;                    // standard deviation of points off thick branches
+  double noise = 0;                        // standard deviation of points off thick branches
   TreeSeconds seconds;
 };
 

@@ -1,4 +1,5 @@
-// The version of the headers. CMakeLists.txt reads it from here. Versions with the same major and minor number link alike.
+// The version of the headers. CMakeLists.txt reads it from here. Versions with the same major and minor number link
+// alike.
 #pragma once
 
 #define BISECTOR_VERSION_MAJOR 0

@@ -14,8 +14,8 @@ namespace bisector {
 DeviceSeconds& operator+=(DeviceSeconds& a, const DeviceSeconds& b);
 DiagramSeconds& operator+=(DiagramSeconds& a, const DiagramSeconds& b);
 
-// A backend holds one domain, which must outlive it: a surface, or a solid. Every backend returns the same pairs and labels for the
-// same seeds; moments agree to rounding, and runs repeat bit for bit.
+// A backend holds one domain, which must outlive it: a surface, or a solid. Every backend returns the same pairs and
+// labels for the same seeds; moments agree to rounding, and runs repeat bit for bit.
 class Backend {
  public:
   virtual ~Backend() = default;
@@ -32,9 +32,9 @@ class Backend {
   // Energies nearer than this, relative, may compare wrongly because of rounding; 0 if comparing them is good enough.
   virtual double energy_noise() const { return 0; }
 
-  // Computes the diagram of the seeds: its moments and the parts of it that are wanted. Other parts are emptied; memory is used again.
-  // Wanting the dual includes the polygons. Only a backend of a solid has polyhedra. Throws Error if there are no seeds; after a
-  // DeviceError neither diagram nor backend are good for anything.
+  // Computes the diagram of the seeds: its moments and the parts of it that are wanted. Other parts are emptied; memory
+  // is used again. Wanting the dual includes the polygons. Only a backend of a solid has polyhedra. Throws Error if
+  // there are no seeds; after a DeviceError neither diagram nor backend are good for anything.
   EvaluationReport evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram);
 
   // Until every caller holds a Diagram.
@@ -56,8 +56,8 @@ class Backend {
   Want offers_;  // parts that compute() can set
 };
 
-// A backend whose cells are those of a solid: masses, centroids and energies are integrals over volumes, and triangles and
-// polygons those of the solid's boundary.
+// A backend whose cells are those of a solid: masses, centroids and energies are integrals over volumes, and triangles
+// and polygons those of the solid's boundary.
 class SolidBackend : public Backend {
  public:
   const Solid& solid() const { return solid_; }

@@ -10,7 +10,8 @@
 
 namespace bisector {
 
-// What a surface's and a solid's have in common: Base is Backend or SolidBackend, Voronoi RestrictedVoronoi or ClippedVoronoi.
+// What a surface's and a solid's have in common: Base is Backend or SolidBackend, Voronoi RestrictedVoronoi or
+// ClippedVoronoi.
 template <class Base, class Voronoi>
 class CpuBackendOf : public Base {
  public:
@@ -37,7 +38,8 @@ class CpuBackend : public CpuBackendOf<Backend, RestrictedVoronoi> {
 
 class CpuSolidBackend : public CpuBackendOf<SolidBackend, ClippedVoronoi> {
  public:
-  CpuSolidBackend(const Solid& solid, NeighbourSource source, InnerCells inner = InnerCells::whole, std::string fallback = {});
+  CpuSolidBackend(const Solid& solid, NeighbourSource source, InnerCells inner = InnerCells::whole,
+                  std::string fallback = {});
 };
 
 }  // namespace bisector

@@ -41,7 +41,8 @@ FallbackBackend::FallbackBackend(std::unique_ptr<Backend> device, NeighbourSourc
           },
           std::move(context)) {}
 
-FallbackSolidBackend::FallbackSolidBackend(std::unique_ptr<SolidBackend> device, NeighbourSource source, Context context)
+FallbackSolidBackend::FallbackSolidBackend(std::unique_ptr<SolidBackend> device, NeighbourSource source,
+                                           Context context)
     : FallbackOf(
           device->solid(), std::move(device),
           [&solid = device->solid(), source](const std::string& reason) {

@@ -11,8 +11,9 @@
 
 namespace bisector {
 
-// The first DeviceError of the device drops it, with one warning, and the same seeds are evaluated on the CPU: an evaluation
-// depends on its seeds alone, so none is lost and the run goes on from where it was. Base is Backend or SolidBackend.
+// The first DeviceError of the device drops it, with one warning, and the same seeds are evaluated on the CPU: an
+// evaluation depends on its seeds alone, so none is lost and the run goes on from where it was. Base is Backend or
+// SolidBackend.
 template <class Base>
 class FallbackOf : public Base {
  public:

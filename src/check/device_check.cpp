@@ -6,10 +6,10 @@
 #include <numbers>
 #include <utility>
 
-#include "core/random.h"
 #include "backend/cpu_backend.h"
-#include "cvt/optimise.h"
 #include "compute/compute.h"
+#include "core/random.h"
+#include "cvt/optimise.h"
 #include "mesh/sampling.h"
 
 namespace bisector {
@@ -142,8 +142,8 @@ struct SolidCase {
   std::vector<Vec3> seeds;
 };
 
-// The cubes of an n x n x n grid over [0, 1]^3 but for those along its axis in z, where n > 2, in six tetrahedra each; inner
-// vertices moved by up to `shake` of a cube's edge.
+// The cubes of an n x n x n grid over [0, 1]^3 but for those along its axis in z, where n > 2, in six tetrahedra each;
+// inner vertices moved by up to `shake` of a cube's edge.
 TetMesh block(Index n, double shake) {
   TetMesh mesh;
   for (Index k = 0; k <= n; ++k)
@@ -203,12 +203,9 @@ std::vector<Vec3> relaxed_points(const TetMesh& mesh, std::size_t count) {
 
 std::vector<SolidCase> make_solid_cases() {
   const TetMesh coarse = block(2, 0), ring = block(5, 0.2);
-  return {{"block", "random", coarse, random_points(1000)},
-          {"block", "grid", coarse, grid_points(7)},
-          {"ring", "random", ring, random_points(500)},
-          {"ring", "optimised", ring, relaxed_points(ring, 300)},
-          {"ring", "grid", ring, grid_points(6)},
-          {"ring", "vertices", ring, ring.vertices}};
+  return {{"block", "random", coarse, random_points(1000)}, {"block", "grid", coarse, grid_points(7)},
+          {"ring", "random", ring, random_points(500)},     {"ring", "optimised", ring, relaxed_points(ring, 300)},
+          {"ring", "grid", ring, grid_points(6)},           {"ring", "vertices", ring, ring.vertices}};
 }
 
 struct Polygons {
@@ -244,7 +241,8 @@ Parity parity_of(const Measured<Polyhedra>& a, const Measured<Polyhedra>& b, con
   return parity;
 }
 
-// The evaluation that is timed comes after one of fewer seeds, so that neither start-up nor the very same diagram helps it.
+// The evaluation that is timed comes after one of fewer seeds, so that neither start-up nor the very same diagram helps
+// it.
 template <class Cells, class Kind>
 Measured<Cells> measure(Kind& backend, const std::vector<Vec3>& seeds) {
   Measured<Cells> measured;
@@ -293,9 +291,18 @@ struct Check {
         context.check();
         const auto backend = make_backend(domain, {device, p, source}, context);
         const auto found = measure<Cells>(*backend, problem.seeds);
-        DeviceCheckRow row{problem.model, problem.seeds_name, source, backend->description(), triangles,
-                           problem.seeds.size(), tets, parity_of(expected, found, domain), found.moments.certification,
-                           found.repeats, found.seconds, expected.seconds};
+        DeviceCheckRow row{problem.model,
+                           problem.seeds_name,
+                           source,
+                           backend->description(),
+                           triangles,
+                           problem.seeds.size(),
+                           tets,
+                           parity_of(expected, found, domain),
+                           found.moments.certification,
+                           found.repeats,
+                           found.seconds,
+                           expected.seconds};
         row.passed = agrees(row);
         done(row);
         rows.push_back(std::move(row));

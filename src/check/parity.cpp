@@ -68,12 +68,13 @@ Parity compare(const CellMoments& a, const RestrictedPolygons& polygons_a, const
                const RestrictedPolygons& polygons_b, const Surface& surface) {
   Parity parity;
   parity.same_pairs = same_bits(polygons_a.pairs, polygons_b.pairs);
-  parity.same_labels = parity.same_pairs && polygons_a.offsets == polygons_b.offsets &&
-                       polygons_a.labels == polygons_b.labels;
+  parity.same_labels =
+      parity.same_pairs && polygons_a.offsets == polygons_b.offsets && polygons_a.labels == polygons_b.labels;
   parity.same_dual = same_dual(polygons_a, polygons_b);
   parity.bitwise = parity.same_labels && same_bits(a, b) && same_bits(polygons_a.vertices, polygons_b.vertices);
   const double area_per_mass = surface.area / surface.mass;
-  measure_errors(a, b, surface.mass, [&](double mass) { return mass * area_per_mass; }, parity);
+  measure_errors(
+      a, b, surface.mass, [&](double mass) { return mass * area_per_mass; }, parity);
   return parity;
 }
 
@@ -82,12 +83,14 @@ Parity compare(const CellMoments& a, const ClippedPolyhedra& polyhedra_a, const 
   Parity parity;
   parity.same_pairs = same_bits(polyhedra_a.pairs, polyhedra_b.pairs);
   parity.same_labels = parity.same_pairs && polyhedra_a.label_offsets == polyhedra_b.label_offsets &&
-                       polyhedra_a.labels == polyhedra_b.labels && polyhedra_a.vertex_offsets == polyhedra_b.vertex_offsets &&
+                       polyhedra_a.labels == polyhedra_b.labels &&
+                       polyhedra_a.vertex_offsets == polyhedra_b.vertex_offsets &&
                        polyhedra_a.triples == polyhedra_b.triples;
   parity.same_dual = dual_tets(polyhedra_a) == dual_tets(polyhedra_b);
   parity.bitwise = parity.same_labels && same_bits(a, b) && same_bits(polyhedra_a.vertices, polyhedra_b.vertices);
   const double volume_per_mass = solid.volume / solid.mass;
-  measure_errors(a, b, solid.mass, [&](double mass) { return std::pow(mass * volume_per_mass, 2.0 / 3); }, parity);
+  measure_errors(
+      a, b, solid.mass, [&](double mass) { return std::pow(mass * volume_per_mass, 2.0 / 3); }, parity);
   return parity;
 }
 

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "bisector/quality.h"
+#include "bisector/remesh.h"
 #include "core/geometry.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "bisector/remesh.h"
 
 namespace bisector::cli {
 

@@ -208,8 +208,11 @@ void add_parameters(Json& json, const GeneralQuadric& quadric) {
 }
 
 Json region_json(const SegmentRegion& region) {
-  Json json{{"type", name_of(type_of(region.proxy))}, {"triangles", region.triangles}, {"area", region.area},
-            {"rms", region.rms},                      {"max", region.max}};
+  Json json{{"type", name_of(type_of(region.proxy))},
+            {"triangles", region.triangles},
+            {"area", region.area},
+            {"rms", region.rms},
+            {"max", region.max}};
   const std::optional<Quadric> quadric = quadric_of(region.proxy);
   json["coefficients"] = quadric ? Json(quadric->c) : Json(nullptr);
   std::visit([&](const auto& surface) { add_parameters(json, surface); }, region.proxy);

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "bisector/device.h"
+#include "bisector/remesh.h"
 #include "bisector/segment.h"
 #include "bisector/tree.h"
 #include "core/words.h"
-#include "bisector/remesh.h"
 
 namespace bisector::cli {
 

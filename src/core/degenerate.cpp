@@ -33,8 +33,8 @@ bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 u = b - a, v = c - a;
-  const double reach = std::max({std::abs(u.x), std::abs(u.y), std::abs(u.z), std::abs(v.x), std::abs(v.y),
-                                 std::abs(v.z)});
+  const double reach =
+      std::max({std::abs(u.x), std::abs(u.y), std::abs(u.z), std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (reach == 0 || collinear(a, b, c)) return 0;
   // The fourth power of a length leaves the range of doubles long before its square does; powers of two are exact.
   int exponent = 0;

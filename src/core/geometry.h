@@ -9,9 +9,24 @@
 
 namespace bisector {
 
-inline Vec3& operator+=(Vec3& a, const Vec3& b) { a.x += b.x; a.y += b.y; a.z += b.z; return a; }
-inline Vec3& operator-=(Vec3& a, const Vec3& b) { a.x -= b.x; a.y -= b.y; a.z -= b.z; return a; }
-inline Vec3& operator*=(Vec3& a, double s) { a.x *= s; a.y *= s; a.z *= s; return a; }
+inline Vec3& operator+=(Vec3& a, const Vec3& b) {
+  a.x += b.x;
+  a.y += b.y;
+  a.z += b.z;
+  return a;
+}
+inline Vec3& operator-=(Vec3& a, const Vec3& b) {
+  a.x -= b.x;
+  a.y -= b.y;
+  a.z -= b.z;
+  return a;
+}
+inline Vec3& operator*=(Vec3& a, double s) {
+  a.x *= s;
+  a.y *= s;
+  a.z *= s;
+  return a;
+}
 inline Vec3 operator+(Vec3 a, const Vec3& b) { return a += b; }
 inline Vec3 operator-(Vec3 a, const Vec3& b) { return a -= b; }
 inline Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
@@ -32,10 +47,12 @@ inline Vec3 unit(const Vec3& a) {
   return length > 0 ? (1 / length) * a : Vec3{};
 }
 
-// A vector of length 1 perpendicular to `n`, which has length 1, and to the x axis, or to the y axis if `n` is near the x axis.
+// A vector of length 1 perpendicular to `n`, which has length 1, and to the x axis, or to the y axis if `n` is near the
+// x axis.
 Vec3 perpendicular(const Vec3& n);
 
-// Normal of the triangle (a, b, c), as long as twice its area, on the side from which the corners run counter-clockwise.
+// Normal of the triangle (a, b, c), as long as twice its area, on the side from which the corners run
+// counter-clockwise.
 inline Vec3 twice_area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(b - a, c - a); }
 
 // Six times the signed volume of the tetrahedron (a, b, c, d), rounded: positive as orientation() says.

@@ -9,8 +9,8 @@
 
 namespace bisector {
 
-// `list(put)` calls put(row, value) for every value, row being below `rows`. It is called twice, to count and to fill, and
-// must list the same both times.
+// `list(put)` calls put(row, value) for every value, row being below `rows`. It is called twice, to count and to fill,
+// and must list the same both times.
 template <class T, class List>
 Csr<T> group_into_rows(std::size_t rows, const List& list) {
   Csr<T> grouped;

@@ -37,8 +37,8 @@ inline unsigned thread_count() {
 
 namespace detail {
 #if defined(__SANITIZE_THREAD__)
-// TBB's own library is not instrumented, and the thread sanitizer reports its hand-overs as races; plain threads show the
-// races between bodies and nothing else.
+// TBB's own library is not instrumented, and the thread sanitizer reports its hand-overs as races; plain threads show
+// the races between bodies and nothing else.
 template <class Body>
 void for_each_chunk(std::size_t chunks, const Body& body) {
   std::atomic<std::size_t> next = 0;

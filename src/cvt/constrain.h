@@ -11,9 +11,9 @@
 
 namespace bisector {
 
-// Moves every seed to the nearest point of the triangles of its cell, and not to the globally nearest triangle, which may
-// lie on another sheet of a thin part. `normals` receives the unit normal there. A seed without triangles stays, and has
-// the normal it had; and so do the seeds inside a solid. `places`: of each seed, or empty.
+// Moves every seed to the nearest point of the triangles of its cell, and not to the globally nearest triangle, which
+// may lie on another sheet of a thin part. `normals` receives the unit normal there. A seed without triangles stays,
+// and has the normal it had; and so do the seeds inside a solid. `places`: of each seed, or empty.
 void project_to_cells(const Surface& surface, const Csr<Index>& cells, std::span<const SeedPlace> places,
                       std::span<Vec3> seeds, std::vector<Vec3>& normals);
 

@@ -6,7 +6,8 @@ namespace bisector {
 namespace {
 
 void add_scaled(std::vector<Vec3>& a, double t, const std::vector<Vec3>& b) {
-  parallel_each(a.size(), [&](std::size_t i) { a[i] += t * b[i]; }, 4096);
+  parallel_each(
+      a.size(), [&](std::size_t i) { a[i] += t * b[i]; }, 4096);
 }
 
 }  // namespace
@@ -34,10 +35,12 @@ std::vector<Vec3> Lbfgs::direction(const std::vector<Vec3>& g, const std::vector
     const Pair& last = pairs_.back();
     gamma = last.sy / fixed_sum(d.size(), [&](std::size_t i) { return norm2(last.y[i]) / d[i]; });
   }
-  parallel_each(q.size(), [&](std::size_t i) { q[i] *= gamma / d[i]; }, 4096);
+  parallel_each(
+      q.size(), [&](std::size_t i) { q[i] *= gamma / d[i]; }, 4096);
   for (std::size_t k = 0; k < pairs_.size(); ++k)
     add_scaled(q, alpha[k] - inner(pairs_[k].y, q) / pairs_[k].sy, pairs_[k].s);
-  parallel_each(q.size(), [&](std::size_t i) { q[i] = -q[i]; }, 4096);
+  parallel_each(
+      q.size(), [&](std::size_t i) { q[i] = -q[i]; }, 4096);
   return q;
 }
 

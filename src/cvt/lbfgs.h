@@ -1,5 +1,5 @@
-// The limited-memory BFGS direction with a scaled diagonal initial Hessian (Nocedal and Wright, algorithm 7.4; Liu et al.
-// 2009, "On centroidal Voronoi tessellation").
+// The limited-memory BFGS direction with a scaled diagonal initial Hessian (Nocedal and Wright, algorithm 7.4; Liu et
+// al. 2009, "On centroidal Voronoi tessellation").
 #pragma once
 
 #include <deque>
@@ -17,7 +17,8 @@ class Lbfgs {
   void clear() { pairs_.clear(); }
   // Adds the step s = x_new - x_old and the change of gradient y. Pairs without positive curvature are dropped.
   void push(std::vector<Vec3> s, std::vector<Vec3> y);
-  // -H g, with the initial inverse Hessian gamma diag(1 / d_i), gamma = s'y / (y' diag(1 / d_i) y) of the last pair, or 1.
+  // -H g, with the initial inverse Hessian gamma diag(1 / d_i), gamma = s'y / (y' diag(1 / d_i) y) of the last pair,
+  // or 1.
   std::vector<Vec3> direction(const std::vector<Vec3>& g, const std::vector<double>& d) const;
 
  private:

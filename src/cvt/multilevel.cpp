@@ -14,10 +14,10 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kPerComponent = 4;      // a tetrahedron
-constexpr std::size_t kCoarsest = 100;        // seeds on the coarsest level, at least
+constexpr std::size_t kPerComponent = 4;  // a tetrahedron
+constexpr std::size_t kCoarsest = 100;    // seeds on the coarsest level, at least
 constexpr int kLevels = 3;
-constexpr double kNearMiddle = 0.25;          // of the distance of two seeds
+constexpr double kNearMiddle = 0.25;  // of the distance of two seeds
 
 }  // namespace
 
@@ -73,7 +73,8 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
 
 namespace {
 
-// The midpoints of the dual edges, as many as there is room for; where edges are too few, also points of cells of high energy.
+// The midpoints of the dual edges, as many as there is room for; where edges are too few, also points of cells of high
+// energy.
 void add_midpoints(const Diagram& diagram, const PlacedSeeds& coarse, std::vector<DualEdge> edges, std::size_t count,
                    PlacedSeeds& finer) {
   const std::vector<Vec3>& seeds = coarse.positions();
@@ -154,9 +155,7 @@ std::vector<Vec3> insertion_points(const Diagram& diagram, const PlacedSeeds& pl
   }
   std::vector<Index> order(seeds.size());
   std::iota(order.begin(), order.end(), Index{0});
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-    return cells[a].second > cells[b].second;
-  });
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return cells[a].second > cells[b].second; });
   std::vector<std::vector<Index>> around(seeds.size());
   for (const DualEdge& e : extract_dual_edges(polygons, seeds)) {
     around[e.a].push_back(e.b);
@@ -188,7 +187,7 @@ void set_count(const Diagram& diagram, std::size_t count, PlacedSeeds& seeds) {
   std::vector<double> squared(edges.size());
   std::vector<std::size_t> order(edges.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  for (std::size_t k = 0; k < edges.size(); ++k) 
+  for (std::size_t k = 0; k < edges.size(); ++k)
     squared[k] = norm2(seeds.position(edges[k].a) - seeds.position(edges[k].b));
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return squared[a] < squared[b]; });
   std::vector<char> removed(seeds.size(), 0);

@@ -15,11 +15,11 @@
 namespace bisector {
 namespace {
 
-constexpr double kArmijo = 1e-4;           // share of the slope's promise that a step must keep
-constexpr double kFlatGradient = 1e-8;     // relative to the first; what is left is rounding
-constexpr int kLineSearchTrials = 8;       // evaluations per step at most
-constexpr std::size_t kDecreaseWindow = 5; // steps over which the energy's fall is judged
-constexpr int kReseedTrials = 10;          // rounds of giving empty cells another place
+constexpr double kArmijo = 1e-4;            // share of the slope's promise that a step must keep
+constexpr double kFlatGradient = 1e-8;      // relative to the first; what is left is rounding
+constexpr int kLineSearchTrials = 8;        // evaluations per step at most
+constexpr std::size_t kDecreaseWindow = 5;  // steps over which the energy's fall is judged
+constexpr int kReseedTrials = 10;           // rounds of giving empty cells another place
 
 using Kind = SeedPlace::Kind;
 
@@ -71,16 +71,16 @@ bool has_empty_cell(const Iterate& now) {
   return false;
 }
 
-// Puts seeds inside a solid that own nothing into the cells of highest energy, half the root mean square distance of their
-// points from the seed.
+// Puts seeds inside a solid that own nothing into the cells of highest energy, half the root mean square distance of
+// their points from the seed.
 void reseed_interior(const std::vector<Moments>& cells, const std::vector<Index>& empty, std::span<Vec3> positions) {
   std::vector<Index> order;
   for (Index i = 0; i < cells.size(); ++i)
     if (cells[i].mass > 0) order.push_back(i);
   const std::size_t count = std::min(empty.size(), order.size());
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(), [&](Index a, Index b) {
-    return cells[a].second != cells[b].second ? cells[a].second > cells[b].second : a < b;
-  });
+  std::partial_sort(
+      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
+      [&](Index a, Index b) { return cells[a].second != cells[b].second ? cells[a].second > cells[b].second : a < b; });
   for (std::size_t k = 0; k < count; ++k) {
     const Moments& cell = cells[order[k]];
     const Vec3 towards = (1 / cell.mass) * cell.first;
@@ -126,8 +126,8 @@ class Descent {
   Iterate now_, next_;
 };
 
-// Puts the seeds back to where they are held. `moments` are those of the cells before the seeds moved, `before` where they
-// were then.
+// Puts the seeds back to where they are held. `moments` are those of the cells before the seeds moved, `before` where
+// they were then.
 void Descent::hold(const CellMoments& moments, const std::vector<Vec3>& before, Iterate& next) const {
   const std::span<Vec3> positions = next.seeds.edit_positions();
   const std::span<SeedPlace> places = next.seeds.edit_places();
@@ -188,8 +188,8 @@ bool Descent::is_descent(const std::vector<Vec3>& direction, double slope, doubl
          inner(next_.gradient, direction) <= (2 * kArmijo - 1) * slope;
 }
 
-// Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then `next_` is
-// not to be used.
+// Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then
+// `next_` is not to be used.
 bool Descent::line_search(const std::vector<Vec3>& direction) {
   const double slope = inner(now_.gradient, direction);
   if (!(slope < 0)) return false;
@@ -270,8 +270,9 @@ void optimise(CvtRun& run, const OptimiseOptions& options) {
   const DiagramSeconds before = run.totals.seconds;
   Descent(run, options).minimise();
   const DiagramSeconds& after = run.totals.seconds;
-  run.totals.seconds_lbfgs += watch.seconds() - (after.delaunay - before.delaunay) - (after.neighbours - before.neighbours) -
-                              (after.pairs - before.pairs) - (after.clip - before.clip);
+  run.totals.seconds_lbfgs += watch.seconds() - (after.delaunay - before.delaunay) -
+                              (after.neighbours - before.neighbours) - (after.pairs - before.pairs) -
+                              (after.clip - before.clip);
 }
 
 CvtGradient complete(CvtRun& run, bool constrained) {
@@ -282,8 +283,7 @@ CvtGradient complete(CvtRun& run, bool constrained) {
     project_to_cells(run.surface(), diagram.moments.triangles, run.seeds.places(), feet, run.normals_);
   }
   CvtGradient gradient;
-  gradient.vectors =
-      gradient_of(diagram.moments.cells, run.seeds, run.curves(), constrained ? &run.normals_ : nullptr);
+  gradient.vectors = gradient_of(diagram.moments.cells, run.seeds, run.curves(), constrained ? &run.normals_ : nullptr);
   if (constrained) gradient.normals = run.normals_;
   run.energy = run.covers(diagram) ? diagram.moments.energy : std::numeric_limits<double>::infinity();
   run.gradient_norm = length_of(gradient.vectors);

@@ -1,4 +1,5 @@
-// The optimisation loop: minimises the CVT energy F = sum_i int rho |x - x_i|^2 by L-BFGS (thesis 4.4.2; Liu et al. 2009).
+// The optimisation loop: minimises the CVT energy F = sum_i int rho |x - x_i|^2 by L-BFGS (thesis 4.4.2; Liu et al.
+// 2009).
 #pragma once
 
 #include <string>
@@ -16,15 +17,16 @@ struct OptimiseOptions {
   double done = 0, share = 1;  // of the whole run: fraction before this optimisation, and its own
 };
 
-// Moves run.seeds downhill along their places. Afterwards run.energy and run.gradient_norm are theirs. Seeds on the surface or
-// inside a solid whose cells are empty are put where the energy is highest. Throws Cancelled between evaluations, and Error if a
-// diagram does not cover the domain.
+// Moves run.seeds downhill along their places. Afterwards run.energy and run.gradient_norm are theirs. Seeds on the
+// surface or inside a solid whose cells are empty are put where the energy is highest. Throws Cancelled between
+// evaluations, and Error if a diagram does not cover the domain.
 void optimise(CvtRun& run, const OptimiseOptions& options);
 
 // dF/dx_i = 2 m_i (x_i - c_i) of each seed, and its part along what the seed is held on.
 struct CvtGradient {
   std::vector<Vec3> vectors;
-  std::vector<Vec3> normals;  // of the surface at each seed, to which `vectors` are tangential; empty if not constrained
+  std::vector<Vec3>
+      normals;  // of the surface at each seed, to which `vectors` are tangential; empty if not constrained
 };
 
 // The gradient at the seeds as they are. Sets run.energy and run.gradient_norm. `constrained` as in OptimiseOptions.

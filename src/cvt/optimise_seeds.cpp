@@ -25,7 +25,7 @@ CvtResult optimise_seeds(const TriangleMesh& mesh, const std::vector<double>& de
   step.constrained = options.constrained;
   step.phase = "optimising";
   optimise(run, step);
-  return {run.seeds.positions(),  run.energy, run.gradient_norm, run.totals.iterations, run.totals.evaluations,
+  return {run.seeds.positions(), run.energy, run.gradient_norm, run.totals.iterations, run.totals.evaluations,
           backend->description()};
 }
 

@@ -45,8 +45,8 @@ class CvtRun {
   double energy = 0;
   double gradient_norm = 0;
 
-  // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other positions, or
-  // lacks something. The reference is good until the next call that computes one.
+  // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other
+  // positions, or lacks something. The reference is good until the next call that computes one.
   const Diagram& diagram(Want want = Want::moments);
   // How the last diagram of the run's seeds was certified.
   const Certification& certification() const { return diagram_.report.certification; }

@@ -20,11 +20,11 @@ constexpr double kFlat = 1e-10;         // area by squared longest edge below wh
 struct Walk {
   std::vector<Vec3> points;
   std::vector<Triangle> triangles;
-  std::vector<Vec3> normals;      // unit; of flat triangles that of a neighbour
+  std::vector<Vec3> normals;  // unit; of flat triangles that of a neighbour
   std::vector<double> areas;
-  std::vector<Index> across;      // triangle beyond each half-edge, or kNone where the walk ends
-  std::vector<char> turned;       // the triangle beyond runs along the half-edge in the same direction
-  std::vector<double> bend;       // signed angle between the normals, positive where convex, by squared length
+  std::vector<Index> across;  // triangle beyond each half-edge, or kNone where the walk ends
+  std::vector<char> turned;   // the triangle beyond runs along the half-edge in the same direction
+  std::vector<double> bend;   // signed angle between the normals, positive where convex, by squared length
 };
 
 Vec3 corner(const Walk& walk, std::size_t half_edge) {
@@ -100,8 +100,7 @@ Walk prepare(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& 
 double window_on_segment(const Vec3& a, const Vec3& b, double squared_radius) {
   const Vec3 d = b - a;
   const double aa = norm2(a), bb = norm2(b), dd = norm2(d);
-  if (aa <= squared_radius && bb <= squared_radius)
-    return (squared_radius - (aa + bb + dot(a, b)) / 3) * std::sqrt(dd);
+  if (aa <= squared_radius && bb <= squared_radius) return (squared_radius - (aa + bb + dot(a, b)) / 3) * std::sqrt(dd);
   const double ad = dot(a, d), root = ad * ad - dd * (aa - squared_radius);
   if (!(root > 0)) return 0;
   const double from = std::max(0.0, (-ad - std::sqrt(root)) / dd), to = std::min(1.0, (-ad + std::sqrt(root)) / dd);
@@ -253,34 +252,37 @@ PrincipalCurvatures principal_curvatures(const TriangleMesh& mesh, const std::ve
 
   const Csr<Index> around = items_at_vertices<Index>(mesh.triangles, n);
   ThreadLocal<Visited> visits;
-  parallel_each(n, [&](std::size_t v) {
-    double area = 0;
-    std::size_t count = 0;
-    for (const Index* t = around.begin(v); t != around.end(v); ++t)
-      if (walk.areas[*t] > 0) {
-        area += walk.areas[*t];
-        ++count;
-      }
-    if (count == 0) return;
-    const double edge = std::sqrt(4 / std::sqrt(3.0) * area / static_cast<double>(count));
-    const double reach = std::clamp(scale * least, radius * edge, kLargestGrowth * radius * edge);
-    Visited& visited = visits.local();
-    visited.stamp.resize(mesh.triangles.size(), 0);
-    ++visited.current;
-    bool first = true;
-    for (const Index* t = around.begin(v); t != around.end(v); ++t) {
-      if (visited.stamp[*t] == visited.current) continue;
-      const Curvature c = measure_sector(walk, walk.points[v], *t, reach, visited);
-      if (!first && !(magnitude_of(c.min, c.max) > magnitude_of(result.min[v], result.max[v]))) continue;
-      first = false;
-      result.min[v] = c.min;
-      result.max[v] = c.max;
-      result.min_direction[v] = c.min_direction;
-      result.max_direction[v] = c.max_direction;
-    }
-    result.min[v] *= scale;
-    result.max[v] *= scale;
-  }, 64);
+  parallel_each(
+      n,
+      [&](std::size_t v) {
+        double area = 0;
+        std::size_t count = 0;
+        for (const Index* t = around.begin(v); t != around.end(v); ++t)
+          if (walk.areas[*t] > 0) {
+            area += walk.areas[*t];
+            ++count;
+          }
+        if (count == 0) return;
+        const double edge = std::sqrt(4 / std::sqrt(3.0) * area / static_cast<double>(count));
+        const double reach = std::clamp(scale * least, radius * edge, kLargestGrowth * radius * edge);
+        Visited& visited = visits.local();
+        visited.stamp.resize(mesh.triangles.size(), 0);
+        ++visited.current;
+        bool first = true;
+        for (const Index* t = around.begin(v); t != around.end(v); ++t) {
+          if (visited.stamp[*t] == visited.current) continue;
+          const Curvature c = measure_sector(walk, walk.points[v], *t, reach, visited);
+          if (!first && !(magnitude_of(c.min, c.max) > magnitude_of(result.min[v], result.max[v]))) continue;
+          first = false;
+          result.min[v] = c.min;
+          result.max[v] = c.max;
+          result.min_direction[v] = c.min_direction;
+          result.max_direction[v] = c.max_direction;
+        }
+        result.min[v] *= scale;
+        result.max[v] *= scale;
+      },
+      64);
   return result;
 }
 

@@ -12,7 +12,7 @@ namespace bisector {
 // sphere oriented outwards; where the orientation is not the same everywhere, that of the vertex's triangle of lowest
 // index counts. Directions are unit tangents, zero at vertices without area around them.
 struct PrincipalCurvatures {
-  std::vector<double> min, max;                  // min <= max
+  std::vector<double> min, max;  // min <= max
   std::vector<Vec3> min_direction, max_direction;
 
   // |kappa_max| of the thesis (4.5): the larger of the two in magnitude.

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/geometry.h"
 #include "bisector/features.h"
+#include "core/geometry.h"
 
 namespace bisector {
 
@@ -38,8 +38,8 @@ class FeatureCurves {
 
  private:
   FeatureGraph graph_;
-  std::vector<std::vector<Vec3>> points_;     // of each curve; a closed one repeats its first
-  std::vector<std::vector<double>> starts_;   // arc length at each point
+  std::vector<std::vector<Vec3>> points_;    // of each curve; a closed one repeats its first
+  std::vector<std::vector<double>> starts_;  // arc length at each point
   std::vector<Vec3> corners_;
   std::vector<std::array<Index, 2>> ends_;
 };

@@ -45,9 +45,7 @@ class Folds {
  public:
   // Both must outlive the object; no triangle may have a repeated corner.
   Folds(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles)
-      : points_(points),
-        triangles_(triangles),
-        table(edge_table(triangles, points.size())),
+      : points_(points), triangles_(triangles), table(edge_table(triangles, points.size())),
         edge_of_(3 * triangles.size()) {
     for (std::size_t e = 0; e < table.edges.size(); ++e)
       for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of_[*h] = e;
@@ -164,12 +162,12 @@ class Folds {
     beside[e] = {static_cast<Index>(from / 3), static_cast<Index>(side.triangle)};
     const Vec3 along = point(table.edges[e][1]) - point(table.edges[e][0]);
     if (const double l = norm(along); l > 0)
-      bend[e] = std::max(bend_beside(from / 3, e, (1 / l) * along),
-                         bend_beside(side.triangle, side.edge, (1 / l) * along));
+      bend[e] =
+          std::max(bend_beside(from / 3, e, (1 / l) * along), bend_beside(side.triangle, side.edge, (1 / l) * along));
   }
 
   std::vector<std::size_t> edge_of_;  // of each half-edge
-  std::vector<Vec3> normals_;  // unit; zero: look through the triangle
+  std::vector<Vec3> normals_;         // unit; zero: look through the triangle
 };
 
 Index other_end(const std::array<Index, 2>& edge, Index v) { return edge[0] == v ? edge[1] : edge[0]; }
@@ -186,7 +184,7 @@ constexpr double kTailAngle = 10 * kRadiansPerDegree;  // whose angle, in radian
 constexpr double kTailFall = 0.3;                      // and at least this part of the angle of the edge before,
 constexpr double kTailTurn = 40 * kRadiansPerDegree;   // which turns from that edge by less than this, in radians,
 constexpr double kTailBend = 0.8;  // and beside which the surface bends by at most this part of the edge's angle;
-constexpr double kEven = 0.8;      // that is not asked of an edge of more than this part of the angle of the one before.
+constexpr double kEven = 0.8;  // that is not asked of an edge of more than this part of the angle of the one before.
 
 // Connected creases are kept if their mean angle exceeds the first (radians) by the second times their disorder.
 constexpr double kPlainFold = 30 * kRadiansPerDegree;
@@ -311,9 +309,9 @@ class CreaseFinder {
 
   // What surrounds connected creases.
   struct Surroundings {
-    bool attached = false;        // a vertex is on a feature of another kind
-    std::vector<double> angles;   // of the other edges at the vertices, radians
-    double edge_length_sum = 0;   // of all edges at the vertices, once for each
+    bool attached = false;       // a vertex is on a feature of another kind
+    std::vector<double> angles;  // of the other edges at the vertices, radians
+    double edge_length_sum = 0;  // of all edges at the vertices, once for each
     std::size_t edge_count = 0;
     double change_sum = 0;        // of the angle, over the vertices where just two edges of the creases meet, radians
     std::size_t inner_count = 0;  // of those vertices

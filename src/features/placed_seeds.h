@@ -1,5 +1,5 @@
-// Seeds and where each of them may be. All that adds, removes or moves seeds goes through here, so that positions and places
-// stay parallel.
+// Seeds and where each of them may be. All that adds, removes or moves seeds goes through here, so that positions and
+// places stay parallel.
 #pragma once
 
 #include <cstddef>

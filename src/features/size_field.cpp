@@ -88,7 +88,8 @@ std::vector<double> SizeField::at(const std::vector<Vec3>& points, std::vector<I
   return h;
 }
 
-std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths, double gradation) {
+std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths,
+                                    double gradation) {
   if (points.empty()) return {};
   const SizeField field(points, lengths, gradation);
   const std::vector<Index> order = hilbert_order(points);

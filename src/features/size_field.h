@@ -8,18 +8,18 @@
 
 namespace bisector {
 
-// h(x) = min over k of h_k + gradation |x - p_k|, the largest field that is at most h_k at p_k and obeys |h(x) - h(y)| <=
-// gradation |x - y| (Alliez et al. 2005, "Variational tetrahedral meshing", section 4), with Euclidean distances: the cells
-// that meet this field are Euclidean, too, and one that is large beside a fine sheet reaches through to it, however far away it
-// is along the surface or through the solid. It also needs no connectivity.
+// h(x) = min over k of h_k + gradation |x - p_k|, the largest field that is at most h_k at p_k and obeys |h(x) - h(y)|
+// <= gradation |x - y| (Alliez et al. 2005, "Variational tetrahedral meshing", section 4), with Euclidean distances:
+// the cells that meet this field are Euclidean, too, and one that is large beside a fine sheet reaches through to it,
+// however far away it is along the surface or through the solid. It also needs no connectivity.
 class SizeField {
  public:
   // One length per point, at least one, finite; gradation > 0.
   SizeField(const std::vector<Vec3>& points, const std::vector<double>& lengths, double gradation);
 
   double operator()(const Vec3& x) const;
-  // h at each point. `near`, if as long as the points, says for each a sample that limited it before, and is written likewise:
-  // the search is quicker from there.
+  // h at each point. `near`, if as long as the points, says for each a sample that limited it before, and is written
+  // likewise: the search is quicker from there.
   std::vector<double> at(const std::vector<Vec3>& points, std::vector<Index>& near) const;
 
  private:
@@ -39,6 +39,7 @@ class SizeField {
 };
 
 // The field's values at its own points.
-std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths, double gradation);
+std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths,
+                                    double gradation);
 
 }  // namespace bisector

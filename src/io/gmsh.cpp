@@ -92,8 +92,7 @@ class GmshReader {
   void read_format() {
     if (in_.word() != "$MeshFormat") in_.fail(std::string("a Gmsh file starts with $MeshFormat; ") + kExportAgain);
     const std::string_view version = in_.need_word("the version");
-    if (version == "2.2" || version == "2.1" || version == "2")
-      old_ = true;
+    if (version == "2.2" || version == "2.1" || version == "2") old_ = true;
     else if (version != "4.1")
       in_.fail("version " + printable(version) + " is not read; save as version 4.1 or 2.2 (gmsh -save -format msh41)");
     const std::int64_t binary = in_.integer("the file type");
@@ -103,10 +102,8 @@ class GmshReader {
     if (binary_) {
       start_values();
       const auto one = in_.value<std::int32_t>();
-      if (one == 0x01000000)
-        in_.big_endian = true;
-      else if (one != 1)
-        in_.fail(std::string("the byte order is not given; ") + kExportAgain);
+      if (one == 0x01000000) in_.big_endian = true;
+      else if (one != 1) in_.fail(std::string("the byte order is not given; ") + kExportAgain);
       in_.binary = false;
     }
     if (in_.word() != "$EndMeshFormat") in_.fail(std::string("$EndMeshFormat is missing; ") + kExportAgain);
@@ -412,8 +409,7 @@ std::vector<std::vector<Index>> chain_edges(const std::vector<std::array<Index, 
 class GmshWriter {
  public:
   explicit GmshWriter(const TetMesh& mesh)
-      : mesh_(mesh),
-        volumes_(group_by_mark(mesh.tets.size(), mesh.regions)),
+      : mesh_(mesh), volumes_(group_by_mark(mesh.tets.size(), mesh.regions)),
         surfaces_(group_by_mark(mesh.boundary.size(), mesh.boundary_labels)),
         curves_(chain_edges(mesh.feature_edges, mesh.vertices.size(), corners_)) {}
 
@@ -442,10 +438,8 @@ class GmshWriter {
   }
   void write_names(int dimension, const Entities& entities, bool unmarked, const char* prefix) {
     for (std::size_t e = 0; e < entities.tags.size(); ++e) {
-      if (unmarked)
-        print("{} {} \"{}\"\n", dimension, entities.tags[e], kUnmarked[3 - dimension]);
-      else
-        print("{} {} \"{}{}\"\n", dimension, entities.tags[e], prefix, entities.marks[e]);
+      if (unmarked) print("{} {} \"{}\"\n", dimension, entities.tags[e], kUnmarked[3 - dimension]);
+      else print("{} {} \"{}{}\"\n", dimension, entities.tags[e], prefix, entities.marks[e]);
     }
   }
 

@@ -49,7 +49,7 @@ struct Soup {
   Csr<Index> faces;
   std::vector<std::int32_t> labels;         // of each face, or empty
   std::vector<std::array<Index, 2>> edges;  // whether or not they are edges of a face
-  std::string ignored;  // what follows the last face, if anything does
+  std::string ignored;                      // what follows the last face, if anything does
 
   void end_face() { faces.offsets.push_back(faces.values.size()); }
   std::size_t open_corners() const { return faces.values.size() - faces.offsets.back(); }

@@ -11,8 +11,8 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <iterator>
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -33,7 +33,9 @@ namespace {
 class File {
  public:
   File(const std::string& path, int flags) : descriptor_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
-  ~File() { if (is_open()) ::close(descriptor_); }
+  ~File() {
+    if (is_open()) ::close(descriptor_);
+  }
   File(const File&) = delete;
   File& operator=(const File&) = delete;
 
@@ -123,10 +125,12 @@ struct MeshFormat {
 };
 
 constexpr MeshFormat kFormats[] = {
-    {".off", read_off, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_off(mesh); }},
+    {".off", read_off,
+     [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_off(mesh); }},
     {".obj", read_obj,
      [](const std::string&, const TriangleMesh& mesh, const GroupNames& groups) { return format_obj(mesh, groups); }},
-    {".ply", read_ply, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_ply(mesh); }},
+    {".ply", read_ply,
+     [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_ply(mesh); }},
     {".stl", read_stl,
      [](const std::string& path, const TriangleMesh& mesh, const GroupNames&) { return format_stl(path, mesh); }},
 };
@@ -247,8 +251,7 @@ void check_points(const std::string& path, const std::vector<Vec3>& vertices) {
         fail(path, fmt::format("vertex {}: a coordinate is not finite; nothing was written", v));
 }
 
-void check_face(const std::string& path, std::size_t face, const Index* begin, const Index* end,
-                std::size_t vertices) {
+void check_face(const std::string& path, std::size_t face, const Index* begin, const Index* end, std::size_t vertices) {
   for (const Index* v = begin; v != end; ++v)
     if (*v >= vertices)
       fail(path, fmt::format("face {}: index {} is out of range, the mesh has {} vertices; nothing was written", face,
@@ -327,8 +330,8 @@ std::vector<Edge> read_feature_edges(const std::string& path, const TriangleMesh
       if (word.empty()) in.fail("an edge has one vertex; give two");
       const std::int64_t i = in.integer(word);
       if (i < 0 || i >= static_cast<std::int64_t>(mesh.vertices.size()))
-        in.fail(fmt::format("index {} is out of range, the mesh has {} vertices; mend the edge", i,
-                            mesh.vertices.size()));
+        in.fail(
+            fmt::format("index {} is out of range, the mesh has {} vertices; mend the edge", i, mesh.vertices.size()));
       v = static_cast<Index>(i);
     }
     edges.push_back(e);

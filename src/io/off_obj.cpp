@@ -33,8 +33,8 @@ Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t verti
   if (v == 0) in.fail("index 0 is out of range, OBJ counts from 1; mend the line");
   const std::int64_t index = v > 0 ? v - 1 : static_cast<std::int64_t>(vertices) + v;
   if (index < 0 || index >= kNone)
-    in.fail(fmt::format("index {} is out of range after {}; mend the line", v,
-                        quantity(vertices, "vertex", "vertices")));
+    in.fail(
+        fmt::format("index {} is out of range after {}; mend the line", v, quantity(vertices, "vertex", "vertices")));
   return static_cast<Index>(index);
 }
 

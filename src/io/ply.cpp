@@ -27,12 +27,22 @@ std::size_t size_of(Scalar type) {
 }
 
 Scalar read_scalar_type(TextReader& in) {
-  static constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames{
-      {{"char", Scalar::int8}, {"int8", Scalar::int8}, {"uchar", Scalar::uint8}, {"uint8", Scalar::uint8},
-       {"short", Scalar::int16}, {"int16", Scalar::int16}, {"ushort", Scalar::uint16}, {"uint16", Scalar::uint16},
-       {"int", Scalar::int32}, {"int32", Scalar::int32}, {"uint", Scalar::uint32}, {"uint32", Scalar::uint32},
-       {"float", Scalar::float32}, {"float32", Scalar::float32}, {"double", Scalar::float64},
-       {"float64", Scalar::float64}}};
+  static constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames{{{"char", Scalar::int8},
+                                                                               {"int8", Scalar::int8},
+                                                                               {"uchar", Scalar::uint8},
+                                                                               {"uint8", Scalar::uint8},
+                                                                               {"short", Scalar::int16},
+                                                                               {"int16", Scalar::int16},
+                                                                               {"ushort", Scalar::uint16},
+                                                                               {"uint16", Scalar::uint16},
+                                                                               {"int", Scalar::int32},
+                                                                               {"int32", Scalar::int32},
+                                                                               {"uint", Scalar::uint32},
+                                                                               {"uint32", Scalar::uint32},
+                                                                               {"float", Scalar::float32},
+                                                                               {"float32", Scalar::float32},
+                                                                               {"double", Scalar::float64},
+                                                                               {"float64", Scalar::float64}}};
   const std::string_view word = in.word();
   for (const auto& [name, type] : kNames)
     if (word == name) return type;
@@ -70,9 +80,7 @@ struct PlyHeader {
   }
 };
 
-bool is_index_list(const PlyProperty& p) {
-  return p.list && (p.name == "vertex_indices" || p.name == "vertex_index");
-}
+bool is_index_list(const PlyProperty& p) { return p.list && (p.name == "vertex_indices" || p.name == "vertex_index"); }
 
 PlyProperty read_ply_property(TextReader& in) {
   PlyProperty property{};
@@ -389,10 +397,11 @@ std::vector<double> read_ply_scalars(Source& source, const PlyHeader& header, co
 }
 
 std::string ply_header(std::size_t vertices, std::size_t faces, std::size_t largest_degree) {
-  return fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
-                     "property double x\nproperty double y\nproperty double z\n"
-                     "element face {}\nproperty list {} {} vertex_indices\n",
-                     vertices, faces, largest_degree > 255 ? "uint" : "uchar", vertices >> 31 ? "uint" : "int");
+  return fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
+      "property double x\nproperty double y\nproperty double z\n"
+      "element face {}\nproperty list {} {} vertex_indices\n",
+      vertices, faces, largest_degree > 255 ? "uint" : "uchar", vertices >> 31 ? "uint" : "int");
 }
 
 void append_ply_vertices(std::string& out, const std::vector<Vec3>& vertices) {

@@ -183,8 +183,7 @@ class LegacyReader {
       in_.fail(std::string("a VTK file starts with '# vtk DataFile'; ") + kExportAgain);
     in_.line();
     const std::string_view form = in_.need_word("ASCII or BINARY");
-    if (same_word(form, "BINARY"))
-      binary_ = true;
+    if (same_word(form, "BINARY")) binary_ = true;
     else if (!same_word(form, "ASCII"))
       in_.fail("'" + printable(form) + "' is neither ASCII nor BINARY; " + kExportAgain);
     in_.big_endian = true;
@@ -199,10 +198,8 @@ class LegacyReader {
     in_.need_room(n, std::max<std::size_t>(1, components), sizeof(T), "items");
     std::vector<double> values(n * components);
     for (double& x : values) {
-      if constexpr (sizeof(T) == 1)
-        x = in_.binary ? static_cast<double>(in_.value<T>()) : in_.value<double>();
-      else
-        x = static_cast<double>(in_.value<T>());
+      if constexpr (sizeof(T) == 1) x = in_.binary ? static_cast<double>(in_.value<T>()) : in_.value<double>();
+      else x = static_cast<double>(in_.value<T>());
     }
     return values;
   }
@@ -214,28 +211,19 @@ class LegacyReader {
       in_.binary = true;
     }
     std::vector<double> values;
-    if (same_word(type, "DOUBLE"))
-      values = read_values<double>(n, components);
+    if (same_word(type, "DOUBLE")) values = read_values<double>(n, components);
     else if (same_word(type, "FLOAT"))
       values = binary_ ? read_values<float>(n, components) : read_values<double>(n, components);
     else if (is_one_of(type, {"INT", "VTKTYPEINT32"}) || (same_word(type, "VTKIDTYPE") && binary_))
       values = read_values<std::int32_t>(n, components);
-    else if (is_one_of(type, {"UNSIGNED_INT", "VTKTYPEUINT32"}))
-      values = read_values<std::uint32_t>(n, components);
-    else if (is_one_of(type, {"LONG", "VTKTYPEINT64", "VTKIDTYPE"}))
-      values = read_values<std::int64_t>(n, components);
-    else if (is_one_of(type, {"UNSIGNED_LONG", "VTKTYPEUINT64"}))
-      values = read_values<std::uint64_t>(n, components);
-    else if (is_one_of(type, {"SHORT", "VTKTYPEINT16"}))
-      values = read_values<std::int16_t>(n, components);
-    else if (is_one_of(type, {"UNSIGNED_SHORT", "VTKTYPEUINT16"}))
-      values = read_values<std::uint16_t>(n, components);
-    else if (is_one_of(type, {"CHAR", "VTKTYPEINT8"}))
-      values = read_values<std::int8_t>(n, components);
-    else if (is_one_of(type, {"UNSIGNED_CHAR", "VTKTYPEUINT8"}))
-      values = read_values<std::uint8_t>(n, components);
-    else
-      in_.fail("the type '" + printable(type) + "' is not read; save as double or int");
+    else if (is_one_of(type, {"UNSIGNED_INT", "VTKTYPEUINT32"})) values = read_values<std::uint32_t>(n, components);
+    else if (is_one_of(type, {"LONG", "VTKTYPEINT64", "VTKIDTYPE"})) values = read_values<std::int64_t>(n, components);
+    else if (is_one_of(type, {"UNSIGNED_LONG", "VTKTYPEUINT64"})) values = read_values<std::uint64_t>(n, components);
+    else if (is_one_of(type, {"SHORT", "VTKTYPEINT16"})) values = read_values<std::int16_t>(n, components);
+    else if (is_one_of(type, {"UNSIGNED_SHORT", "VTKTYPEUINT16"})) values = read_values<std::uint16_t>(n, components);
+    else if (is_one_of(type, {"CHAR", "VTKTYPEINT8"})) values = read_values<std::int8_t>(n, components);
+    else if (is_one_of(type, {"UNSIGNED_CHAR", "VTKTYPEUINT8"})) values = read_values<std::uint8_t>(n, components);
+    else in_.fail("the type '" + printable(type) + "' is not read; save as double or int");
     in_.binary = false;
     return values;
   }
@@ -415,28 +403,21 @@ class VtuReader {
     bool grid = false, piece = false;
     Tag tag;
     while (next_tag(tag)) {
-      if (tag.name == "VTKFile")
-        read_head(tag);
-      else if (tag.name == "UnstructuredGrid")
-        grid = true;
+      if (tag.name == "VTKFile") read_head(tag);
+      else if (tag.name == "UnstructuredGrid") grid = true;
       else if (tag.name == "Piece") {
         if (piece) fail(path_, "there are several pieces; merge them");
         piece = true;
         points_ = number(tag, "NumberOfPoints");
         cells_ = number(tag, "NumberOfCells");
-      } else if (tag.name == "Points")
-        section = Section::points;
-      else if (tag.name == "Cells")
-        section = Section::cells;
-      else if (tag.name == "PointData")
-        section = Section::point_data;
-      else if (tag.name == "CellData")
-        section = Section::cell_data;
+      } else if (tag.name == "Points") section = Section::points;
+      else if (tag.name == "Cells") section = Section::cells;
+      else if (tag.name == "PointData") section = Section::point_data;
+      else if (tag.name == "CellData") section = Section::cell_data;
       else if (tag.name == "/Points" || tag.name == "/Cells" || tag.name == "/PointData" || tag.name == "/CellData" ||
                tag.name == "/Piece")
         section = Section::none;
-      else if (tag.name == "DataArray" && section != Section::none)
-        take_array(tag, section);
+      else if (tag.name == "DataArray" && section != Section::none) take_array(tag, section);
     }
     if (!grid) fail(path_, "there is no UnstructuredGrid; save as an unstructured grid (.vtu)");
     if (!piece || grid_.points.empty() || grid_.types.empty())
@@ -597,26 +578,16 @@ class VtuReader {
         text = appended_.substr(offset);
       }
       const std::string bytes = read_bytes_of(ByteStream(path_, text, form == "binary" || appended_base64_));
-      if (type == "Float64")
-        values = unpack<double>(bytes);
-      else if (type == "Float32")
-        values = unpack<float>(bytes);
-      else if (type == "Int64")
-        values = unpack<std::int64_t>(bytes);
-      else if (type == "UInt64")
-        values = unpack<std::uint64_t>(bytes);
-      else if (type == "Int32")
-        values = unpack<std::int32_t>(bytes);
-      else if (type == "UInt32")
-        values = unpack<std::uint32_t>(bytes);
-      else if (type == "Int16")
-        values = unpack<std::int16_t>(bytes);
-      else if (type == "UInt16")
-        values = unpack<std::uint16_t>(bytes);
-      else if (type == "Int8")
-        values = unpack<std::int8_t>(bytes);
-      else if (type == "UInt8")
-        values = unpack<std::uint8_t>(bytes);
+      if (type == "Float64") values = unpack<double>(bytes);
+      else if (type == "Float32") values = unpack<float>(bytes);
+      else if (type == "Int64") values = unpack<std::int64_t>(bytes);
+      else if (type == "UInt64") values = unpack<std::uint64_t>(bytes);
+      else if (type == "Int32") values = unpack<std::int32_t>(bytes);
+      else if (type == "UInt32") values = unpack<std::uint32_t>(bytes);
+      else if (type == "Int16") values = unpack<std::int16_t>(bytes);
+      else if (type == "UInt16") values = unpack<std::uint16_t>(bytes);
+      else if (type == "Int8") values = unpack<std::int8_t>(bytes);
+      else if (type == "UInt8") values = unpack<std::uint8_t>(bytes);
       else
         fail(path_, fmt::format("the array '{}' has type '{}', which is not read; {}", printable(tag["Name"]),
                                 printable(type), kExportAgain));

@@ -52,7 +52,8 @@ double farthest(const std::vector<Vec3>& vertices, const FeatureEdges& edges, co
 }  // namespace
 
 FeatureDistance measure_feature_distance(const std::vector<Vec3>& vertices, const FeatureEdges& edges,
-                                         const std::vector<Vec3>& reference_vertices, const FeatureEdges& reference_edges) {
+                                         const std::vector<Vec3>& reference_vertices,
+                                         const FeatureEdges& reference_edges) {
   FeatureDistance result;
   if (edges.empty() && reference_edges.empty()) return result;
   if (edges.empty() || reference_edges.empty()) {

@@ -19,8 +19,7 @@ bool PolygonSplitter::split(const Index* corners, std::size_t n) {
 
 bool PolygonSplitter::project(std::size_t n) {
   Vec3 normal;
-  for (std::size_t i = 2; i < n; ++i)
-    normal += cross(position(i - 1) - position(0), position(i) - position(0));
+  for (std::size_t i = 2; i < n; ++i) normal += cross(position(i - 1) - position(0), position(i) - position(0));
   int axis = 0;
   for (int k = 1; k < 3; ++k)
     if (std::abs(normal[k]) > std::abs(normal[axis])) axis = k;

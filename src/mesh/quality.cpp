@@ -45,7 +45,8 @@ class Marks {
     std::array<bool, 3> marked{};
     for (int k = 0; k < 3 && !edges_.empty(); ++k) {
       const Index a = t[k], b = t[(k + 1) % 3];
-      marked[k] = std::binary_search(edges_.begin(), edges_.end(), std::array<Index, 2>{std::min(a, b), std::max(a, b)});
+      marked[k] =
+          std::binary_search(edges_.begin(), edges_.end(), std::array<Index, 2>{std::min(a, b), std::max(a, b)});
     }
     return marked;
   }

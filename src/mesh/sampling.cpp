@@ -70,8 +70,8 @@ std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t 
     const double at = random.uniform() * mass.back();
     const auto triangle = static_cast<Index>(std::upper_bound(mass.begin(), mass.end(), at) - mass.begin());
     const auto [a, b, c] = mesh.triangles[triangle];
-    const auto w = density.empty() ? uniform_weights(random)
-                                   : linear_weights(random, density[a], density[b], density[c]);
+    const auto w =
+        density.empty() ? uniform_weights(random) : linear_weights(random, density[a], density[b], density[c]);
     samples[i] = {w[0] * mesh.vertices[a] + w[1] * mesh.vertices[b] + w[2] * mesh.vertices[c], triangle};
   });
   return samples;

@@ -28,8 +28,8 @@ std::vector<std::array<Index, 4>> tet_adjacency(const std::vector<Tetrahedron>& 
     const Side &a = sides[k], &b = sides[k + 1];
     if (a.corners != b.corners) continue;
     if (k + 2 < sides.size() && sides[k + 2].corners == a.corners)
-      throw Error("the facet of the vertices " + std::to_string(a.corners[0]) + ", " + std::to_string(a.corners[1]) + " and " +
-                  std::to_string(a.corners[2]) + " belongs to more than two tetrahedra");
+      throw Error("the facet of the vertices " + std::to_string(a.corners[0]) + ", " + std::to_string(a.corners[1]) +
+                  " and " + std::to_string(a.corners[2]) + " belongs to more than two tetrahedra");
     adjacent[a.tet][static_cast<std::size_t>(a.facet)] = b.tet;
     adjacent[b.tet][static_cast<std::size_t>(b.facet)] = a.tet;
   }

@@ -15,8 +15,8 @@ inline Triangle facet_of(const Tetrahedron& tet, int k) {
   return {tet[kFacetCorners[k][0]], tet[kFacetCorners[k][1]], tet[kFacetCorners[k][2]]};
 }
 
-// For each tetrahedron and each of its facets the tetrahedron on the other side, or kNone on the boundary. Throws Error,
-// naming the first, if a facet has more than two tetrahedra.
+// For each tetrahedron and each of its facets the tetrahedron on the other side, or kNone on the boundary. Throws
+// Error, naming the first, if a facet has more than two tetrahedra.
 std::vector<std::array<Index, 4>> tet_adjacency(const std::vector<Tetrahedron>& tets);
 
 }  // namespace bisector

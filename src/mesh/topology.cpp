@@ -24,7 +24,8 @@ std::size_t corner_at(const std::vector<Triangle>& triangles, std::size_t half_e
 }
 
 // Number of vertices whose corners make more than one fan; `fans` links the corners (3 t + k) of each.
-std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count, DisjointSets<>& fans) {
+std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count,
+                                 DisjointSets<>& fans) {
   constexpr std::size_t kUnseen = static_cast<std::size_t>(-1);
   std::vector<std::size_t> fan(vertex_count, kUnseen);
   std::vector<char> split(vertex_count, 0);

@@ -16,8 +16,8 @@ struct EdgeTable {
 };
 EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
-// The component of each vertex, connected through triangles, numbered from 0 by lowest vertex; kNone for vertices that no
-// triangle uses.
+// The component of each vertex, connected through triangles, numbered from 0 by lowest vertex; kNone for vertices that
+// no triangle uses.
 std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
 }  // namespace bisector

@@ -94,9 +94,7 @@ std::size_t count_border(const EdgeTable& table) {
 class Borders {
  public:
   Borders(const Work& work, double tolerance)
-      : work_(work),
-        tolerance_(tolerance),
-        table(edge_table(work.triangles, work.points.size())),
+      : work_(work), tolerance_(tolerance), table(edge_table(work.triangles, work.points.size())),
         edge_of_(3 * work.triangles.size()),
         triangles_at_(items_at_vertices<std::size_t>(work.triangles, work.points.size())),
         stamp_(work.triangles.size(), 0) {

@@ -16,14 +16,14 @@
 namespace bisector {
 namespace {
 
-constexpr int kSamples = 3;               // per pixel and axis
-constexpr int kBandRows = 16;             // pixel rows that are drawn together
-constexpr int kBandMargin = 2;            // sample rows that a band sees of its neighbours, for outlines
-constexpr double kPictureMargin = 0.06;   // around the model, on each side, of the picture's size
-constexpr double kCameraDistance = 4;     // in radii of the bounding sphere
-constexpr double kCreaseCosine = 0.766;   // of 40 degrees between normals: sharper edges are not smoothed
-constexpr std::size_t kLargestFan = 64;   // faces at a vertex that smoothing looks at
-constexpr int kLargestPicture = 16384;    // pixels of width and height
+constexpr int kSamples = 3;              // per pixel and axis
+constexpr int kBandRows = 16;            // pixel rows that are drawn together
+constexpr int kBandMargin = 2;           // sample rows that a band sees of its neighbours, for outlines
+constexpr double kPictureMargin = 0.06;  // around the model, on each side, of the picture's size
+constexpr double kCameraDistance = 4;    // in radii of the bounding sphere
+constexpr double kCreaseCosine = 0.766;  // of 40 degrees between normals: sharper edges are not smoothed
+constexpr std::size_t kLargestFan = 64;  // faces at a vertex that smoothing looks at
+constexpr int kLargestPicture = 16384;   // pixels of width and height
 
 // Edges are drawn half as wide as this, in pixels. They are at their darkest, as a part of pure ink, where the
 // polygon's inner circle is at least as large as the last radius, in pixels, and fade to nothing at the first, where
@@ -37,15 +37,20 @@ constexpr double kNoEdgesRadius = 0.25, kFullEdgesRadius = 2;
 constexpr double kAmbient = 0.14, kSky = 0.16, kHead = 0.32, kKey = 0.54, kGloss = 0.06, kGlossExponent = 40;
 
 using Colour = std::array<unsigned char, 3>;
-constexpr Colour kNeutral{188, 211, 236};  // of polygons without a colour of their own
-constexpr Colour kInk{34, 44, 66};         // of edges and outlines
+constexpr Colour kNeutral{188, 211, 236};                      // of polygons without a colour of their own
+constexpr Colour kInk{34, 44, 66};                             // of edges and outlines
 constexpr Colour kTop{250, 251, 252}, kBottom{226, 231, 238};  // of the background
 
 // Light is added up linearly; files hold sRGB.
 struct Rgb {
   float r = 0, g = 0, b = 0;
 
-  Rgb& operator+=(const Rgb& o) { r += o.r; g += o.g; b += o.b; return *this; }
+  Rgb& operator+=(const Rgb& o) {
+    r += o.r;
+    g += o.g;
+    b += o.b;
+    return *this;
+  }
   friend Rgb operator*(float s, const Rgb& c) { return {s * c.r, s * c.g, s * c.b}; }
   friend Rgb operator*(const Rgb& a, const Rgb& b) { return {a.r * b.r, a.g * b.g, a.b * b.b}; }
   friend Rgb operator+(Rgb a, const Rgb& b) { return a += b; }
@@ -104,8 +109,8 @@ Camera aim(const std::vector<Vec3>& vertices, const Csr<Index>& polygons, const 
     hi_y = k ? std::max(hi_y, p.y) : p.y;
   }
   const double width = kSamples * options.width, height = kSamples * options.height;
-  const double scale = (1 - 2 * kPictureMargin) *
-                       std::min(width / std::max(hi_x - lo_x, 1e-9), height / std::max(hi_y - lo_y, 1e-9));
+  const double scale =
+      (1 - 2 * kPictureMargin) * std::min(width / std::max(hi_x - lo_x, 1e-9), height / std::max(hi_y - lo_y, 1e-9));
   camera.points.resize(vertices.size());
   parallel_each(vertices.size(), [&](std::size_t v) {
     const Projected p = project(vertices[v]);
@@ -170,8 +175,8 @@ class Lights {
 };
 
 struct Sample {
-  float nearness = 0;   // 0: background
-  Colour colour{};      // the polygon's, for outlines
+  float nearness = 0;  // 0: background
+  Colour colour{};     // the polygon's, for outlines
   Rgb light;
 };
 
@@ -297,9 +302,7 @@ void Band::draw_outlines() {
 }
 
 // At a height of 0 (top) to 1.
-Rgb background(double height) {
-  return mix(to_linear(kTop), to_linear(kBottom), static_cast<float>(height));
-}
+Rgb background(double height) { return mix(to_linear(kTop), to_linear(kBottom), static_cast<float>(height)); }
 
 // The pieces that touch each band of rows.
 Csr<Index> sort_into_bands(const Scene& scene, std::size_t bands) {
@@ -332,29 +335,32 @@ std::vector<unsigned char> render(const Scene& scene) {
   std::vector<unsigned char> pixels(3 * columns * rows);
   const auto bands = static_cast<std::size_t>((height + kBandRows - 1) / kBandRows);
   const Csr<Index> pieces = sort_into_bands(scene, bands);
-  parallel_each(bands, [&](std::size_t b) {
-    const int top = static_cast<int>(b) * kBandRows, bottom = std::min(height, top + kBandRows);
-    Band band(scene, std::max(0, kSamples * top - kBandMargin),
-              std::min(kSamples * height, kSamples * bottom + kBandMargin));
-    for (const Index* piece = pieces.begin(b); piece != pieces.end(b); ++piece) band.draw(scene.pieces[*piece]);
-    if (scene.options.outlines) band.draw_outlines();
-    for (int y = top; y < bottom; ++y) {
-      const Rgb sky = background((y + 0.5) / height);
-      for (int x = 0; x < width; ++x) {
-        Rgb sum;
-        for (int sy = 0; sy < kSamples; ++sy)
-          for (int sx = 0; sx < kSamples; ++sx) {
-            const Sample& sample = band.at(kSamples * x + sx, kSamples * y + sy);
-            sum += sample.nearness > 0 ? sample.light : sky;
+  parallel_each(
+      bands,
+      [&](std::size_t b) {
+        const int top = static_cast<int>(b) * kBandRows, bottom = std::min(height, top + kBandRows);
+        Band band(scene, std::max(0, kSamples * top - kBandMargin),
+                  std::min(kSamples * height, kSamples * bottom + kBandMargin));
+        for (const Index* piece = pieces.begin(b); piece != pieces.end(b); ++piece) band.draw(scene.pieces[*piece]);
+        if (scene.options.outlines) band.draw_outlines();
+        for (int y = top; y < bottom; ++y) {
+          const Rgb sky = background((y + 0.5) / height);
+          for (int x = 0; x < width; ++x) {
+            Rgb sum;
+            for (int sy = 0; sy < kSamples; ++sy)
+              for (int sx = 0; sx < kSamples; ++sx) {
+                const Sample& sample = band.at(kSamples * x + sx, kSamples * y + sy);
+                sum += sample.nearness > 0 ? sample.light : sky;
+              }
+            const Rgb mean = (1.0f / (kSamples * kSamples)) * sum;
+            unsigned char* pixel = &pixels[3 * (static_cast<std::size_t>(y) * columns + static_cast<std::size_t>(x))];
+            pixel[0] = to_srgb(mean.r);
+            pixel[1] = to_srgb(mean.g);
+            pixel[2] = to_srgb(mean.b);
           }
-        const Rgb mean = (1.0f / (kSamples * kSamples)) * sum;
-        unsigned char* pixel = &pixels[3 * (static_cast<std::size_t>(y) * columns + static_cast<std::size_t>(x))];
-        pixel[0] = to_srgb(mean.r);
-        pixel[1] = to_srgb(mean.g);
-        pixel[2] = to_srgb(mean.b);
-      }
-    }
-  }, 1);
+        }
+      },
+      1);
   return pixels;
 }
 
@@ -380,7 +386,7 @@ void write_preview(const std::string& path, const std::vector<Vec3>& vertices, c
   if (options.width < 1 || options.height < 1 || options.width > kLargestPicture || options.height > kLargestPicture)
     throw Error(path + ": a picture is 1 to 16384 pixels wide and high; choose another size");
   const Camera camera = aim(vertices, polygons, options);
-  const Scene scene{polygons, options, camera, corner_normals(vertices, polygons), split_into_pieces(polygons),
+  const Scene scene{polygons,      options, camera, corner_normals(vertices, polygons), split_into_pieces(polygons),
                     Lights(camera)};
   write_file(path, encode_png(render(scene), options.width, options.height));
 }

@@ -27,8 +27,8 @@ constexpr std::size_t kMostAdded = 100;
 // Lengths of curve, in edges: what a cell must hold to be snapped to it; what is worth a seed, and in the last rounds;
 // and links along a curve that are shorter are not divided.
 constexpr double kRoomToSnap = 0.4, kSmallest = 0.05, kTiniest = 0.002, kShortLink = 0.5;
-// Two curves from the same corner need protection where they are nearer than this, in edges; the shells of protecting seeds
-// are at least kLeastStep edges apart, and so many at most.
+// Two curves from the same corner need protection where they are nearer than this, in edges; the shells of protecting
+// seeds are at least kLeastStep edges apart, and so many at most.
 constexpr double kAcute = 0.8, kLeastStep = 0.3;
 constexpr std::size_t kMostShells = 1000;
 // A cell that holds less is pushed away from the curve by this share of its seed's distance.
@@ -76,15 +76,17 @@ Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const 
       const CurveInterval& i = intervals[k];
       const SeedPlace& place = places[i.cell];
       const bool own = place.curve == c;
-      const bool corner = !closed && place.corner != kNone && ((k == 0 && place.corner == curves.ends(c)[0]) ||
-                                                               (k + 1 == count && place.corner == curves.ends(c)[1]));
+      const bool corner =
+          !closed && place.corner != kNone &&
+          ((k == 0 && place.corner == curves.ends(c)[0]) || (k + 1 == count && place.corner == curves.ends(c)[1]));
       valid[k] = own || corner;
       if (!valid[k]) {
         found.faults.push_back({c, i.from, i.to, i.cell});
         continue;
       }
       const bool again = visits[i.cell]++ > 0 && !(around && k + 1 == count) && !corner;
-      if (again && !(place.position >= i.from && place.position <= i.to)) found.faults.push_back({c, i.from, i.to, kNone});
+      if (again && !(place.position >= i.from && place.position <= i.to))
+        found.faults.push_back({c, i.from, i.to, kNone});
     }
     // A chain of edges that no other curve has, each with a triangle on every sheet.
     const std::size_t links = count - (closed && !around ? 0 : 1);
@@ -135,8 +137,8 @@ double position_at_radius(const FeatureCurves& curves, Index curve, int end, dou
   return end == 0 ? curves.length(curve) : 0;
 }
 
-// Where on the curve to meet a foreign seed: as far from the corner they share as that seed, else across from it; in the middle
-// of the fault where that is elsewhere.
+// Where on the curve to meet a foreign seed: as far from the corner they share as that seed, else across from it; in
+// the middle of the fault where that is elsewhere.
 double meeting_position(const FeatureCurves& curves, const PlacedSeeds& seeds, const Fault& fault) {
   const double middle = 0.5 * (fault.from + fault.to), length = fault.to - fault.from;
   if (fault.cell == kNone || seeds.place(fault.cell).curve == kNone) return middle;
@@ -213,7 +215,8 @@ double length_along(const FeatureCurves& curves, const Arm& arm, double position
   return arm.end == 0 ? position : curves.length(arm.curve) - position;
 }
 
-// Gives the arms of a corner positions at the same distances from it, shell by shell, as far as they stay close to each other.
+// Gives the arms of a corner positions at the same distances from it, shell by shell, as far as they stay close to each
+// other.
 void protect_arms(const FeatureCurves& curves, const CurveMeasure& measure, double c, std::vector<Arm>& arms) {
   // The edge length near the corner, by the first arm; shells must be the same for all.
   const double edge = measure.edge_length(arms[0].curve, arms[0].end == 0 ? 0 : curves.length(arms[0].curve), c);
@@ -282,9 +285,10 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
     if (!zones[k].empty()) space_evenly(curves, measure, k, on[k], seeds);
 }
 
-// True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved away.
-bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<Fault>& faults, bool crowd,
-          bool last, PlacedSeeds& seeds) {
+// True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved
+// away.
+bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<Fault>& faults,
+          bool crowd, bool last, PlacedSeeds& seeds) {
   std::vector<std::size_t> wanted(curves.size());
   for (Index k = 0; k < curves.size(); ++k) wanted[k] = measure.edges(k, c) - (curves.closed(k) ? 0 : 1);
   for (const SeedPlace& place : seeds.places())
@@ -303,7 +307,8 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
     if (fault.cell != kNone && seeds.on_surface(fault.cell)) {
       if (std::exchange(used[fault.cell], 1)) continue;
       changed = true;
-      if (last || ((crowd || wanted[fault.curve] > 0) && length >= kRoomToSnap * measure.edge_length(fault.curve, position, c))) {
+      if (last || ((crowd || wanted[fault.curve] > 0) &&
+                   length >= kRoomToSnap * measure.edge_length(fault.curve, position, c))) {
         put(fault.cell, fault.curve, position, Kind::curve);
         if (wanted[fault.curve] > 0) --wanted[fault.curve];
       } else if (length >= kRoomToSnap * measure.edge_length(fault.curve, position, c)) {
@@ -337,8 +342,8 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
 
 }  // namespace
 
-FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
-                             const Diagram& diagram) {
+FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves,
+                             const std::vector<SeedPlace>& places, const Diagram& diagram) {
   return find_faults(trace, curves, places, diagram).report;
 }
 

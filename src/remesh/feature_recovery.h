@@ -1,10 +1,11 @@
 // Making the dual contain every feature curve as a chain of edges (thesis 4.4.3).
 //
-// A curve is in the dual if it runs through the cells of its own seeds alone, once through each, and every two that follow
-// each other on it have an edge in the dual with a triangle on each sheet. A foreign cell on a curve is moved away if it
-// hardly touches it, put elsewhere if the curve has its seeds, snapped to the curve if it lacks some, and met with one more
-// seed on the curve if it belongs to another curve: across from the foreign one, or, where the two curves meet at a corner, as
-// far from it: seeds at equal distances do not own parts of each other's curve, however small the angle. Such pairs are fixed.
+// A curve is in the dual if it runs through the cells of its own seeds alone, once through each, and every two that
+// follow each other on it have an edge in the dual with a triangle on each sheet. A foreign cell on a curve is moved
+// away if it hardly touches it, put elsewhere if the curve has its seeds, snapped to the curve if it lacks some, and
+// met with one more seed on the curve if it belongs to another curve: across from the foreign one, or, where the two
+// curves meet at a corner, as far from it: seeds at equal distances do not own parts of each other's curve, however
+// small the angle. Such pairs are fixed.
 #pragma once
 
 #include <array>
@@ -22,15 +23,15 @@ struct FeatureReport {
 };
 
 // `diagram` is that of seeds with these places, with polygons and dual.
-FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
-                             const Diagram& diagram);
+FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves,
+                             const std::vector<SeedPlace>& places, const Diagram& diagram);
 
-// Puts seeds on the surface whose cells reach a curve elsewhere, where the energy is high, and optimises again, for a bounded
-// number of rounds: curves have as many seeds of their own as they need.
+// Puts seeds on the surface whose cells reach a curve elsewhere, where the energy is high, and optimises again, for a
+// bounded number of rounds: curves have as many seeds of their own as they need.
 void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options);
 
-// Mends the curves that are broken and optimises again, for a bounded number of rounds. The count is kept in the first rounds;
-// in the last ones seeds are inserted and nothing moves. `c` is the scale of CurveMeasure.
+// Mends the curves that are broken and optimises again, for a bounded number of rounds. The count is kept in the first
+// rounds; in the last ones seeds are inserted and nothing moves. `c` is the scale of CurveMeasure.
 FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, double c,
                                OptimiseOptions options);
 

@@ -8,15 +8,15 @@
 
 namespace bisector {
 
-// Feature curves measured in edges of the result. With density rho the edge length is h = c rho^(-1/4), which gives the cells
-// of a surface equal energy; c follows from the number of vertices.
+// Feature curves measured in edges of the result. With density rho the edge length is h = c rho^(-1/4), which gives the
+// cells of a surface equal energy; c follows from the number of vertices.
 class CurveMeasure {
  public:
   // Both must outlive the object.
   CurveMeasure(const Surface& surface, const FeatureCurves& curves);
 
-  // The c with which equilateral triangles would need `vertices` vertices: N = (2 / sqrt 3) int rho^(1/2) / c^2 over the
-  // surface plus half the borders' integral of rho^(1/4) / c.
+  // The c with which equilateral triangles would need `vertices` vertices: N = (2 / sqrt 3) int rho^(1/2) / c^2 over
+  // the surface plus half the borders' integral of rho^(1/4) / c.
   double scale(std::size_t vertices) const;
   // The integral of rho^(1/4) along the curve up to a position.
   double at(Index curve, double position) const;

@@ -26,11 +26,11 @@ constexpr int kSplit = 2;
 constexpr std::size_t kFewSamples = 10'000;
 // Weight of a vertex's tangential distance to where its triangles would be equilateral, beside that of its samples.
 constexpr double kFairness = 0.2;
-constexpr double kUpright = 0.5;         // cosine between a triangle's normal and the reference's, at least
-constexpr double kResidual = 1e-4;       // of the linear system, relative
+constexpr double kUpright = 0.5;    // cosine between a triangle's normal and the reference's, at least
+constexpr double kResidual = 1e-4;  // of the linear system, relative
 constexpr int kSolverSteps = 200;
-constexpr int kHalvings = 6;             // of a vertex's step, then it stays; of the whole step, then the fit ends
-constexpr double kRounding = 1e-12;      // of the reference's diagonal: nearer than this there is nothing to gain
+constexpr int kHalvings = 6;         // of a vertex's step, then it stays; of the whole step, then the fit ends
+constexpr double kRounding = 1e-12;  // of the reference's diagonal: nearer than this there is nothing to gain
 constexpr std::uint64_t kRandomSeed = 1;
 
 using Corners = std::array<Vec3, 3>;
@@ -121,7 +121,7 @@ struct Local {
 struct Shape {
   double largest_cotangent = 0;  // of the smallest angle
   double quality = 0;
-  double upright = 0;            // cosine of the angle to the reference's normal
+  double upright = 0;  // cosine of the angle to the reference's normal
 };
 
 Shape shape_of(const Corners& p, const Vec3& upright) {
@@ -170,20 +170,20 @@ class Fit {
   const TriangleMesh& reference_;
   TriangleMesh& mesh_;
   const FitOptions& options_;
-  double diagonal_;                        // of the reference
+  double diagonal_;  // of the reference
   NearestOnMesh nearest_on_reference_;
-  Csr<std::size_t> corners_;               // at each of the mesh's vertices
+  Csr<std::size_t> corners_;  // at each of the mesh's vertices
   std::vector<char> fixed_;
-  std::vector<Part> parts_;                // of each of the mesh's triangles, with one sample in each part
-  std::vector<double> areas_;              // of the mesh's triangles at the start: the samples' weights do not change
+  std::vector<Part> parts_;    // of each of the mesh's triangles, with one sample in each part
+  std::vector<double> areas_;  // of the mesh's triangles at the start: the samples' weights do not change
   double total_area_ = 0;
-  std::vector<Vec3> points_;               // samples of the reference, in the order of its triangles
-  std::vector<Index> point_triangle_;      // of the reference
-  std::vector<Vec3> start_;                // vertices of the mesh
-  std::vector<Vec3> upright_;              // of each of the mesh's triangles: the reference's normal
+  std::vector<Vec3> points_;           // samples of the reference, in the order of its triangles
+  std::vector<Index> point_triangle_;  // of the reference
+  std::vector<Vec3> start_;            // vertices of the mesh
+  std::vector<Vec3> upright_;          // of each of the mesh's triangles: the reference's normal
   Shape bounds_;
-  std::vector<Index> foot_triangle_;       // of each of the mesh's samples, in the reference
-  std::vector<Index> found_triangle_;      // of each of the reference's samples, in the mesh
+  std::vector<Index> foot_triangle_;   // of each of the mesh's samples, in the reference
+  std::vector<Index> found_triangle_;  // of each of the reference's samples, in the mesh
 };
 
 Fit::Fit(const TriangleMesh& reference, TriangleMesh& mesh, const FitOptions& options)
@@ -236,12 +236,16 @@ void Fit::sample_reference() {
 
 void Fit::set_bounds() {
   upright_.resize(mesh_.triangles.size());
-  parallel_each(upright_.size(), [&](std::size_t t) {
-    const Corners p = corners_of(mesh_, start_, t);
-    const NearestPoint foot = nearest_on_reference_.nearest(at(p, {1.0 / 3, 1.0 / 3, 1.0 / 3}));
-    const Vec3 own = unit_normal(p), theirs = unit_normal(corners_of(reference_, reference_.vertices, foot.triangle));
-    upright_[t] = dot(own, theirs) > 0 ? theirs : own;
-  }, 128);
+  parallel_each(
+      upright_.size(),
+      [&](std::size_t t) {
+        const Corners p = corners_of(mesh_, start_, t);
+        const NearestPoint foot = nearest_on_reference_.nearest(at(p, {1.0 / 3, 1.0 / 3, 1.0 / 3}));
+        const Vec3 own = unit_normal(p),
+                   theirs = unit_normal(corners_of(reference_, reference_.vertices, foot.triangle));
+        upright_[t] = dot(own, theirs) > 0 ? theirs : own;
+      },
+      128);
   bounds_ = {0, 1, kUpright};
   if (!options_.min_angle || !options_.min_quality)
     for (std::size_t t = 0; t < upright_.size(); ++t) {
@@ -296,28 +300,31 @@ std::vector<Local> Fit::local_forms() const {
   for (std::size_t i = 0; i < points_.size(); ++i) points.values[slot[found_triangle_[i]]++] = static_cast<Index>(i);
 
   std::vector<Local> forms(mesh_.triangles.size());
-  parallel_each(forms.size(), [&](std::size_t t) {
-    if (!(areas_[t] > 0)) return;
-    const Corners p = corners_of(mesh_, mesh_.vertices, t);
-    const Vec3 normal = unit_normal(p);
-    const auto add = [&](double w, const Weights& b, const Vec3& pull, Index reference_triangle) {
-      if (!std::isfinite(b[0] + b[1] + b[2] + norm2(pull))) return;  // at a needle
-      forms[t].add(w, b);
-      const Vec3 theirs = unit_normal(corners_of(reference_, reference_.vertices, reference_triangle));
-      if (dot(normal, theirs) < 0) return;  // another sheet
-      for (int k = 0; k < 3; ++k) forms[t].pull[k] += (w * b[k]) * pull;
-    };
-    for (std::size_t i = t * parts_.size(); i < (t + 1) * parts_.size(); ++i) {
-      const Index foot = foot_triangle_[i];
-      const Weights b = sample_weights(i);
-      const Vec3 q = at(p, b);
-      add(mesh_weight(t), b, nearest_on(corners_of(reference_, reference_.vertices, foot), q) - q, foot);
-    }
-    for (const Index* i = points.begin(t); i != points.end(t); ++i) {
-      const Vec3 q = nearest_on(p, points_[*i]);
-      add(reference_weight(), weights_of(p, q), points_[*i] - q, point_triangle_[*i]);
-    }
-  }, 256);
+  parallel_each(
+      forms.size(),
+      [&](std::size_t t) {
+        if (!(areas_[t] > 0)) return;
+        const Corners p = corners_of(mesh_, mesh_.vertices, t);
+        const Vec3 normal = unit_normal(p);
+        const auto add = [&](double w, const Weights& b, const Vec3& pull, Index reference_triangle) {
+          if (!std::isfinite(b[0] + b[1] + b[2] + norm2(pull))) return;  // at a needle
+          forms[t].add(w, b);
+          const Vec3 theirs = unit_normal(corners_of(reference_, reference_.vertices, reference_triangle));
+          if (dot(normal, theirs) < 0) return;  // another sheet
+          for (int k = 0; k < 3; ++k) forms[t].pull[k] += (w * b[k]) * pull;
+        };
+        for (std::size_t i = t * parts_.size(); i < (t + 1) * parts_.size(); ++i) {
+          const Index foot = foot_triangle_[i];
+          const Weights b = sample_weights(i);
+          const Vec3 q = at(p, b);
+          add(mesh_weight(t), b, nearest_on(corners_of(reference_, reference_.vertices, foot), q) - q, foot);
+        }
+        for (const Index* i = points.begin(t); i != points.end(t); ++i) {
+          const Vec3 q = nearest_on(p, points_[*i]);
+          add(reference_weight(), weights_of(p, q), points_[*i] - q, point_triangle_[*i]);
+        }
+      },
+      256);
   return forms;
 }
 
@@ -486,8 +493,8 @@ FitReport Fit::run(const Context& context) {
       }
     }
     const double fraction = static_cast<double>(result.iterations) / options_.iterations;
-    context.report({"fit", result.iterations, options_.iterations, now.sum(), 0,
-                    options_.done + options_.share * fraction});
+    context.report(
+        {"fit", result.iterations, options_.iterations, now.sum(), 0, options_.done + options_.share * fraction});
   }
   result.restored = separate();
   if (result.restored > 0) now = pair_up(mesh_.vertices);

@@ -15,13 +15,13 @@ struct FitOptions {
   // Nonzero: the vertex stays (corners, creases). One per vertex of the mesh, or empty for none. Vertices at borders
   // and non-manifold edges stay in any case.
   std::vector<char> fixed;
-  int iterations = 10;             // at most
-  double tolerance = 0.01;         // ends when a step takes less than this share off the squared distance
+  int iterations = 10;      // at most
+  double tolerance = 0.01;  // ends when a step takes less than this share off the squared distance
   // No triangle's smallest angle (degrees) or Q (mesh/quality.h) falls below these; one that is below at the start gets
   // no worse. Without a value: the smallest of the mesh at the start, which holds back much of a mesh that has many
   // triangles near its smallest.
   std::optional<double> min_angle, min_quality;
-  double done = 0, share = 1;      // for progress: fraction of the whole run before the fit, and its own
+  double done = 0, share = 1;  // for progress: fraction of the whole run before the fit, and its own
 };
 
 // Minimises the two-sided mean squared distance between mesh and reference over the vertices, by alternation: fixed

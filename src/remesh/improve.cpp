@@ -26,17 +26,17 @@ constexpr int kSmoothingSweeps = 6;
 constexpr double kTether = 20;
 // A patch reaches so many edges from its middle.
 constexpr std::size_t kRings = 2;
-// A seed is poor if its triangles cost this many times the average. Of poor seeds that meet the goal kPoorTried are tried, and one
-// in kPoorShare of all.
+// A seed is poor if its triangles cost this many times the average. Of poor seeds that meet the goal kPoorTried are
+// tried, and one in kPoorShare of all.
 constexpr double kPoor = 1.5;
 constexpr std::size_t kPoorTried = 30, kPoorShare = 30;
-// In average costs of a triangle: the price of each triangle at a seed beyond or short of six; by how much a trial may be
-// worse after the first sweeps; and what the right number of seeds may cost, per seed.
+// In average costs of a triangle: the price of each triangle at a seed beyond or short of six; by how much a trial may
+// be worse after the first sweeps; and what the right number of seeds may cost, per seed.
 constexpr double kIrregular = 10, kTrialSlack = 4, kPrice = 20;
 // Edge flips that are tried per patch.
 constexpr std::size_t kFlips = 2;
-// Patches that are tried for each seed that is missing or too many, and the share of the number of seeds by which it may be
-// off on the way.
+// Patches that are tried for each seed that is missing or too many, and the share of the number of seeds by which it
+// may be off on the way.
 constexpr std::size_t kTriesToRestore = 8;
 constexpr double kDrift = 0.005;
 // Diagrams that are computed to find out which changes hold together.
@@ -48,15 +48,15 @@ enum class Star : unsigned char { disk, fan, other };
 struct Snapshot {
   PlacedSeeds seeds;
   DiagramOfSeeds known;
-  bool covers = false;            // the diagram is one of the whole surface
-  std::vector<double> costs;      // of the dual's triangles
+  bool covers = false;        // the diagram is one of the whole surface
+  std::vector<double> costs;  // of the dual's triangles
   std::vector<ShapeExcess> excess;
-  Csr<Index> stars;               // triangles at each seed
-  Csr<Index> rings;               // neighbours of each seed
+  Csr<Index> stars;  // triangles at each seed
+  Csr<Index> rings;  // neighbours of each seed
   std::vector<Star> kinds;
   FeatureReport features;
-  long long euler = 0;            // of the dual
-  double average = 0;             // cost
+  long long euler = 0;  // of the dual
+  double average = 0;   // cost
   ShapeExcess worst;
 
   const Dual& dual() const { return known.diagram.dual; }
@@ -128,7 +128,7 @@ struct Change {
   std::vector<Index> footprint;  // the free seeds of the patch, removed ones too
   std::vector<Moved> moved;
   std::vector<Index> removed;
-  std::vector<Index> curves;     // that it could break
+  std::vector<Index> curves;  // that it could break
   double gain = 0;
   std::size_t added = 0;
   int growth() const { return static_cast<int>(added) - static_cast<int>(removed.size()); }
@@ -175,8 +175,8 @@ class Improver {
   const ImproveOptions& options_;
   ShapeGoal goal_;
   std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
-  std::size_t poor_left_ = 0;     // poor seeds that may still be tried
-  std::vector<char> done_;        // by seed: tried in vain, and nothing near it has changed since
+  std::size_t poor_left_ = 0;                      // poor seeds that may still be tried
+  std::vector<char> done_;                         // by seed: tried in vain, and nothing near it has changed since
   Snapshot now_;
   ImproveReport report_;
 };
@@ -372,8 +372,8 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
     return a.excess != b.excess ? a.excess > b.excess : a.cost != b.cost ? a.cost > b.cost : a.seed < b.seed;
   });
   const auto missing = static_cast<long long>(wanted()) - static_cast<long long>(now_.seeds.size());
-  const std::size_t most = aim == Aim::better ? now_.seeds.size()
-                                              : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
+  const std::size_t most =
+      aim == Aim::better ? now_.seeds.size() : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
   std::vector<char> taken(now_.dual().triangles.size(), 0);
   std::vector<Index> middles;
   for (const Candidate& candidate : candidates) {
@@ -420,7 +420,8 @@ std::size_t Improver::batch(Aim aim) {
   const CellMap map(run_.surface(), now_.seeds.positions(), now_.moments().triangles, now_.rings);
   std::vector<Change> changes(middles.size());
   std::vector<std::size_t> trials(middles.size(), 0);
-  parallel_each(middles.size(), [&](std::size_t k) { changes[k] = best_change(middles[k], map, aim, trials[k]); }, 1);
+  parallel_each(
+      middles.size(), [&](std::size_t k) { changes[k] = best_change(middles[k], map, aim, trials[k]); }, 1);
   report_.trials += std::accumulate(trials.begin(), trials.end(), std::size_t{0});
   std::vector<char> on = choose_changes(changes, aim);
   const std::size_t before = now_.seeds.size();
@@ -565,7 +566,8 @@ void Improver::smooth() {
   for (int sweep = 0; sweep < kSmoothingSweeps; ++sweep) {
     run_.context().check();
     for (const std::vector<Index>& seeds : classes)
-      parallel_each(seeds.size(), [&](std::size_t k) { all.relax(seeds[k], kTether); }, 256);
+      parallel_each(
+          seeds.size(), [&](std::size_t k) { all.relax(seeds[k], kTether); }, 256);
   }
 
   std::vector<char> back(n, 0);

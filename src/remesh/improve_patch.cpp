@@ -13,16 +13,16 @@ namespace {
 using Kind = SeedPlace::Kind;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kAngleWeight = 0.5;                // of the smallest angle's cosine beside Q
-constexpr double kLinear = 10, kQuadratic = 200;  // of what is beyond the goal
-constexpr double kMargin = 2;                       // degrees within the goal, from where on it is felt
-constexpr double kHold = 6;                         // in a patch, for cells of about equal size
-constexpr double kFolded = 20;                      // cost of a triangle that turned over
-constexpr double kFacing = 0.2;                     // least cosine between a triangle and what it replaces
+constexpr double kAngleWeight = 0.5;                   // of the smallest angle's cosine beside Q
+constexpr double kLinear = 10, kQuadratic = 200;       // of what is beyond the goal
+constexpr double kMargin = 2;                          // degrees within the goal, from where on it is felt
+constexpr double kHold = 6;                            // in a patch, for cells of about equal size
+constexpr double kFolded = 20;                         // cost of a triangle that turned over
+constexpr double kFacing = 0.2;                        // least cosine between a triangle and what it replaces
 constexpr double kFirstStep = 0.1, kLastStep = 0.003;  // of the mean edge length
 constexpr double kDelaunaySlack = 1e-9;
 constexpr int kFlipPasses = 8;
-constexpr int kFlipEvery = 3;                       // sweeps
+constexpr int kFlipEvery = 3;  // sweeps
 
 double beyond(double excess) { return excess > 0 ? excess * (kLinear + kQuadratic * excess) : 0; }
 

@@ -1,5 +1,6 @@
-// A part of the dual as a triangulation that can be tried out: seeds move, appear and vanish, edges follow by Delaunay flips.
-// It is a guess at the restricted Delaunay triangulation that costs microseconds; the diagram has the last word (improve.h).
+// A part of the dual as a triangulation that can be tried out: seeds move, appear and vanish, edges follow by Delaunay
+// flips. It is a guess at the restricted Delaunay triangulation that costs microseconds; the diagram has the last word
+// (improve.h).
 #pragma once
 
 #include <array>
@@ -18,7 +19,8 @@ struct ShapeGoal {
 
 ShapeGoal shape_goal(double min_angle, double max_angle);
 
-// 0 for an equilateral triangle. Grows with 1 - Q (mesh/quality.h), with the smallest angle's cosine, and fast beyond the goal.
+// 0 for an equilateral triangle. Grows with 1 - Q (mesh/quality.h), with the smallest angle's cosine, and fast beyond
+// the goal.
 double shape_cost(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
 // By how many degrees the smallest angle is less than it should be and the largest one more.
 struct ShapeExcess {
@@ -34,11 +36,12 @@ struct ShapeExcess {
 };
 ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
 
-// The surface by the cells of a diagram: the nearest seed of a point owns the piece of the surface that the point goes to,
-// which keeps points on their sheet.
+// The surface by the cells of a diagram: the nearest seed of a point owns the piece of the surface that the point goes
+// to, which keeps points on their sheet.
 class CellMap {
  public:
-  // `cells` are the triangles of each cell, `rings` the neighbours of each seed in the dual. All must outlive the object.
+  // `cells` are the triangles of each cell, `rings` the neighbours of each seed in the dual. All must outlive the
+  // object.
   CellMap(const Surface& surface, const std::vector<Vec3>& seeds, const Csr<Index>& cells, const Csr<Index>& rings)
       : surface_(surface), seeds_(seeds), cells_(cells), rings_(rings) {}
 
@@ -53,15 +56,15 @@ class CellMap {
 };
 
 struct PatchVertex {
-  Vec3 x, normal;     // the normal is 0 where the seed is not on the surface alone
+  Vec3 x, normal;  // the normal is 0 where the seed is not on the surface alone
   SeedPlace place;
   Index owner = kNone;  // cell of the map that it is in
   Index seed = kNone;   // its index outside, if it has one
   bool free = false;
   bool removed = false;
-  Index outside = 0;    // triangles at it that are not in the patch
-  double step = 0;      // length that the next moves are tried with; 0 before the first
-  Vec3 start;           // where it was before that
+  Index outside = 0;  // triangles at it that are not in the patch
+  double step = 0;    // length that the next moves are tried with; 0 before the first
+  Vec3 start;         // where it was before that
 };
 
 class ImprovePatch {
@@ -73,14 +76,16 @@ class ImprovePatch {
   Index add_vertex(const PatchVertex& vertex);
   void add_triangle(const Triangle& t);
   // `degree`: triangles at the vertex, here and outside.
-  void set_outside(Index v, std::size_t degree) { vertices_[v].outside = static_cast<Index>(degree - stars_[v].size()); }
+  void set_outside(Index v, std::size_t degree) {
+    vertices_[v].outside = static_cast<Index>(degree - stars_[v].size());
+  }
   // Edges that stay, lower vertex first, each pair once; in any order.
   void lock(std::vector<std::array<Index, 2>> edges);
 
   const std::vector<PatchVertex>& vertices() const { return vertices_; }
   std::vector<Triangle> triangles() const;
-  // Sum of the triangles' costs, each less `average`, and so much for each triangle that a vertex on the surface has more or
-  // fewer than six.
+  // Sum of the triangles' costs, each less `average`, and so much for each triangle that a vertex on the surface has
+  // more or fewer than six.
   double cost(double average, double irregular) const;
 
   // Each is false, and nothing is changed, if the triangulation has no room for it.
@@ -97,8 +102,8 @@ class ImprovePatch {
 
   // Flips edges until all are Delaunay, as far as the locked ones allow.
   void make_delaunay();
-  // Moves v to where its triangles, and `hold` times the square of its way from the start in edge lengths, cost less; true if it
-  // moved. Touches nothing but v and the costs of its triangles.
+  // Moves v to where its triangles, and `hold` times the square of its way from the start in edge lengths, cost less;
+  // true if it moved. Touches nothing but v and the costs of its triangles.
   bool relax(Index v, double hold);
   // Relaxes the free vertices in order, so many times, with flips in between.
   void relax_all(int sweeps);
@@ -129,7 +134,7 @@ class ImprovePatch {
   ShapeGoal goal_;
   std::vector<PatchVertex> vertices_;
   std::vector<PatchTriangle> triangles_;
-  std::vector<std::vector<Index>> stars_;  // triangles at each vertex
+  std::vector<std::vector<Index>> stars_;     // triangles at each vertex
   std::vector<std::array<Index, 2>> locked_;  // sorted
 };
 

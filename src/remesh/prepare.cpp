@@ -15,8 +15,8 @@
 namespace bisector {
 namespace {
 
-// With few seeds to start from the count says nothing about the result's, which topology control finds. The density then is
-// one that a mesh of so many vertices could follow.
+// With few seeds to start from the count says nothing about the result's, which topology control finds. The density
+// then is one that a mesh of so many vertices could follow.
 constexpr std::size_t kLeastForDensity = 3000;
 constexpr std::size_t kMostVertices = 100'000'000;
 
@@ -38,8 +38,10 @@ std::string plural(std::size_t count, const char* word) {
 }
 
 void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const Context& context) {
-  if (welded.merged_vertices + welded.split_edges + welded.degenerate_triangles + welded.duplicate_triangles == 0) return;
-  std::string line = fmt::format("welded {} {}", welded.merged_vertices, welded.merged_vertices == 1 ? "vertex" : "vertices");
+  if (welded.merged_vertices + welded.split_edges + welded.degenerate_triangles + welded.duplicate_triangles == 0)
+    return;
+  std::string line =
+      fmt::format("welded {} {}", welded.merged_vertices, welded.merged_vertices == 1 ? "vertex" : "vertices");
   if (welded.split_edges) line += fmt::format(", split {} at cracks", plural(welded.split_edges, "edge"));
   if (welded.degenerate_triangles + welded.duplicate_triangles)
     line += fmt::format(", removed {}", plural(welded.degenerate_triangles + welded.duplicate_triangles, "triangle"));
@@ -71,8 +73,8 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
   if (topology.boundary_edges == 0) return keep_apart(input, 0);
   WeldResult welded = weld(input, 0);
-  const bool useful = welded.border_after < welded.border_before &&
-                      non_manifold_edges(welded.mesh) <= topology.non_manifold_edges;
+  const bool useful =
+      welded.border_after < welded.border_before && non_manifold_edges(welded.mesh) <= topology.non_manifold_edges;
   return useful ? welded : keep_apart(input, topology.boundary_edges);
 }
 
@@ -113,8 +115,8 @@ PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, c
   sizing.sharp = graph.edges;
   SizedMesh sized = refine_for_density(welded, sizing, target);
   if (sized.sizing.vertices > kMostVertices && options.seeds.empty())
-    throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones", options.edge_length,
-                            static_cast<double>(sized.sizing.vertices), kMostVertices));
+    throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
+                            options.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));
   prepared.features = split_features(graph, sized.splits);
   prepared.mesh = std::move(sized.mesh);
   prepared.mesh.feature_edges.clear();

@@ -28,13 +28,13 @@
 namespace bisector {
 namespace {
 
-// Of the steps allowed per level: the coarsest of several levels settles soon, the finest starts near its minimum, and seeds that
-// are put on the surface move little.
+// Of the steps allowed per level: the coarsest of several levels settles soon, the finest starts near its minimum, and
+// seeds that are put on the surface move little.
 constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0.05;
 constexpr int kMendingRounds = 3;  // of features and topology
 constexpr int kFreedSteps = 20;
 constexpr double kFitQuality = 0.7;  // what fitting may bring better triangles down to
-constexpr double kMaxAngle = 91;  // degrees; goal of the final pass
+constexpr double kMaxAngle = 91;     // degrees; goal of the final pass
 
 double steps_share(std::size_t level, std::size_t levels) {
   if (levels == 1) return 1;
@@ -58,8 +58,8 @@ void check_options(const RemeshOptions& options) {
   if (options.edge_length == 0 || !options.seeds.empty()) check_plan(plan_of(options));
 }
 
-// Seeds level by level, coarse to fine, those on features moving along them from the first; then what makes a good mesh of
-// their dual.
+// Seeds level by level, coarse to fine, those on features moving along them from the first; then what makes a good mesh
+// of their dual.
 class Pipeline {
  public:
   Pipeline(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context)
@@ -144,14 +144,15 @@ void Pipeline::optimise_levels() {
   if (!plan_.places.empty()) {
     run_.seeds = PlacedSeeds(plan_.seeds, plan_.places);
   } else {
-    run_.seeds = PlacedSeeds(plan_.seeds.empty() ? initial_seeds(surface_, counts.front(), plan_.random_seed)
-                                                    : plan_.seeds);
+    run_.seeds =
+        PlacedSeeds(plan_.seeds.empty() ? initial_seeds(surface_, counts.front(), plan_.random_seed) : plan_.seeds);
     place_on_features(counts.front());
   }
 
   // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
   double total = plan_.constrained ? kConstrainedShare * cost(counts.back()) : 0;
-  for (std::size_t level = 0; level < counts.size(); ++level) total += steps_share(level, counts.size()) * cost(counts[level]);
+  for (std::size_t level = 0; level < counts.size(); ++level)
+    total += steps_share(level, counts.size()) * cost(counts[level]);
   for (std::size_t level = 0; level < counts.size(); ++level) {
     step_.phase = counts.size() > 1 ? fmt::format("level {}/{}", level + 1, counts.size()) : "optimising";
     const double share = steps_share(level, counts.size());
@@ -180,7 +181,8 @@ bool Pipeline::dual_suffices() {
   return same_topology(analyse_topology(dual, run_.seeds.size()), result_.input_topology);
 }
 
-// Seeds at tips where topology fails are no longer held there: two cells may wrap around a tip that is thin. True if there are any.
+// Seeds at tips where topology fails are no longer held there: two cells may wrap around a tip that is thin. True if
+// there are any.
 bool Pipeline::free_tips() {
   std::vector<char> on_curve(curves_.graph().corners.size(), 0);
   for (Index c = 0; c < curves_.size(); ++c)

@@ -11,15 +11,15 @@ namespace bisector {
 
 // What remeshing takes once the domain is made: surface, density and features are given beside it.
 struct RemeshPlan {
-  std::size_t vertices = 0;   // wanted; not heeded if there are seeds
-  std::vector<Vec3> seeds;    // start from these, in one level; topology control may add as many as it takes
+  std::size_t vertices = 0;  // wanted; not heeded if there are seeds
+  std::vector<Vec3> seeds;   // start from these, in one level; topology control may add as many as it takes
   // Of each seed; those on features are there already. Empty: features get seeds of their own.
   std::vector<SeedPlace> places = {};
   std::uint64_t random_seed = 1;
-  int iterations = 100;       // as in RemeshOptions, like those that follow
+  int iterations = 100;  // as in RemeshOptions, like those that follow
   double tolerance = 1e-6;
   int levels = 0;
-  bool constrained = true;    // seeds end on the surface (CCVT)
+  bool constrained = true;  // seeds end on the surface (CCVT)
   TopologyControl topology = TopologyControl::enforce;
   double min_angle = 40;
   bool fit = false;
@@ -28,7 +28,9 @@ struct RemeshPlan {
 // What of the options is left then. Energy::automatic means constrained.
 RemeshPlan plan_of(const RemeshOptions& options);
 
-// Throws as the public remesh(): for fewer than 4 vertices, a number of places other than that of seeds, DeviceError, Cancelled.
-RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context = {});
+// Throws as the public remesh(): for fewer than 4 vertices, a number of places other than that of seeds, DeviceError,
+// Cancelled.
+RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan,
+                    const Context& context = {});
 
 }  // namespace bisector

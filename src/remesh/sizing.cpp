@@ -21,16 +21,16 @@
 namespace bisector {
 namespace {
 
-constexpr double kSmallestFeature = 0.25;     // of the uniform edge length: smaller ones do not show in the result
-constexpr double kSamplesPerVertex = 32;      // of the surface for lfs: their spacing is then that smallest feature
+constexpr double kSmallestFeature = 0.25;  // of the uniform edge length: smaller ones do not show in the result
+constexpr double kSamplesPerVertex = 32;   // of the surface for lfs: their spacing is then that smallest feature
 constexpr double kMostSamples = 300'000;
-constexpr double kLongest = 2;                // edge length by h above which an edge is bisected
-constexpr double kSteepest = 2;               // ratio of densities above which it is
-constexpr double kShortest = 0.5;             // edge length by h below which it is not for the sake of that ratio
-constexpr std::size_t kTriangles = 400'000;   // refinement stops there
-constexpr double kMostVertices = 1e8;         // that an edge length may ask for
-constexpr int kRounds = 8;                    // of refinement and calibration
-constexpr double kSettled = 1e-3;             // relative error of the calibration
+constexpr double kLongest = 2;               // edge length by h above which an edge is bisected
+constexpr double kSteepest = 2;              // ratio of densities above which it is
+constexpr double kShortest = 0.5;            // edge length by h below which it is not for the sake of that ratio
+constexpr std::size_t kTriangles = 400'000;  // refinement stops there
+constexpr double kMostVertices = 1e8;        // that an edge length may ask for
+constexpr int kRounds = 8;                   // of refinement and calibration
+constexpr double kSettled = 1e-3;            // relative error of the calibration
 
 double fourth_root(double x) { return std::sqrt(std::sqrt(x)); }
 
@@ -80,8 +80,8 @@ MeshEstimate estimate(const Domain& domain, const std::vector<double>& h) {
   const double inverse = fixed_sum(domain.areas.size(), [&](std::size_t t) {
     const Triangle& v = domain.triangles[t];
     const double d[3] = {density(v[0]), density(v[1]), density(v[2])};
-    return domain.areas[t] / 3 * (fourth_root(0.5 * (d[0] + d[1])) + fourth_root(0.5 * (d[1] + d[2])) +
-                                  fourth_root(0.5 * (d[2] + d[0])));
+    return domain.areas[t] / 3 *
+           (fourth_root(0.5 * (d[0] + d[1])) + fourth_root(0.5 * (d[1] + d[2])) + fourth_root(0.5 * (d[2] + d[0])));
   });
   const double border = fixed_sum(domain.borders.size(), [&](std::size_t e) {
     const Border& b = domain.borders[e];
@@ -132,17 +132,23 @@ void check_bounds(const Domain& domain, const SizingOptions& options, const Sizi
       throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones",
                               target.edge_length, kMostVertices));
     if (target.edge_length < least || (largest > 0 && target.edge_length > largest))
-      throw Error(fmt::format("sizing: the edge length {:g} is not within the bounds asked for; change it or "
-                              "the least or largest edge length", target.edge_length));
+      throw Error(
+          fmt::format("sizing: the edge length {:g} is not within the bounds asked for; change it or "
+                      "the least or largest edge length",
+                      target.edge_length));
     return;
   }
   const auto count = static_cast<double>(target.vertices);
   if (least > 0 && uniform_count(domain, least) < count)
-    throw Error(fmt::format("sizing: {} vertices do not fit with edges of {:g} and more; ask for at most {:.0f}, or "
-                            "for shorter edges", target.vertices, least, uniform_count(domain, least)));
+    throw Error(
+        fmt::format("sizing: {} vertices do not fit with edges of {:g} and more; ask for at most {:.0f}, or "
+                    "for shorter edges",
+                    target.vertices, least, uniform_count(domain, least)));
   if (largest > 0 && uniform_count(domain, largest) > count)
-    throw Error(fmt::format("sizing: {} vertices are too few for edges of at most {:g}; ask for at least {:.0f}, or "
-                            "for longer edges", target.vertices, largest, uniform_count(domain, largest)));
+    throw Error(
+        fmt::format("sizing: {} vertices are too few for edges of at most {:g}; ask for at least {:.0f}, or "
+                    "for longer edges",
+                    target.vertices, largest, uniform_count(domain, largest)));
 }
 
 // The mean of each vertex's logarithm and that of its neighbours.
@@ -163,8 +169,7 @@ void smooth_logarithms(const TriangleMesh& mesh, std::vector<double>& values) {
 class Field {
  public:
   // For a result that would have so many vertices and edges of that length if it were uniform.
-  Field(const TriangleMesh& mesh, const SizingOptions& options, double vertices, double uniform)
-      : kind_(options.kind) {
+  Field(const TriangleMesh& mesh, const SizingOptions& options, double vertices, double uniform) : kind_(options.kind) {
     const double diagonal = bounding_box(mesh.vertices).diagonal();
     unit_ = diagonal;
     least_ = std::min(kSmallestFeature * uniform / diagonal, 1.0);
@@ -301,11 +306,7 @@ class Refiner {
  public:
   // `lengths`: h at the vertices; `factor`: h where the field is 1.
   Refiner(SizedMesh& sized, Field& field, std::vector<double> lengths, double factor, const SizingOptions& options)
-      : mesh_(sized.mesh),
-        sized_(sized),
-        field_(field),
-        lengths_(std::move(lengths)),
-        factor_(factor),
+      : mesh_(sized.mesh), sized_(sized), field_(field), lengths_(std::move(lengths)), factor_(factor),
         options_(options) {}
 
   // False if nothing had to be bisected.

@@ -38,8 +38,8 @@ MeshEstimate estimate_mesh(const TriangleMesh& mesh, const Sizing& sizing);
 // 4 / h0]: what is smaller than the edges could show is no reason to be finer still, and no density is 0 or infinite.
 // Curvature is averaged over balls of radius h0, as far as principal_curvatures goes, and its logarithm once more over
 // neighbours; lfs is a distance and needs no smoothing. Then h = clamp(limit_gradation(c rho^(-1/4)), min_edge,
-// max_edge), c being chosen for the target. Throws Error for a bad value, where the target cannot be had within min_edge
-// and max_edge, and for edges so short that they make more than 100 million vertices.
+// max_edge), c being chosen for the target. Throws Error for a bad value, where the target cannot be had within
+// min_edge and max_edge, and for edges so short that they make more than 100 million vertices.
 Sizing compute_sizing(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target);
 
 // The edge length aimed at, at a vertex or at barycentric coordinates on a triangle.
@@ -51,7 +51,7 @@ double target_edge_length(const Sizing& sizing, const TriangleMesh& mesh, Index 
 struct SizedMesh {
   TriangleMesh mesh;
   Sizing sizing;
-  std::vector<Index> parent;                 // input triangle of each triangle
+  std::vector<Index> parent;  // input triangle of each triangle
   EdgeSplits splits;
 };
 

@@ -19,8 +19,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Rounds of inserting seeds: with an optimisation of so many steps after each (thesis 4.4.4), while more than one cell in
-// kTooFew fails; then without. Every kFarRounds-th round of the latter inserts far points.
+// Rounds of inserting seeds: with an optimisation of so many steps after each (thesis 4.4.4), while more than one cell
+// in kTooFew fails; then without. Every kFarRounds-th round of the latter inserts far points.
 constexpr int kGrowingRounds = 12, kGrowingSteps = 30, kRefiningRounds = 80, kFarRounds = 3;
 constexpr std::size_t kTooFew = 8;
 // Refining has no end if there are so many times the failures of the beginning, and kMostAdded more.
@@ -58,9 +58,9 @@ struct Extremes {
   }
 };
 
-// Points of the diagram where another seed would mend a failure: the nearest to the seed of what is to be split off, which on a
-// thin part is opposite to it, so that the bisector runs between the sides; or, on demand, the farthest from the seeds there
-// are, as in Delaunay refinement, which spreads seeds evenly and so ends.
+// Points of the diagram where another seed would mend a failure: the nearest to the seed of what is to be split off,
+// which on a thin part is opposite to it, so that the bisector runs between the sides; or, on demand, the farthest from
+// the seeds there are, as in Delaunay refinement, which spreads seeds evenly and so ends.
 class Repair {
  public:
   Repair(const Surface& surface, const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds, bool far)
@@ -138,8 +138,8 @@ class Repair {
     add_others(parts);
   }
 
-  // A cell with a part that is not a disk: where it faces away from the seed's side, as on the back of a limb, else the far
-  // points of its loops, else its farthest point.
+  // A cell with a part that is not a disk: where it faces away from the seed's side, as on the back of a limb, else the
+  // far points of its loops, else its farthest point.
   void open_up(const BallReport::Cell& c) {
     const bool disks = c.euler == static_cast<long long>(c.components) && c.loops == c.components;
     if (disks && c.components > 1) return;
@@ -188,7 +188,8 @@ class Repair {
   std::vector<Vec3> thinned() const {
     std::vector<Vec3> kept;
     for (const Candidate& c : candidates_)
-      if (std::all_of(kept.begin(), kept.end(), [&](const Vec3& p) { return norm2(p - c.point) >= kApart * c.squared; }))
+      if (std::all_of(kept.begin(), kept.end(),
+                      [&](const Vec3& p) { return norm2(p - c.point) >= kApart * c.squared; }))
         kept.push_back(c.point);
     return kept;
   }
@@ -219,10 +220,7 @@ void mark_neighbours(const std::vector<DualEdge>& edges, std::vector<char>& mark
 class Control {
  public:
   Control(CvtRun& run, OptimiseOptions options)
-      : run_(run),
-        options_(std::move(options)),
-        wanted_(run.seeds.size()),
-        given_(wanted_),
+      : run_(run), options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_),
         most_(std::max(budget(), kGrown)) {
     options_.done = 1;
     options_.share = 0;
@@ -353,9 +351,7 @@ class Control {
     const std::vector<Moments>& cells = run_.diagram().moments.cells;
     std::vector<Index> order(given_);
     std::iota(order.begin(), order.end(), Index{0});
-    std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-      return cells[a].second < cells[b].second;
-    });
+    std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return cells[a].second < cells[b].second; });
     std::vector<Index> spared;
     for (Index i : order) {
       if (spared.size() == count) break;
@@ -394,8 +390,8 @@ class Control {
     return failing;
   }
 
-  // Moves the seeds that are not held as far as the property goes on holding: where it would not, seeds go back, and are held
-  // from then on. False, and nothing is moved, if that does not help.
+  // Moves the seeds that are not held as far as the property goes on holding: where it would not, seeds go back, and
+  // are held from then on. False, and nothing is moved, if that does not help.
   bool move(const PlacedSeeds& before, const std::vector<Vec3>& next, std::vector<char>& held) {
     run_.seeds = before;
     for (int retreat = 0; retreat <= kRetreats; ++retreat) {
@@ -451,18 +447,18 @@ class Control {
 
   CvtRun& run_;
   OptimiseOptions options_;
-  std::size_t wanted_;       // vertices
-  std::size_t given_;        // seeds before those inserted by refining
-  std::size_t most_;         // seeds
-  double gap_ = kCrossing;   // see divide_cells
+  std::size_t wanted_;      // vertices
+  std::size_t given_;       // seeds before those inserted by refining
+  std::size_t most_;        // seeds
+  double gap_ = kCrossing;  // see divide_cells
   TopologyOutcome outcome_;
   const RestrictedPolygons* polygons_ = nullptr;  // of the run's diagram, or divided_
   RestrictedPolygons divided_;
   std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells
   SavedSeeds best_;
-  std::size_t fewest_ = 0;      // failures of the best seeds
+  std::size_t fewest_ = 0;  // failures of the best seeds
   std::size_t least_surplus_ = 0;
-  bool best_has_too_few_ = true;     // too many cells of the best seeds fail
+  bool best_has_too_few_ = true;  // too many cells of the best seeds fail
 };
 
 }  // namespace
@@ -484,22 +480,26 @@ TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual) {
 }
 
 bool same_topology(const MeshTopology& dual, const MeshTopology& input) {
-  return dual.manifold == input.manifold && dual.oriented == input.oriented && dual.closed == input.closed && dual.euler == input.euler &&
-         dual.components == input.components;
+  return dual.manifold == input.manifold && dual.oriented == input.oriented && dual.closed == input.closed &&
+         dual.euler == input.euler && dual.components == input.components;
 }
 
 std::vector<TopologyFault> topology_faults(const BallReport& report, const std::vector<Vec3>& seeds) {
   std::vector<TopologyFault> faults;
   for (const BallReport::Cell& c : report.cells)
-    faults.push_back({{c.seed}, seeds[c.seed],
-                      fmt::format("cell of {} components and Euler characteristic {}, with {} loops and {} parts of the border",
-                                  c.components, c.euler, c.loops, c.border_parts)});
+    faults.push_back(
+        {{c.seed},
+         seeds[c.seed],
+         fmt::format("cell of {} components and Euler characteristic {}, with {} loops and {} parts of the border",
+                     c.components, c.euler, c.loops, c.border_parts)});
   for (const BallReport::Edge& e : report.edges)
-    faults.push_back({{e.a, e.b}, seeds[e.a],
+    faults.push_back({{e.a, e.b},
+                      seeds[e.a],
                       fmt::format("edge of {} components with {} ends, {} of them on the border", e.components, e.ends,
                                   e.border_points)});
   for (const BallReport::Vertex& v : report.vertices)
-    faults.push_back({{v.seeds[0], v.seeds[1], v.seeds[2]}, seeds[v.seeds[0]],
+    faults.push_back({{v.seeds[0], v.seeds[1], v.seeds[2]},
+                      seeds[v.seeds[0]],
                       fmt::format("three cells that meet in {} points", v.places.size())});
   return faults;
 }

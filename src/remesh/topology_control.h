@@ -31,15 +31,19 @@ struct TopologyOutcome {
 };
 
 // Inserts seeds until the topological ball property holds:
-// - While an eighth of the cells fail there are too few seeds, and the optimisation runs again after each round (thesis 4.4.4).
-// - Then without optimising, for a density that makes cells larger than the surface is thick would draw the new seeds away.
-// - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are optimised as
+// - While an eighth of the cells fail there are too few seeds, and the optimisation runs again after each round
+// (thesis 4.4.4).
+// - Then without optimising, for a density that makes cells larger than the surface is thick would draw the new seeds
+// away.
+// - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are
+// optimised as
 //   far as the property goes on holding.
 // Cells of sheets that cross or nearly touch are divided (sheets.h): the report then names the sheets in
 // TopologyOutcome::sheets by indices after those of the seeds.
 //
-// Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to the seeds
-// with the fewest failures, which topology_faults lists. Surfaces that are not manifold and oriented are only checked.
+// Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to
+// the seeds with the fewest failures, which topology_faults lists. Surfaces that are not manifold and oriented are only
+// checked.
 TopologyOutcome enforce_topology(CvtRun& run, const MeshTopology& input, OptimiseOptions options);
 
 }  // namespace bisector

@@ -53,7 +53,8 @@ DualGraph dual_graph(const TriangleMesh& mesh) {
   graph.neighbours.values.reserve(found.values.size());
   graph.edge_length.reserve(found.values.size());
   for (std::size_t t = 0; t < n; ++t) {
-    Neighbour *const begin = found.values.data() + found.offsets[t], *const end = found.values.data() + found.offsets[t + 1];
+    Neighbour *const begin = found.values.data() + found.offsets[t], *const end =
+                                                                         found.values.data() + found.offsets[t + 1];
     std::stable_sort(begin, end, [](const Neighbour& p, const Neighbour& q) { return p.triangle < q.triangle; });
     for (const Neighbour* it = begin; it != end; ++it) {
       if (it != begin && it->triangle == graph.neighbours.values.back()) {

@@ -9,9 +9,10 @@
 namespace bisector {
 
 struct DualGraph {
-  Csr<Index> neighbours;            // of each triangle, ascending; all pairs of triangles at an edge of more than two
-  std::vector<double> edge_length;  // of the edge shared with each neighbour, as in `neighbours`; several shared ones added
-  double mean_edge_length = 0;      // over the mesh's edges
+  Csr<Index> neighbours;  // of each triangle, ascending; all pairs of triangles at an edge of more than two
+  std::vector<double>
+      edge_length;              // of the edge shared with each neighbour, as in `neighbours`; several shared ones added
+  double mean_edge_length = 0;  // over the mesh's edges
 };
 
 DualGraph dual_graph(const TriangleMesh& mesh);

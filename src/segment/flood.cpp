@@ -6,9 +6,11 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kMostSearched = 40;  // triangles about one that is to leave its region, to see that the rest hangs together
-constexpr int kRounds = 20;                // of moves at borders
-// What rounding alone could turn is left as it is: relative and absolute slack of squared distances in the unit-sized model.
+constexpr std::size_t kMostSearched =
+    40;                      // triangles about one that is to leave its region, to see that the rest hangs together
+constexpr int kRounds = 20;  // of moves at borders
+// What rounding alone could turn is left as it is: relative and absolute slack of squared distances in the unit-sized
+// model.
 constexpr double kRelativeSlack = 1e-9, kAbsoluteSlack = 1e-18;
 
 struct Offer {

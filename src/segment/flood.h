@@ -14,10 +14,10 @@ struct FloodSeed {
   Index triangle, region;
 };
 
-// Distortion-minimising flooding (thesis 2.3.1; Cohen-Steiner, Alliez and Desbrun 2004): regions grow from one seed triangle
-// each, always by the triangle of least distance to the proxy that reaches it. Fills the triangles labelled kNone that can
-// be reached; others are left alone. `distances` gets each filled triangle's distance_to its proxy. Adds the distances it
-// takes to `evaluations`.
+// Distortion-minimising flooding (thesis 2.3.1; Cohen-Steiner, Alliez and Desbrun 2004): regions grow from one seed
+// triangle each, always by the triangle of least distance to the proxy that reaches it. Fills the triangles labelled
+// kNone that can be reached; others are left alone. `distances` gets each filled triangle's distance_to its proxy. Adds
+// the distances it takes to `evaluations`.
 void flood(const SegmentDomain& domain, const std::vector<Proxy>& proxies, const std::vector<FloodSeed>& seeds,
            std::vector<Index>& labels, std::vector<double>& distances, std::size_t& evaluations);
 

@@ -14,14 +14,15 @@ namespace bisector {
 namespace {
 
 // Division of a region in two.
-constexpr int kFirstSteps = 2, kMoreSteps = 4;  // of Lloyd's iteration in the region: from each start, then from the best
+constexpr int kFirstSteps = 2,
+              kMoreSteps = 4;  // of Lloyd's iteration in the region: from each start, then from the best
 constexpr double kFlatShare = 0.6, kRestShare = 0.1;  // of the triangles, that a plane is taken out of the region with
 constexpr int kTrimSteps = 4, kAverages = 4;  // of trimmed least squares, and of averaging over neighbours in each
 
 // Teleportation: a region is removed and another one divided.
 constexpr int kTrialSteps = 8;                 // of Lloyd's iteration, before a teleportation is judged
 constexpr std::size_t kMostEvaluations = 100;  // of distances for each triangle, in all teleportations: bounds the time
-constexpr int kMostRefusals = 10;     // in a row that do not lower the energy: others would hardly do better
+constexpr int kMostRefusals = 10;              // in a row that do not lower the energy: others would hardly do better
 constexpr double kLeastShare = 0.1;   // of what the removal costs before iterating, that the division must gain
 constexpr double kWorthwhile = 1e-3;  // part of the energy that a teleportation must gain
 
@@ -74,8 +75,8 @@ std::array<std::vector<Index>, 2> halves(const SegmentDomain& domain, const Inde
   return parts;
 }
 
-// What is nearest to a plane, by trimmed least squares, and what is farthest from it: takes a plane out of a region that a
-// curved proxy was bent around. Signed distances are averaged over neighbours, so that noise does not decide.
+// What is nearest to a plane, by trimmed least squares, and what is farthest from it: takes a plane out of a region
+// that a curved proxy was bent around. Signed distances are averaged over neighbours, so that noise does not decide.
 std::array<std::vector<Index>, 2> flat_and_rest(const SegmentDomain& domain, const Index* begin, const Index* end) {
   const auto n = static_cast<std::size_t>(end - begin);
   std::array<std::vector<Index>, 2> parts;
@@ -91,7 +92,8 @@ std::array<std::vector<Index>, 2> flat_and_rest(const SegmentDomain& domain, con
     for (int round = 0; round < kAverages; ++round) {
       for (std::size_t i = 0; i < n; ++i) {
         double sum = off[i], weight = 1;
-        for (const Index* t = domain.graph.neighbours.begin(begin[i]); t != domain.graph.neighbours.end(begin[i]); ++t) {
+        for (const Index* t = domain.graph.neighbours.begin(begin[i]); t != domain.graph.neighbours.end(begin[i]);
+             ++t) {
           const Index* at = std::lower_bound(begin, end, *t);
           if (at == end || *at != *t) continue;
           sum += off[static_cast<std::size_t>(at - begin)];
@@ -135,13 +137,15 @@ void PartitionEditor::divide(const Partition& partition, Index region, int steps
   for (int k = 0; k < steps && seeds[0] != seeds[1]; ++k) {
     labels.assign(domain.triangles.size(), kBlocked);
     for (const Index* t = begin; t != end; ++t) labels[*t] = kNone;
-    flood(domain, {proxies[0], proxies[1]}, {{seeds[0], 0}, {seeds[1], 1}}, labels, distances, lloyd_.counts.evaluations);
+    flood(domain, {proxies[0], proxies[1]}, {{seeds[0], 0}, {seeds[1], 1}}, labels, distances,
+          lloyd_.counts.evaluations);
     std::array<std::vector<Index>, 2> parts;
     for (const Index* t = begin; t != end; ++t) parts[labels[*t]].push_back(*t);
     double energy = 0;
     for (std::size_t i = 0; i < 2; ++i) {
       const Index *first = parts[i].data(), *last = first + parts[i].size();
-      const RegionProxy fit = lloyd_.refit(first, last, sum_of_moments(domain, first, last), nullptr, distances, k % 2 == 1);
+      const RegionProxy fit =
+          lloyd_.refit(first, last, sum_of_moments(domain, first, last), nullptr, distances, k % 2 == 1);
       energy += fit.energy;
       proxies[i] = fit.proxy;
       seeds[i] = nearest_triangle(domain, parts[i], fit.proxy);

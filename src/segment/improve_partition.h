@@ -1,5 +1,5 @@
-// More, fewer and better placed regions: insertion, merging, deletion and teleportation (thesis 2.3.2; Cohen-Steiner, Alliez
-// and Desbrun 2004).
+// More, fewer and better placed regions: insertion, merging, deletion and teleportation (thesis 2.3.2; Cohen-Steiner,
+// Alliez and Desbrun 2004).
 #pragma once
 
 #include <cstddef>
@@ -16,15 +16,16 @@ class PartitionEditor {
  public:
   explicit PartitionEditor(Lloyd& lloyd, int iterations) : lloyd_(lloyd), iterations_(iterations) {}
 
-  // Adds a region about the triangle that is farthest from its proxy, in an invalid region or else the one of most energy
-  // (thesis, "Proxy insertion"), and iterates. False: every region is a single triangle or exact.
+  // Adds a region about the triangle that is farthest from its proxy, in an invalid region or else the one of most
+  // energy (thesis, "Proxy insertion"), and iterates. False: every region is a single triangle or exact.
   bool insert_farthest(Partition& partition);
-  // Merges the pair of neighbours that costs least if that is below half the largest energy of a region and the union has a
-  // valid proxy (thesis, "Proxy merging"), and iterates.
+  // Merges the pair of neighbours that costs least if that is below half the largest energy of a region and the union
+  // has a valid proxy (thesis, "Proxy merging"), and iterates.
   bool merge_redundant(Partition& partition);
   // Divides the region that gains most by it, and iterates. False: none gains.
   bool divide_best(Partition& partition);
-  // Removes the region that costs least while the energy stays at most so large, and iterates a little. False: none can go.
+  // Removes the region that costs least while the energy stays at most so large, and iterates a little. False: none can
+  // go.
   bool remove_cheapest(Partition& partition, double most_energy);
   // Moves regions from where they are hardly missed to where they gain most, as long as the energy falls.
   void teleport(Partition& partition);
@@ -54,8 +55,8 @@ class PartitionEditor {
 
   Lloyd& lloyd_;
   int iterations_;
-  std::map<std::uint64_t, Division> divisions_;                          // by version
-  std::map<std::pair<std::uint64_t, std::uint64_t>, double> merging_;    // by versions, the lower first
+  std::map<std::uint64_t, Division> divisions_;                        // by version
+  std::map<std::pair<std::uint64_t, std::uint64_t>, double> merging_;  // by versions, the lower first
 };
 
 }  // namespace bisector

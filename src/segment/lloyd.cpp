@@ -17,14 +17,15 @@ namespace {
 
 constexpr std::size_t kTorusSamples = 160;  // points of a region that tori are fitted to
 constexpr std::size_t kLeastForTorus = 12;  // triangles of a region that tori are tried on
-constexpr int kToriEvery = 5;               // steps after which tori are tried anew on regions that are none; they are dear to fit
+constexpr int kToriEvery = 5;  // steps after which tori are tried anew on regions that are none; they are dear to fit
 constexpr int kFirstFloods = 3, kFloodEvery = 4;  // the first steps flood, then one in so many: later only borders move
-constexpr double kEnough = 1e-4;            // a step that lowers the energy by a smaller part is the last
-constexpr double kStepsToCome = 5;          // as large as the last one, that a trial may still hope for
-constexpr double kExact = 1e-14;            // squared distance that is as good as none, in the unit-sized model
-constexpr double kOneSided = 0.99;          // share of the area with normals on one side of a surface, at least
+constexpr double kEnough = 1e-4;                  // a step that lowers the energy by a smaller part is the last
+constexpr double kStepsToCome = 5;                // as large as the last one, that a trial may still hope for
+constexpr double kExact = 1e-14;                  // squared distance that is as good as none, in the unit-sized model
+constexpr double kOneSided = 0.99;                // share of the area with normals on one side of a surface, at least
 
-// Whether the triangles' normals are on one side of a surface. Noise is fitted best by two sheets with the data between.
+// Whether the triangles' normals are on one side of a surface. Noise is fitted best by two sheets with the data
+// between.
 bool is_one_sided(const SegmentDomain& domain, const Index* begin, const Index* end, const Proxy& proxy) {
   double along = 0, against = 0;
   for (const Index* t = begin; t != end; ++t)
@@ -38,7 +39,8 @@ SurfaceMoments changed_moments(const SegmentDomain& domain, const SurfaceMoments
   std::vector<Index> added, removed;
   std::set_difference(begin, end, old_begin, old_end, std::back_inserter(added));
   std::set_difference(old_begin, old_end, begin, end, std::back_inserter(removed));
-  if (4 * (added.size() + removed.size()) > static_cast<std::size_t>(end - begin)) return sum_of_moments(domain, begin, end);
+  if (4 * (added.size() + removed.size()) > static_cast<std::size_t>(end - begin))
+    return sum_of_moments(domain, begin, end);
   SurfaceMoments sum = known;
   const auto add = [&](const std::vector<Index>& triangles, double sign) {
     for (const Index t : triangles) {
@@ -94,7 +96,8 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
       best.invalid = true;
       const QuadricFit oriented = fit_oriented_quadric(moments);
       const Proxy proxy = Proxy::of(oriented.quadric);
-      if (oriented.valid && !is_invalid(oriented.quadric, moments) && is_one_sided(domain_, begin, end, proxy)) consider(proxy);
+      if (oriented.valid && !is_invalid(oriented.quadric, moments) && is_one_sided(domain_, begin, end, proxy))
+        consider(proxy);
     }
     if (tori && best.energy > enough && surfaces_ == SegmentSurfaces::all && count >= kLeastForTorus) {
       const SurfaceSamples samples = sample_triangles(domain_, {begin, end}, kTorusSamples);
@@ -179,7 +182,9 @@ bool Lloyd::step(Partition& partition, bool flooding) {
     for (const Index t : triangles) next.labels[t] = kNone;
     flood(domain_, all, seeds, next.labels, next.distances, counts.evaluations);
     relax_borders(domain_, all, triangles, next.labels, next.distances, counts.evaluations);
-    const auto total = [](const std::vector<double>& d) { return fixed_sum(d.size(), [&](std::size_t t) { return d[t]; }); };
+    const auto total = [](const std::vector<double>& d) {
+      return fixed_sum(d.size(), [&](std::size_t t) { return d[t]; });
+    };
     better = total(next.distances) <= total(partition.distances);
   }
   if (!better) {

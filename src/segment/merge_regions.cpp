@@ -17,8 +17,9 @@ namespace {
 constexpr int kPollEvery = 1024;            // mergings of triangles after which the context is asked whether to go on
 constexpr std::size_t kTorusSamples = 96;   // points of a pair of regions that tori are fitted to
 constexpr std::size_t kLeastForTorus = 12;  // triangles of a pair that tori are tried on
-constexpr std::size_t kFewForTori = 60;     // regions from which on tori are tried: they are dear, and on small regions quadrics do
-constexpr double kPoorFit = 1.5;            // growth of the squared distance from which on a torus is worth trying
+constexpr std::size_t kFewForTori =
+    60;  // regions from which on tori are tried: they are dear, and on small regions quadrics do
+constexpr double kPoorFit = 1.5;  // growth of the squared distance from which on a torus is worth trying
 
 // Area, first and second moments, about the origin of the unit-sized model.
 struct PlaneMoments {

@@ -15,7 +15,7 @@ namespace {
 
 using Axes = std::array<Vec3, 3>;
 
-constexpr double kRounding = 1e-9;      // of the extent: what differs by less is the same
+constexpr double kRounding = 1e-9;        // of the extent: what differs by less is the same
 constexpr double kZeroCurvature = 1e-15;  // of the greatest eigenvalue: what is less is 0
 
 Vec3 require_direction(const Vec3& v, const char* what) {
@@ -26,7 +26,8 @@ Vec3 require_direction(const Vec3& v, const char* what) {
 }
 
 void require_length(double length, const char* what) {
-  if (!(length > 0) || !std::isfinite(length)) throw Error(std::string(what) + " is not positive: give a finite length");
+  if (!(length > 0) || !std::isfinite(length))
+    throw Error(std::string(what) + " is not positive: give a finite length");
 }
 
 // Cylindrical coordinates of a point about an axis; `outward` is a unit vector, any one for points of the axis.
@@ -72,8 +73,8 @@ Axes principal_axes(const Quadric& q) {
 }
 
 // The points y(s) = -(1 - s) g / (2 rho E(s)), E = e + s (1 - e), 0 <= s <= 1, about p in principal axes, where
-// c + g y + lambda y^2 falls from c > 0 at s = 1. They are the stationary points of |y|^2 for those multipliers that can
-// belong to the nearest point of the quadric: 1 + 2 mu lambda >= 0 (Moré 1993, "Generalizations of the trust region
+// c + g y + lambda y^2 falls from c > 0 at s = 1. They are the stationary points of |y|^2 for those multipliers that
+// can belong to the nearest point of the quadric: 1 + 2 mu lambda >= 0 (Moré 1993, "Generalizations of the trust region
 // problem"). So of the six roots of Fitzgibbon's polynomial only one has to be found, by bracketing.
 struct NearestPointPath {
   double c = 0, rho = 0;
@@ -127,7 +128,8 @@ std::optional<Vec3> nearest_point(const Quadric& q, const Axes& axes, const Vec3
   for (double& l : path.lambda)
     if (std::abs(l) < kZeroCurvature * greatest) l = 0;
 
-  const std::size_t least = static_cast<std::size_t>(std::min_element(path.lambda.begin(), path.lambda.end()) - path.lambda.begin());
+  const std::size_t least =
+      static_cast<std::size_t>(std::min_element(path.lambda.begin(), path.lambda.end()) - path.lambda.begin());
   Vec3 foot = p;
   if (greatest == 0) {
     if (!(norm2(gradient) > 0)) return std::nullopt;
@@ -145,10 +147,8 @@ std::optional<Vec3> nearest_point(const Quadric& q, const Axes& axes, const Vec3
     } else {
       path.move_to(0, 1);
       if (path.value > 0) {
-        if (path.indefinite)
-          path.y[least] += std::sqrt(path.value / path.rho);
-        else if (path.value > 1e-12 * path.c)
-          return std::nullopt;
+        if (path.indefinite) path.y[least] += std::sqrt(path.value / path.rho);
+        else if (path.value > 1e-12 * path.c) return std::nullopt;
       } else {
         find_root(path, true, 0.25);
       }
@@ -207,7 +207,8 @@ PrincipalForm principal_form(const Quadric& q) {
   std::array<std::size_t, 3> order{0, 1, 2};
   std::array<double, 3> lambda;
   for (std::size_t k = 0; k < 3; ++k) lambda[k] = curvature(q, axes[k]);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) { return std::abs(lambda[i]) > std::abs(lambda[j]); });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t i, std::size_t j) { return std::abs(lambda[i]) > std::abs(lambda[j]); });
   for (std::size_t k = 0; k < 3; ++k) {
     form.axes[k] = axes[order[k]];
     form.lambda[k] = lambda[order[k]];
@@ -315,7 +316,8 @@ std::optional<Primitive> as_cylinder(PrincipalForm form) {
   return make_cylinder(form.point(form.middle(0), form.middle(1), 0), form.axes[2], std::sqrt(radius2));
 }
 
-// The axis of the eigenvalue whose sign is that of no other last, before it the longer one first; none if all signs agree.
+// The axis of the eigenvalue whose sign is that of no other last, before it the longer one first; none if all signs
+// agree.
 std::optional<PrincipalForm> odd_sign_last(const PrincipalForm& form) {
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t i = k == 0 ? 1 : 0, j = k == 2 ? 1 : 2;
@@ -680,8 +682,8 @@ Primitive classify(const Quadric& quadric, const Vec3& near, double extent, doub
   require_length(extent, "extent of a quadric");
   Quadric local = to_local(quadric, near, extent), absolute;
   for (std::size_t k = 0; k < 10; ++k) absolute.c[k] = std::abs(quadric.c[k]);
-  const double rounding =
-      std::numeric_limits<double>::epsilon() * value_of(absolute, {std::abs(near.x), std::abs(near.y), std::abs(near.z)});
+  const double rounding = std::numeric_limits<double>::epsilon() *
+                          value_of(absolute, {std::abs(near.x), std::abs(near.y), std::abs(near.z)});
   double greatest = 0;
   for (double c : local.c) greatest = std::isfinite(c) ? std::max(greatest, std::abs(c)) : c;
   if (!std::isfinite(greatest)) throw Error("coefficient of a quadric is not finite: give finite ones");
@@ -690,7 +692,8 @@ Primitive classify(const Quadric& quadric, const Vec3& near, double extent, doub
 
   const PrincipalForm form = principal_form(local);
   const Points points = surface_points(local, form.axes);
-  Primitive result = simplest(form, points, std::max(tolerance / extent, kRounding), greatest > 0 ? rounding / greatest : 0);
+  Primitive result =
+      simplest(form, points, std::max(tolerance / extent, kRounding), greatest > 0 ? rounding / greatest : 0);
   if (auto* general = std::get_if<GeneralQuadric>(&result)) normalise(general->polynomial, points);
   const auto* plane = std::get_if<Plane>(&result);
   if (plane && !points.empty() && dot(gradient_of(local, points[0]), plane->normal) < 0)

@@ -14,15 +14,16 @@ namespace {
 using std::numbers::pi;
 
 // What fits are refused for. Lengths are in extents of the points: the greatest distance from their centroid.
-constexpr double kLargest = 1e3;                // radii at most: larger surfaces are flat over the points, up to rounding
+constexpr double kLargest = 1e3;  // radii at most: larger surfaces are flat over the points, up to rounding
 constexpr double kLeastAngle = 0.1 * pi / 180;  // radians, of a cone that is neither a cylinder nor a plane
-constexpr double kExact = 1e-22;      // mean squared distance that is rounding
-constexpr double kGain = 10;          // a surface must lessen a simpler one's variance by this part over the number of points
-constexpr double kLeastPivot = 1e-13;  // of the normal equations, in the greatest one: the points determine all unknowns
+constexpr double kExact = 1e-22;                // mean squared distance that is rounding
+constexpr double kGain = 10;  // a surface must lessen a simpler one's variance by this part over the number of points
+constexpr double kLeastPivot =
+    1e-13;  // of the normal equations, in the greatest one: the points determine all unknowns
 
 // How starts are compared: the best few on a part of the samples, the winner on all of them.
-constexpr std::size_t kScreened = 64;       // samples
-constexpr std::size_t kTried = 4;           // starts that take steps
+constexpr std::size_t kScreened = 64;        // samples
+constexpr std::size_t kTried = 4;            // starts that take steps
 constexpr int kFirstSteps = 4, kSteps = 60;  // of Levenberg and Marquardt, on the part and on all
 constexpr int kMaxUnknowns = 7;
 
@@ -44,7 +45,8 @@ Local to_local(const SurfaceSamples& samples) {
                 " normals and " + std::to_string(samples.weights.size()) + " weights: give as many of each");
   Local local;
   for (std::size_t i = 0; i < n; ++i) {
-    if (!(samples.weights[i] >= 0) || !std::isfinite(samples.weights[i] + norm2(samples.points[i]) + norm2(samples.normals[i])))
+    if (!(samples.weights[i] >= 0) ||
+        !std::isfinite(samples.weights[i] + norm2(samples.points[i]) + norm2(samples.normals[i])))
       throw Error("surface sample " + std::to_string(i) + " has a negative weight or a number that is not finite");
     if (samples.weights[i] == 0) continue;
     local.points.push_back(samples.points[i]);
@@ -88,13 +90,14 @@ Local thinned(const Local& local) {
   return thin;
 }
 
-// A sphere, cylinder, cone or torus while it is fitted. Of cylinders and cones `centre` is the axis' point nearest the origin.
+// A sphere, cylinder, cone or torus while it is fitted. Of cylinders and cones `centre` is the axis' point nearest the
+// origin.
 struct Shape {
   SurfaceType type;
   Vec3 centre, axis{0, 0, 1};
-  double radius = 0;        // of a cone: the distance from `centre` to the cone
-  double minor_radius = 0;  // of a torus
-  double angle = 0;         // of a cone
+  double radius = 0;            // of a cone: the distance from `centre` to the cone
+  double minor_radius = 0;      // of a torus
+  double angle = 0;             // of a cone
   double sine = 0, cosine = 1;  // of the angle
 };
 
@@ -110,7 +113,8 @@ constexpr int unknowns(SurfaceType type) {
 
 // Brings a shape into its normal form: axis, signs and centre. False if its numbers describe no surface of its type.
 bool normalise(Shape& shape) {
-  if (!std::isfinite(norm2(shape.centre) + norm2(shape.axis) + shape.radius + shape.minor_radius + shape.angle)) return false;
+  if (!std::isfinite(norm2(shape.centre) + norm2(shape.axis) + shape.radius + shape.minor_radius + shape.angle))
+    return false;
   shape.axis *= 1 / norm(shape.axis);
   if (shape.type == SurfaceType::cone) {
     if (shape.angle < 0) {
@@ -129,8 +133,8 @@ bool normalise(Shape& shape) {
   return shape.radius > 0 && (shape.type != SurfaceType::torus || shape.minor_radius > 0);
 }
 
-// Signed distance of a point, the unit normal at its foot, and the distance's derivatives by the radius and by a torus' minor
-// radius or a cone's angle.
+// Signed distance of a point, the unit normal at its foot, and the distance's derivatives by the radius and by a torus'
+// minor radius or a cone's angle.
 struct Residual {
   double d;
   Vec3 normal;
@@ -183,7 +187,8 @@ double energy(const Shape& shape, const Local& local) {
 }
 
 // The unknowns: translations across the axis (a sphere's, a torus' along it too), rotations about the origin across the
-// axis, then the radius, then the minor radius or the angle. A translation t and a rotation w of the surface change the distance of p by -n.t and -w.(p x n).
+// axis, then the radius, then the minor radius or the angle. A translation t and a rotation w of the surface change the
+// distance of p by -n.t and -w.(p x n).
 struct NormalEquations {
   Matrix matrix;
   Vector right;
@@ -256,8 +261,10 @@ Shape stepped(const Shape& shape, const NormalEquations& at, const Vector& step)
     k += 2;
   }
   if (shape.type == SurfaceType::cone) {
-    // The circle across `centre` takes the linear step, so that it stays on the surface under large changes of the angle.
-    const double radius = (shape.radius + step(k) + shape.radius * shape.sine / shape.cosine * step(k + 1)) / shape.cosine;
+    // The circle across `centre` takes the linear step, so that it stays on the surface under large changes of the
+    // angle.
+    const double radius =
+        (shape.radius + step(k) + shape.radius * shape.sine / shape.cosine * step(k + 1)) / shape.cosine;
     next.radius = radius * std::cos(shape.angle + step(k + 1));
     next.angle += step(k + 1);
   } else {
@@ -333,10 +340,8 @@ class RoundFitter {
     move.row(0) /= 2 * std::sqrt(spread);
     const Eigen::Matrix<double, N + 1, N + 1> matrix = move * about * move.transpose();
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N + 1, N + 1>> solver;
-    if constexpr (N == 2)
-      solver.computeDirect(matrix);
-    else
-      solver.compute(matrix);
+    if constexpr (N == 2) solver.computeDirect(matrix);
+    else solver.compute(matrix);
     const Eigen::Matrix<double, N + 1, 1> c = solver.eigenvectors().col(0);
     const double quadratic = c(0) / (2 * std::sqrt(spread));
     if (!(std::abs(quadratic) > 1e-9)) return result;
@@ -385,8 +390,8 @@ void add_eigenvectors(const Eigen::Matrix3d& matrix, int count, Directions& dire
   for (int k = 0; k < count; ++k) directions.push_back(vec3(solver.eigenvectors().col(k)));
 }
 
-// Directions of axes: of the rotations to whose velocities the normals are orthogonal, the lines of the normals being in
-// a linear complex (Pottmann and Randrup 1998); of planes that the normals lie in; and the points' principal axes.
+// Directions of axes: of the rotations to whose velocities the normals are orthogonal, the lines of the normals being
+// in a linear complex (Pottmann and Randrup 1998); of planes that the normals lie in; and the points' principal axes.
 Directions axis_directions(const Sums& sums) {
   Directions directions;
   const Eigen::Matrix3d regular = sums.normals + 1e-9 * Eigen::Matrix3d::Identity();
@@ -425,7 +430,8 @@ void add_axes_by_curvature(const Local& local, const Sums& sums, const std::vect
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 right = Vector6::Zero();
-  const Eigen::Vector3d n = frame.eigenvectors().col(0), x = frame.eigenvectors().col(1), y = frame.eigenvectors().col(2);
+  const Eigen::Vector3d n = frame.eigenvectors().col(0), x = frame.eigenvectors().col(1),
+                        y = frame.eigenvectors().col(2);
   for (std::size_t i = 0; i < local.points.size(); ++i) {
     const Eigen::Vector3d p = eigen(local.points[i]);
     const double u = p.dot(x), v = p.dot(y);
@@ -506,7 +512,8 @@ std::optional<Shape> start_torus(const Local& local, const Vec3& axis, const Vec
   }
   const RoundFit<2> fit = circle.fit();
   if (!(fit.radius > 0) || fit.radius > 10 * kLargest) return std::nullopt;
-  return Shape{SurfaceType::torus, point + fit.centre(1) * axis, axis, std::max(fit.centre(0), 1.05 * fit.radius), fit.radius};
+  return Shape{SurfaceType::torus, point + fit.centre(1) * axis, axis, std::max(fit.centre(0), 1.05 * fit.radius),
+               fit.radius};
 }
 
 std::optional<Shape> start_sphere(const Local& local) {
@@ -625,7 +632,8 @@ bool has_simpler(const Fitted& fitted, const Local& local) {
   if (shape.type != SurfaceType::torus) return false;
   if (beaten_by_fit(best_of(SurfaceType::sphere, local))) return true;
   constexpr double kLarge = 10;
-  return shape.radius > kLarge && (beaten_by_fit(best_of(SurfaceType::cylinder, local)) || beaten_by_fit(best_of(SurfaceType::cone, local)));
+  return shape.radius > kLarge &&
+         (beaten_by_fit(best_of(SurfaceType::cylinder, local)) || beaten_by_fit(best_of(SurfaceType::cone, local)));
 }
 
 // Share of the weight before a cone's apex.
@@ -696,7 +704,8 @@ std::optional<PrimitiveFit> checked(const std::optional<Fitted>& fitted, const L
       energy += local.weights[i] * d * d;
     }
   }
-  return PrimitiveFit{from_local(primitive, local.origin, local.scale), energy * local.total * local.scale * local.scale};
+  return PrimitiveFit{from_local(primitive, local.origin, local.scale),
+                      energy * local.total * local.scale * local.scale};
 }
 
 std::optional<PrimitiveFit> fit_plane_to(const Local& local) {
@@ -708,7 +717,8 @@ std::optional<PrimitiveFit> fit_plane_to(const Local& local) {
 
 void require_fitted(SurfaceType type) {
   if (type > SurfaceType::torus)
-    throw Error(std::string("no fit by distance of a ") + name_of(type) + ": give a plane, sphere, cylinder, cone or torus");
+    throw Error(std::string("no fit by distance of a ") + name_of(type) +
+                ": give a plane, sphere, cylinder, cone or torus");
 }
 
 // Whether there are as many different points as unknowns.
@@ -736,7 +746,8 @@ std::optional<Quadric> reweighted(const Quadric& last, const SurfaceSamples& loc
   using Vector9 = Eigen::Matrix<double, 9, 1>;
   using Matrix9 = Eigen::Matrix<double, 9, 9>;
   double mean_slope = 0, total = 0;
-  for (std::size_t i = 0; i < local.points.size(); ++i) mean_slope += local.weights[i] * norm2(gradient_of(last, local.points[i]));
+  for (std::size_t i = 0; i < local.points.size(); ++i)
+    mean_slope += local.weights[i] * norm2(gradient_of(last, local.points[i]));
   if (!(mean_slope > 0)) return std::nullopt;
   Matrix9 second = Matrix9::Zero(), slopes = Matrix9::Zero();
   Vector9 mean = Vector9::Zero();
@@ -812,7 +823,8 @@ PrimitiveFit refine_quadric(const Primitive& start, const SurfaceSamples& sample
     if (!(d < (1 - 1e-6) * least)) break;
     least = d;
   }
-  if (least < before) best.primitive = classify(from_local(kept, local.origin, local.scale), local.origin, local.scale, 0);
+  if (least < before)
+    best.primitive = classify(from_local(kept, local.origin, local.scale), local.origin, local.scale, 0);
   best.squared_distance = least * local.total * local.scale * local.scale;
   return best;
 }

@@ -10,11 +10,12 @@ namespace bisector {
 namespace {
 
 // What is no surface of its own. Lengths are in root mean square radii of the piece.
-constexpr double kSharp = 0.12;     // semi-axes of a hyperbola that is taken for two crossing planes, at most
-constexpr double kCrossing = 1.5;   // distance from the piece's middle up to which planes cross within it
-constexpr double kFlat = 0.05;      // ratio of curvatures (or slopes) below which the lesser is taken for 0
-constexpr double kOneSided = 1.13;  // data farther than so many standard deviations on one side of a centre are on one side
-constexpr double kAligned = 0.5;    // QuadricFit::alignment of a surface, at least
+constexpr double kSharp = 0.12;    // semi-axes of a hyperbola that is taken for two crossing planes, at most
+constexpr double kCrossing = 1.5;  // distance from the piece's middle up to which planes cross within it
+constexpr double kFlat = 0.05;     // ratio of curvatures (or slopes) below which the lesser is taken for 0
+constexpr double kOneSided =
+    1.13;  // data farther than so many standard deviations on one side of a centre are on one side
+constexpr double kAligned = 0.5;  // QuadricFit::alignment of a surface, at least
 // Mean squared distance, in the unit-sized model, of what is flat to a part in 1e7 of it: a plane.
 constexpr double kExactPlane = 1e-14;
 
@@ -115,7 +116,8 @@ bool is_invalid(const Quadric& quadric, const SurfaceMoments& moments) {
   if (lambda(0) < 0 && lambda(2) > 0) {
     const double smaller = std::min(-lambda(0), lambda(2));
     const bool straight = std::abs(lambda(1)) < kFlat * smaller && !curved_along_rest(smaller);
-    if (straight && gap(0) < kSharp && gap(2) < kSharp && std::abs(centre(0)) < kCrossing && std::abs(centre(2)) < kCrossing)
+    if (straight && gap(0) < kSharp && gap(2) < kSharp && std::abs(centre(0)) < kCrossing &&
+        std::abs(centre(2)) < kCrossing)
       return true;
   }
   return false;

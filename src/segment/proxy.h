@@ -31,8 +31,8 @@ struct Proxy {
   }
 };
 
-// The thesis' d(t, P), Eq. 2.3: from squared approximate distances (2.2.2) of the corners and the barycentre, times the area;
-// distances to a torus are exact.
+// The thesis' d(t, P), Eq. 2.3: from squared approximate distances (2.2.2) of the corners and the barycentre, times the
+// area; distances to a torus are exact.
 inline double distance_to(const SegmentDomain& domain, Index triangle, const Proxy& proxy) {
   const TriangleSamples& s = domain.samples[triangle];
   double squares[4];
@@ -77,7 +77,7 @@ struct ProxyFit {
   Proxy proxy;
   double squared_distance = 0;  // integral of the first-order approximation
   bool plane = true;
-  bool invalid = false;         // the best quadric was invalid, and the proxy is not it
+  bool invalid = false;  // the best quadric was invalid, and the proxy is not it
 };
 
 // The best plane or quadric for a piece of surface, from its moments.

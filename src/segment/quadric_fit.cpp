@@ -205,7 +205,9 @@ SurfaceMoments moved(const SurfaceMoments& moments, const Vec3& origin) {
         const int n = 4 - a - b;
         double* power[5];
         for (int i = 0; i <= n; ++i)
-          power[i] = &result.m[axis == 0 ? kIndices.of[i][a][b] : axis == 1 ? kIndices.of[a][i][b] : kIndices.of[a][b][i]];
+          power[i] = &result.m[axis == 0   ? kIndices.of[i][a][b]
+                               : axis == 1 ? kIndices.of[a][i][b]
+                                           : kIndices.of[a][b][i]];
         for (int pass = 0; pass < n; ++pass)
           for (int i = n; i > pass; --i) *power[i] -= d[axis] * *power[i - 1];
       }

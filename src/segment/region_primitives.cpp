@@ -18,16 +18,17 @@
 namespace bisector {
 namespace {
 
-// Which vertices tell a region's surface: those deep inside, since near borders that no crease marks some belong to others.
+// Which vertices tell a region's surface: those deep inside, since near borders that no crease marks some belong to
+// others.
 constexpr std::uint8_t kDeep = 4;           // edges away from borders, at most
 constexpr std::size_t kEnoughInside = 24;   // vertices that are left one edge inside; twice as many deeper inside
 constexpr std::size_t kTrialSamples = 400;  // vertices that types are tried on
 
 // When one surface is as good as another. Lengths are in the unit-sized model, energies those of Eq. 2.3.
-constexpr double kExact = 2e-6;       // distances that do not tell types apart
-constexpr double kMuchWorse = 1.5;    // ratio of energies, or of tilts, from which on the larger one is out of question
+constexpr double kExact = 2e-6;     // distances that do not tell types apart
+constexpr double kMuchWorse = 1.5;  // ratio of energies, or of tilts, from which on the larger one is out of question
 constexpr double kHardlyWorse = 1.07;  // ratio of energies up to which the larger one is accepted for a simpler type
-constexpr double kOneSided = 0.98;    // least Candidate::side: less means two sheets with the data between
+constexpr double kOneSided = 0.98;     // least Candidate::side: less means two sheets with the data between
 
 // From the simplest to the most general.
 constexpr std::array kSpecialTypes{SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder, SurfaceType::cone,
@@ -61,15 +62,17 @@ struct VertexSamples {
   std::size_t corners = 0;  // vertices of the region, whatever their depth
 };
 
-// The vertices that are deepest inside, where those are enough to tell the surface: near borders that no crease marks, and on
-// borders, are vertices of other surfaces.
+// The vertices that are deepest inside, where those are enough to tell the surface: near borders that no crease marks,
+// and on borders, are vertices of other surfaces.
 VertexSamples vertex_samples(const SegmentDomain& domain, const Index* begin, const Index* end,
                              const std::vector<std::uint8_t>& depths) {
   std::vector<VertexSum> sums;
   sums.reserve(3 * static_cast<std::size_t>(end - begin));
   for (const Index* t = begin; t != end; ++t)
-    for (const Index v : domain.triangles[*t]) sums.push_back({v, domain.areas[*t] / 3, domain.areas[*t] * domain.normals[*t]});
-  std::stable_sort(sums.begin(), sums.end(), [](const VertexSum& a, const VertexSum& b) { return a.vertex < b.vertex; });
+    for (const Index v : domain.triangles[*t])
+      sums.push_back({v, domain.areas[*t] / 3, domain.areas[*t] * domain.normals[*t]});
+  std::stable_sort(sums.begin(), sums.end(),
+                   [](const VertexSum& a, const VertexSum& b) { return a.vertex < b.vertex; });
   std::size_t n = 0;
   for (std::size_t k = 0; k < sums.size(); ++k) {
     if (n > 0 && sums[n - 1].vertex == sums[k].vertex) {
@@ -134,8 +137,8 @@ int free_parameters(SurfaceType type) {
 
 int free_parameters(const Primitive& primitive) { return free_parameters(type_of(primitive)); }
 
-// What the sum of squared distances of n points may be larger by, as a factor, for so many parameters fewer: the Bayesian
-// information criterion (Schwarz 1978) with twice its penalty, since each type is the best of several fits.
+// What the sum of squared distances of n points may be larger by, as a factor, for so many parameters fewer: the
+// Bayesian information criterion (Schwarz 1978) with twice its penalty, since each type is the best of several fits.
 double simplicity_allowance(std::size_t n, int fewer) {
   const double points = std::max<double>(10, static_cast<double>(n));
   return std::exp(2 * fewer * std::log(points) / points);
@@ -143,7 +146,8 @@ double simplicity_allowance(std::size_t n, int fewer) {
 
 class RegionSurface {
  public:
-  RegionSurface(const SegmentDomain& domain, const Index* begin, const Index* end, const std::vector<std::uint8_t>& depths)
+  RegionSurface(const SegmentDomain& domain, const Index* begin, const Index* end,
+                const std::vector<std::uint8_t>& depths)
       : domain_(domain), begin_(begin), end_(end) {
     VertexSamples inside = vertex_samples(domain, begin, end, depths);
     corners_ = inside.corners;
@@ -239,12 +243,14 @@ std::vector<Candidate> fit_candidates(const RegionSurface& region, const Surface
   const Quadric quadric = proxy.torus ? fit_proxy(moments, surfaces).proxy.quadric : proxy.quadric;
   const Primitive start = classify(quadric, moments.centroid(), std::sqrt(moments.area()), kExact);
   candidates.push_back(region.measured(start));
-  const auto refined = region.best([&](const SurfaceSamples& samples) { return std::optional(refine_quadric(start, samples)); });
+  const auto refined =
+      region.best([&](const SurfaceSamples& samples) { return std::optional(refine_quadric(start, samples)); });
   if (refined) candidates.push_back(*refined);
   return candidates;
 }
 
-// Leaves out what is no surface of its own; the plane always stays. Surfaces with all triangles on one side are preferred.
+// Leaves out what is no surface of its own; the plane always stays. Surfaces with all triangles on one side are
+// preferred.
 void remove_invalid(const SurfaceMoments& moments, std::vector<Candidate>& candidates) {
   std::erase_if(candidates, [&](const Candidate& c) {
     const auto* quadric = std::get_if<GeneralQuadric>(&c.primitive);
@@ -254,8 +260,8 @@ void remove_invalid(const SurfaceMoments& moments, std::vector<Candidate>& candi
     std::erase_if(candidates, [](const Candidate& c) { return !RegionSurface::is_sound(c); });
 }
 
-// Leaves out what is much farther off than the best. What passes through all vertices and is no more tilted than others may be
-// as far off between them as tessellation makes it.
+// Leaves out what is much farther off than the best. What passes through all vertices and is no more tilted than others
+// may be as far off between them as tessellation makes it.
 void remove_distant(const RegionSurface& region, std::vector<Candidate>& candidates) {
   Candidate least{{}, kInfinity, kInfinity, kInfinity, 1};
   for (const Candidate& c : candidates) {
@@ -269,7 +275,8 @@ void remove_distant(const RegionSurface& region, std::vector<Candidate>& candida
   });
 }
 
-// The simplest that passes through all vertices; else, from the simplest on, a more general one has to pay for its parameters.
+// The simplest that passes through all vertices; else, from the simplest on, a more general one has to pay for its
+// parameters.
 const Candidate& simplest_adequate(const RegionSurface& region, const std::vector<Candidate>& candidates) {
   const auto exact_one = std::find_if(candidates.begin(), candidates.end(),
                                       [&](const Candidate& c) { return region.passes_through_vertices(c); });
@@ -339,14 +346,18 @@ bool simplify(const SegmentDomain& domain, SegmentSurfaces surfaces, Index r, co
 
 }  // namespace
 
-std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::size_t count,
-                                         const std::vector<Proxy>& proxies, SegmentSurfaces surfaces) {
+std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std::vector<Index>& labels,
+                                         std::size_t count, const std::vector<Proxy>& proxies,
+                                         SegmentSurfaces surfaces) {
   const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
   std::vector<Primitive> primitives(count);
-  parallel_each(count, [&](std::size_t r) {
-    primitives[r] = primitive_of(domain, triangles.begin(r), triangles.end(r), depths, proxies[r], surfaces);
-  }, 1);
+  parallel_each(
+      count,
+      [&](std::size_t r) {
+        primitives[r] = primitive_of(domain, triangles.begin(r), triangles.end(r), depths, proxies[r], surfaces);
+      },
+      1);
   return primitives;
 }
 
@@ -371,13 +382,17 @@ void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, 
   labels = std::move(labelling.labels);
 }
 
-void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels, std::vector<Primitive>& primitives) {
+void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels,
+                       std::vector<Primitive>& primitives) {
   const Csr<Index> triangles = items_of_labels<Index>(labels, primitives.size());
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
-  parallel_each(primitives.size(), [&](std::size_t r) {
-    const RegionSurface region(domain, triangles.begin(r), triangles.end(r), depths);
-    primitives[r] = region.refined(region.measured(primitives[r]));
-  }, 1);
+  parallel_each(
+      primitives.size(),
+      [&](std::size_t r) {
+        const RegionSurface region(domain, triangles.begin(r), triangles.end(r), depths);
+        primitives[r] = region.refined(region.measured(primitives[r]));
+      },
+      1);
 }
 
 }  // namespace bisector

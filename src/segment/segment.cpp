@@ -25,11 +25,13 @@
 namespace bisector {
 namespace {
 
-// Start by merging: so many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to all pairs.
+// Start by merging: so many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to
+// all pairs.
 constexpr std::size_t kFewestPieces = 200, kMostPieces = 1000;
 constexpr std::size_t kPiecesPerProxy = 10, kTrianglesPerPiece = 40;
-constexpr int kPlanarSteps = 4;              // of Lloyd's iteration, for the pieces
-constexpr std::size_t kSpareShare = 5;       // one region in so many is added: which can be spared shows after Lloyd's iteration
+constexpr int kPlanarSteps = 4;  // of Lloyd's iteration, for the pieces
+constexpr std::size_t kSpareShare =
+    5;  // one region in so many is added: which can be spared shows after Lloyd's iteration
 
 // Smoothing: the weight is halved while the root mean square distance grows by more than this ratio.
 constexpr double kMostGrowth = 1.05;
@@ -40,15 +42,18 @@ constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that r
 constexpr int kAttempts = 4;
 constexpr double kAim = 0.97;  // of the error that would just do if all grew in proportion
 
-constexpr double kFarFoot = 2;  // a vertex is not projected farther than so many times the largest distance in its region
+constexpr double kFarFoot =
+    2;  // a vertex is not projected farther than so many times the largest distance in its region
 
 void check_options(const SegmentOptions& options) {
   if (options.proxies == 0 && !(options.error > 0 && std::isfinite(options.error)))
     throw Error(fmt::format("an error of {} percent is asked for; it must be positive", options.error));
-  if (options.iterations < 0) throw Error(fmt::format("{} iterations are asked for; ask for 0 or more", options.iterations));
+  if (options.iterations < 0)
+    throw Error(fmt::format("{} iterations are asked for; ask for 0 or more", options.iterations));
   if (!(options.smooth >= 0) || !std::isfinite(options.smooth))
     throw Error(fmt::format("the smoothing weight is {}; it must be 0 or positive", options.smooth));
-  if (options.fuzzy_rings < 1) throw Error(fmt::format("{} fuzzy rings are asked for; ask for 1 or more", options.fuzzy_rings));
+  if (options.fuzzy_rings < 1)
+    throw Error(fmt::format("{} fuzzy rings are asked for; ask for 1 or more", options.fuzzy_rings));
 }
 
 void check_count(const SegmentDomain& domain, std::size_t proxies) {
@@ -57,8 +62,9 @@ void check_count(const SegmentDomain& domain, std::size_t proxies) {
     throw Error(fmt::format("{} proxies are asked for, but the mesh has {} triangles only; ask for fewer", proxies,
                             domain.triangles.size()));
   if (proxies < domain.component_count)
-    throw Error(fmt::format("{} proxies are asked for, but the mesh has {} components, of which each needs one; ask for as many",
-                            proxies, domain.component_count));
+    throw Error(fmt::format(
+        "{} proxies are asked for, but the mesh has {} components, of which each needs one; ask for as many", proxies,
+        domain.component_count));
 }
 
 // The root mean square distance that SegmentOptions::error allows, in the unit-sized model.
@@ -76,8 +82,8 @@ Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double a
   const std::size_t n = domain.triangles.size();
   if (options.surfaces == SegmentSurfaces::planes && options.proxies > 0)
     return fit_all(lloyd, merge_into_planes(domain, options.proxies, lloyd.context()));
-  const std::size_t enough = std::max(kPiecesPerProxy * options.proxies,
-                                      std::clamp(n / kTrianglesPerPiece, kFewestPieces, kMostPieces));
+  const std::size_t enough =
+      std::max(kPiecesPerProxy * options.proxies, std::clamp(n / kTrianglesPerPiece, kFewestPieces, kMostPieces));
   const std::size_t pieces = std::min(n, std::max(enough, domain.component_count));
   Lloyd planar(domain, SegmentSurfaces::planes, lloyd.context());
   Partition small = fit_all(planar, merge_into_planes(domain, pieces, lloyd.context()));
@@ -126,13 +132,15 @@ Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptio
   const std::size_t wanted = options.proxies;
   const double most_rms = wanted > 0 ? 0 : allowed_rms(lloyd.domain(), options.error);
   const double allowed = most_rms * most_rms * lloyd.domain().area;
-  const auto enough = [&](const Partition& p) { return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed; };
+  const auto enough = [&](const Partition& p) {
+    return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed;
+  };
   Stopwatch clock;
   report(context, "start", 0);
   const bool merging = options.start == SegmentStart::merging;
   const std::size_t at_random = options.start == SegmentStart::random ? wanted : 1;
-  Partition partition = merging ? start_by_merging(lloyd, options, allowed)
-                                : start_at_random(lloyd, at_random, options.random_seed);
+  Partition partition =
+      merging ? start_by_merging(lloyd, options, allowed) : start_at_random(lloyd, at_random, options.random_seed);
   seconds.start = clock.lap();
 
   report(context, "Lloyd", 0.2, partition.energy());
@@ -147,7 +155,8 @@ Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptio
 
   report(context, "moving regions", 0.6, partition.energy());
   constexpr double kAnyEnergy = std::numeric_limits<double>::infinity();
-  while (wanted > 0 && partition.regions.size() > wanted && editor.remove_cheapest(partition, kAnyEnergy)) context.check();
+  while (wanted > 0 && partition.regions.size() > wanted && editor.remove_cheapest(partition, kAnyEnergy))
+    context.check();
   editor.teleport(partition);
   if (wanted == 0)
     while (editor.remove_cheapest(partition, allowed)) report(context, "removing regions", 0.7, partition.energy());
@@ -174,7 +183,8 @@ void sort_regions(const SegmentDomain& domain, std::vector<Index>& labels, std::
 }
 
 double mean_square(const SegmentDomain& domain, const std::vector<Index>& labels, const std::vector<Proxy>& proxies) {
-  return fixed_sum(labels.size(), [&](std::size_t t) { return distance_to(domain, static_cast<Index>(t), proxies[labels[t]]); }) /
+  return fixed_sum(labels.size(),
+                   [&](std::size_t t) { return distance_to(domain, static_cast<Index>(t), proxies[labels[t]]); }) /
          domain.area;
 }
 
@@ -217,7 +227,8 @@ double smooth_within(const SegmentDomain& domain, const SegmentOptions& options,
   return 0;
 }
 
-SegmentRegion measure_region(const SegmentDomain& domain, const Primitive& primitive, const Index* begin, const Index* end) {
+SegmentRegion measure_region(const SegmentDomain& domain, const Primitive& primitive, const Index* begin,
+                             const Index* end) {
   SegmentRegion region;
   region.triangles = static_cast<std::size_t>(end - begin);
   double sum = 0;
@@ -225,7 +236,8 @@ SegmentRegion measure_region(const SegmentDomain& domain, const Primitive& primi
     if (!(domain.areas[*t] > 0)) continue;
     const Triangle& v = domain.triangles[*t];
     double squares = 0;
-    for (const Vec3& p : {domain.vertices[v[0]], domain.vertices[v[1]], domain.vertices[v[2]], domain.barycentres[*t]}) {
+    for (const Vec3& p :
+         {domain.vertices[v[0]], domain.vertices[v[1]], domain.vertices[v[2]], domain.barycentres[*t]}) {
       const double d = distance(primitive, p);
       squares += d * d;
       region.max = std::max(region.max, d);
@@ -241,12 +253,14 @@ SegmentRegion measure_region(const SegmentDomain& domain, const Primitive& primi
   return region;
 }
 
-std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDomain& domain, const std::vector<Index>& labels,
-                                     const std::vector<Primitive>& primitives, const std::vector<SegmentRegion>& measured) {
+std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDomain& domain,
+                                     const std::vector<Index>& labels, const std::vector<Primitive>& primitives,
+                                     const std::vector<SegmentRegion>& measured) {
   std::vector<std::vector<Index>> regions(mesh.vertices.size());
   for (std::size_t t = 0; t < labels.size(); ++t)
     for (const Index v : domain.triangles[t])
-      if (std::find(regions[v].begin(), regions[v].end(), labels[t]) == regions[v].end()) regions[v].push_back(labels[t]);
+      if (std::find(regions[v].begin(), regions[v].end(), labels[t]) == regions[v].end())
+        regions[v].push_back(labels[t]);
   std::vector<Vec3> result = mesh.vertices;
   parallel_each(result.size(), [&](std::size_t v) {
     if (regions[v].empty()) return;
@@ -326,8 +340,10 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
     aimed.error *= kAim * most / result.rms;
   }
   if (options.proxies == 0 && result.rms > most)
-    context.warn(fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
-                             "a number of proxies", result.rms, most));
+    context.warn(
+        fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
+                    "a number of proxies",
+                    result.rms, most));
   result.seconds.total = clock.seconds();
   return result;
 }

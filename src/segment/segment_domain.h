@@ -17,8 +17,8 @@ struct TriangleSamples {
 };
 
 struct SegmentDomain {
-  std::vector<Vec3> vertices;       // (input - origin) / scale
-  std::vector<Triangle> triangles;  // oriented alike where that can be had
+  std::vector<Vec3> vertices;              // (input - origin) / scale
+  std::vector<Triangle> triangles;         // oriented alike where that can be had
   std::vector<Vec3> normals, barycentres;  // of each triangle; a zero normal where there is no area
   std::vector<double> areas;
   std::vector<TriangleSamples> samples;

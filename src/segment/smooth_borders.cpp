@@ -128,8 +128,7 @@ class BorderSmoother {
   Strip make_strip(Index a, Index b) {
     Strip strip;
     gather(a, b, strip.triangles);
-    for (std::size_t i = 0; i < strip.triangles.size(); ++i)
-      position_[strip.triangles[i]] = static_cast<Index>(i);
+    for (std::size_t i = 0; i < strip.triangles.size(); ++i) position_[strip.triangles[i]] = static_cast<Index>(i);
     const double unit = kUnit / std::max(1.0, options_.lambda);
     const auto fixed = [&](double cost) { return static_cast<Cost>(std::llround(unit * cost)); };
     for (std::size_t i = 0; i < strip.triangles.size(); ++i) {

@@ -1,4 +1,5 @@
-// Shorter borders between regions by graph cuts in a strip of triangles along them (thesis 2.3.3, "Boundary smoothing").
+// Shorter borders between regions by graph cuts in a strip of triangles along them (thesis 2.3.3, "Boundary
+// smoothing").
 #pragma once
 
 #include <functional>
@@ -10,13 +11,14 @@
 namespace bisector {
 
 struct SmoothBordersOptions {
-  double lambda = 1;   // weight of the borders' length
-  int rings = 1;       // width of the strip: triangles up to so many edges' steps from the border
-  int sweeps = 6;      // over all pairs of regions that meet
+  double lambda = 1;  // weight of the borders' length
+  int rings = 1;      // width of the strip: triangles up to so many edges' steps from the border
+  int sweeps = 6;     // over all pairs of regions that meet
 };
 
 struct SmoothBordersResult {
-  std::size_t cuts = 0, refused = 0;  // pairs of regions whose border changed; cuts that would have changed the topology
+  std::size_t cuts = 0,
+              refused = 0;  // pairs of regions whose border changed; cuts that would have changed the topology
 };
 
 // Moves triangles between regions that share a border, one pair at a time in ascending order, where the thesis' energy

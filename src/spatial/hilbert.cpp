@@ -1,6 +1,5 @@
 #include "spatial/hilbert.h"
 
-
 #include "core/parallel.h"
 
 namespace bisector {
@@ -22,8 +21,8 @@ std::uint64_t spread(std::uint64_t x) {
   return x;
 }
 
-// Place on the Hilbert curve of 21 bits per axis: the curve's orientation in each octant is undone from the highest bit down,
-// then the Gray code (Skilling 2004, "Programming the Hilbert curve").
+// Place on the Hilbert curve of 21 bits per axis: the curve's orientation in each octant is undone from the highest bit
+// down, then the Gray code (Skilling 2004, "Programming the Hilbert curve").
 std::uint64_t hilbert_code(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   constexpr std::uint32_t kTop = 1u << 20;
   std::uint32_t axes[3] = {x, y, z};
@@ -54,8 +53,9 @@ std::vector<Index> hilbert_order(const std::vector<Vec3>& points) {
   std::vector<Key> keys(points.size());
   parallel_each(points.size(), [&](std::size_t i) {
     const Vec3 p = scale * (points[i] - box.lo);
-    keys[i] = {hilbert_code(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), static_cast<std::uint32_t>(p.z)),
-               static_cast<Index>(i)};
+    keys[i] = {
+        hilbert_code(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), static_cast<std::uint32_t>(p.z)),
+        static_cast<Index>(i)};
   });
   // Points of one code are ordered by position first, so that equal points meet.
   sort_in_parallel(keys, [&](const Key& a, const Key& b) {

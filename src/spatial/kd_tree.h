@@ -15,9 +15,12 @@ struct PointSet {
   std::size_t kdtree_get_point_count() const { return points.size(); }
   double kdtree_get_pt(Index i, std::size_t axis) const { return points[i][static_cast<int>(axis)]; }
   template <class Box>
-  bool kdtree_get_bbox(Box&) const { return false; }
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
 };
 
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointSet, double>, PointSet, 3, Index>;
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointSet, double>, PointSet, 3, Index>;
 
 }  // namespace bisector

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
 #include "core/stopwatch.h"
 #include "cvt/constrain.h"
-#include "bisector/quality.h"
 #include "remesh/remesh.h"
 #include "spatial/hilbert.h"
 
@@ -136,10 +136,13 @@ RemeshResult finish_boundary(TetRun& run) {
     crossings = count_self_intersections(surface.mesh);
   }
   if (crossings > 0)
-    throw Error(fmt::format("the boundary of the result crosses itself at {} pairs of triangles: parts are thinner than its edges; "
-                            "ask for more vertices", crossings));
+    throw Error(fmt::format(
+        "the boundary of the result crosses itself at {} pairs of triangles: parts are thinner than its edges; "
+        "ask for more vertices",
+        crossings));
   if (!surface.topology.closed || !surface.topology.manifold)
-    throw Error("the boundary of the result is not a closed manifold: parts are thinner than its edges; ask for more vertices");
+    throw Error(
+        "the boundary of the result is not a closed manifold: parts are thinner than its edges; ask for more vertices");
   return surface;
 }
 

@@ -71,10 +71,8 @@ class Carver {
       const Index t = queue_[head];
       for (std::size_t k = 0; k < 4; ++k) {
         if (wall_[t][k]) continue;
-        if (adjacent_[t][k] != kNone)
-          mark(adjacent_[t][k], side_[t]);
-        else if (side_[t] == inside)
-          throw Error("the tetrahedra do not fill the surface; please report this as a bug");
+        if (adjacent_[t][k] != kNone) mark(adjacent_[t][k], side_[t]);
+        else if (side_[t] == inside) throw Error("the tetrahedra do not fill the surface; please report this as a bug");
       }
     }
   }

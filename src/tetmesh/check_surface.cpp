@@ -70,7 +70,7 @@ void check_edges(const TriangleMesh& mesh, const EdgeTable& table, const std::ve
   }
   if (open.any())
     throw Error("the surface is not closed: " + open.list("edge has one triangle", "edges have one triangle") +
-                "; close the holes or weld the cracks",
+                    "; close the holes or weld the cracks",
                 Reason::open_surface);
   if (multiple.any())
     throw Error("the surface is not manifold: " +

@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "spatial/hilbert.h"
+#include "spatial/seed_tree.h"
 #include "tetmesh/carve.h"
 #include "tetmesh/insert_points.h"
 #include "voronoi/delaunay_tets.h"
-#include "spatial/hilbert.h"
-#include "spatial/seed_tree.h"
 
 namespace bisector {
 
@@ -97,7 +97,7 @@ struct Candidates {
 
   std::size_t first_point;  // index of the first point among the vertices
   std::vector<Vec3> vertices;
-  std::vector<char> used;   // not: vertices that no triangle of the boundary has, and points left out
+  std::vector<char> used;  // not: vertices that no triangle of the boundary has, and points left out
 };
 
 // Leaves out points in the diametral spheres of missing triangles until no triangle is missing or no such point is
@@ -145,18 +145,20 @@ TetMesh take_delaunay(const TriangleMesh& boundary, const std::vector<Vec3>& poi
 }
 
 // TetGen's tetrahedra of the boundary alone, for where some of its triangles are missing whatever points are left out.
-TetgenResult fill_by_tetgen(const TriangleMesh& boundary, const std::vector<Index>& missing, const TetgenOptions& options,
-                            const Context& context) {
+TetgenResult fill_by_tetgen(const TriangleMesh& boundary, const std::vector<Index>& missing,
+                            const TetgenOptions& options, const Context& context) {
   if (find_tetgen().empty() && options.program.empty())
-    throw Error(fmt::format("{} of {} boundary triangles are no Delaunay facets (first: {}), and TetGen, which could "
-                            "fit tetrahedra to them, is not there; build with BISECTOR_TETGEN or set BISECTOR_TETGEN "
-                            "to the path of bisector-tetgen",
-                            missing.size(), boundary.triangles.size(), missing.front()));
+    throw Error(
+        fmt::format("{} of {} boundary triangles are no Delaunay facets (first: {}), and TetGen, which could "
+                    "fit tetrahedra to them, is not there; build with BISECTOR_TETGEN or set BISECTOR_TETGEN "
+                    "to the path of bisector-tetgen",
+                    missing.size(), boundary.triangles.size(), missing.front()));
   TetgenResult tets = tetgen_tets(boundary, options, context);
   if (tets.zero_volume > 0)
-    throw Error(fmt::format("TetGen gave {} flat tetrahedra where boundary triangles are no Delaunay facets; ask for "
-                            "more vertices",
-                            tets.zero_volume));
+    throw Error(
+        fmt::format("TetGen gave {} flat tetrahedra where boundary triangles are no Delaunay facets; ask for "
+                    "more vertices",
+                    tets.zero_volume));
   return tets;
 }
 
@@ -177,8 +179,8 @@ TetMesh in_order(TetMesh mesh, std::size_t boundary, const std::vector<Index>& v
 }
 
 // Puts the points that were left out into the mesh, as far as they fit.
-void insert_left_out(const std::vector<Vec3>& points, const Candidates& candidates, const Context& context, TetMesh& mesh,
-                     std::vector<Index>& vertex) {
+void insert_left_out(const std::vector<Vec3>& points, const Candidates& candidates, const Context& context,
+                     TetMesh& mesh, std::vector<Index>& vertex) {
   std::vector<Vec3> late;
   std::vector<Index> late_points, late_vertices;
   for (Index i = 0; i < points.size(); ++i) {

@@ -12,8 +12,8 @@ namespace bisector {
 namespace {
 
 // Shares of the steps that the whole run is allowed.
-constexpr double kLevelShare = 0.35;   // on the only level, and on each of the coarser ones
-constexpr double kFinestShare = 0.2;   // on the finest of several levels, which starts near its minimum
+constexpr double kLevelShare = 0.35;  // on the only level, and on each of the coarser ones
+constexpr double kFinestShare = 0.2;  // on the finest of several levels, which starts near its minimum
 // Seeds of a CVT are as dense as this power of the density, 3 / (3 + 2) in space.
 constexpr double kSeedExponent = 0.6;
 

@@ -18,14 +18,14 @@
 namespace bisector {
 namespace {
 
-constexpr double kGain = 1e-3;           // by which a change must at least raise the least sine of a dihedral angle
-constexpr double kMeanGain = 2e-3;       // of the mean radius ratio by a round, below which no further one follows
-constexpr int kLastSweeps = 2;           // of smoothing for the mean, at the end
+constexpr double kGain = 1e-3;             // by which a change must at least raise the least sine of a dihedral angle
+constexpr double kMeanGain = 2e-3;         // of the mean radius ratio by a round, below which no further one follows
+constexpr int kLastSweeps = 2;             // of smoothing for the mean, at the end
 constexpr std::size_t kCheckEvery = 1024;  // vertices or tetrahedra between two checks for cancellation
 // Shares of TetImproveOptions::insert_below, up to which tetrahedra may get a new vertex. The stages follow each other:
 // new vertices are few, and the worst tetrahedra have the first choice.
 constexpr std::array<double, 4> kInsertStages{0, 0.5, 0.75, 1};
-constexpr std::size_t kTrials = 4;       // places for a new vertex that are tried for each tetrahedron
+constexpr std::size_t kTrials = 4;  // places for a new vertex that are tried for each tetrahedron
 // Fractions of the improvement for progress: where each of its three parts begins, and how much the first two take.
 constexpr double kSmoothingFrom = 0.1, kClimbingFrom = 0.5, kLastFrom = 0.9, kPart = 0.4;
 
@@ -80,7 +80,7 @@ class Improver {
   struct Failure {
     Tetrahedron corners;  // of the tetrahedron that was in the slot then
     std::uint64_t time;
-    bool insert;          // a new vertex was tried, too
+    bool insert;  // a new vertex was tried, too
   };
   std::uint64_t time_ = 1;
   std::vector<std::uint64_t> touched_;  // of each vertex, when something around it changed
@@ -221,9 +221,7 @@ bool Improver::insert_vertex(Index t) {
   return false;
 }
 
-bool Improver::mend(Index t) {
-  return swap(t) || smooth(t) || contract(t) || (may_insert(t) && insert_vertex(t));
-}
+bool Improver::mend(Index t) { return swap(t) || smooth(t) || contract(t) || (may_insert(t) && insert_vertex(t)); }
 
 std::size_t Improver::climb() {
   struct Item {

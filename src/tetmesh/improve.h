@@ -17,17 +17,17 @@ namespace bisector {
 struct TetImproveOptions {
   // Degrees, in (0, 60]: tetrahedra with a dihedral angle below this, or above 180 less this, are worked on.
   double goal = 35;
-  double insert_below = 30;   // likewise: where nothing else helps, such tetrahedra get new vertices
-  double insertions = 0.02;   // new vertices, at most, over those of the mesh given
-  int rounds = 30;            // at most
-  TetSlide slide = {};        // how boundary vertices may move; as it is, they don't
+  double insert_below = 30;  // likewise: where nothing else helps, such tetrahedra get new vertices
+  double insertions = 0.02;  // new vertices, at most, over those of the mesh given
+  int rounds = 30;           // at most
+  TetSlide slide = {};       // how boundary vertices may move; as it is, they don't
 };
 
 TetShapes measure_shapes(const TetMesh& mesh, double goal);
 
 struct TetImproveResult {
-  TetMesh mesh;                // kept vertices in the order given, then new ones; marks as given
-  std::vector<Index> source;   // for each vertex the one it was in the mesh given, or kNone
+  TetMesh mesh;               // kept vertices in the order given, then new ones; marks as given
+  std::vector<Index> source;  // for each vertex the one it was in the mesh given, or kNone
   TetImproveReport report;
 };
 

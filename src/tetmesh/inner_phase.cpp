@@ -18,7 +18,7 @@ constexpr int kPushRounds = 8;        // after which sites that still own a part
 // How far above the boundary, in boundary edge lengths, a site may sit without owning a piece of it. Layers of a dense
 // packing are 0.8 apart.
 constexpr double kClearance = 0.75;
-constexpr double kLeastPush = 0.1;    // edge lengths
+constexpr double kLeastPush = 0.1;  // edge lengths
 
 // Removes so many of the most crowded sites inside, whose cells have the least energy.
 void remove_crowded(CvtRun& sites, std::size_t boundary, std::size_t count) {
@@ -57,8 +57,8 @@ void push(CvtRun& run, const std::vector<Index>& sites, double usual_edge) {
   }
 }
 
-// The dual contains the boundary only if no cell of a site inside meets it: such sites are pushed away from it, and those
-// that nothing helps are removed.
+// The dual contains the boundary only if no cell of a site inside meets it: such sites are pushed away from it, and
+// those that nothing helps are removed.
 void clear_boundary(TetRun& run) {
   for (int round = 0;; ++round) {
     const std::vector<Index> at_boundary = inner_sites_at_boundary(run.sites);

@@ -1,5 +1,5 @@
-// The last phase of tetrahedral meshing: with the boundary finished, the sites inside are optimised once more, and none of
-// them is left with a part of the boundary.
+// The last phase of tetrahedral meshing: with the boundary finished, the sites inside are optimised once more, and none
+// of them is left with a part of the boundary.
 #pragma once
 
 #include "tetmesh/tet_run.h"

@@ -41,8 +41,7 @@ TetLocator::TetLocator(const TetMesh& mesh) : mesh_(mesh), box_(bounding_box(mes
     const auto from = cell_of(box.lo), to = cell_of(box.hi);
     for (int z = from[2]; z <= to[2]; ++z)
       for (int y = from[1]; y <= to[1]; ++y)
-        for (int x = from[0]; x <= to[0]; ++x)
-          visit((static_cast<std::size_t>(z) * size_[1] + y) * size_[0] + x);
+        for (int x = from[0]; x <= to[0]; ++x) visit((static_cast<std::size_t>(z) * size_[1] + y) * size_[0] + x);
   };
   const std::size_t cells = static_cast<std::size_t>(size_[0]) * size_[1] * size_[2];
   tets_ = group_into_rows<Index>(cells, [&](const auto& put) {

@@ -62,8 +62,8 @@ std::vector<Vec3> sample_solid(const TetMesh& mesh, std::size_t count, std::uint
   parallel_each(count, [&](std::size_t i) {
     Random random(random_seed, i);
     const double at = (static_cast<double>(i) + random.uniform()) / static_cast<double>(count) * sum;
-    const std::size_t k = std::min(static_cast<std::size_t>(std::upper_bound(sums.begin(), sums.end(), at) - sums.begin()),
-                                   sums.size() - 1);
+    const std::size_t k = std::min(
+        static_cast<std::size_t>(std::upper_bound(sums.begin(), sums.end(), at) - sums.begin()), sums.size() - 1);
     const Tetrahedron& tet = mesh.tets[order[k]];
     const std::array<double, 4> w =
         density.empty() ? uniform_weights(random)

@@ -68,8 +68,8 @@ bool newton_step(const double h[3][3], const Vec3& g, Vec3& s) {
 
 double smallest_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double area = norm(cross(b - a, c - a));
-  return std::min({std::atan2(area, dot(b - a, c - a)), std::atan2(area, dot(a - b, c - b)),
-                   std::atan2(area, dot(a - c, b - c))});
+  return std::min(
+      {std::atan2(area, dot(b - a, c - a)), std::atan2(area, dot(a - b, c - b)), std::atan2(area, dot(a - c, b - c))});
 }
 
 }  // namespace
@@ -146,7 +146,8 @@ bool TetSmoother::admit(Index v, Vec3& x) const {
         after[i] = f[i] == v ? x : before[i];
       }
       const double angle = smallest_angle(after[0], after[1], after[2]);
-      if (angle < slide_.min_angle * kRadiansPerDegree && angle < smallest_angle(before[0], before[1], before[2])) return false;
+      if (angle < slide_.min_angle * kRadiansPerDegree && angle < smallest_angle(before[0], before[1], before[2]))
+        return false;
       const Vec3 m = cross(first_[f[1]] - first_[f[0]], first_[f[2]] - first_[f[0]]);
       const Vec3 n = cross(after[1] - after[0], after[2] - after[0]);
       if (dot(m, n) < std::cos(slide_.max_turn * kRadiansPerDegree) * norm(m) * norm(n)) return false;

@@ -14,10 +14,10 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kManyTets = 8;         // tetrahedra of the solid for each site, from which on a stand-in pays
-constexpr int kSurfaceSteps = 20;            // iterations of its surface's optimisation, per level
-constexpr std::size_t kFewestVertices = 100; // of its surface
-constexpr std::size_t kFewerTriangles = 4;   // triangles of the surface given for each vertex of its surface, at least
+constexpr std::size_t kManyTets = 8;          // tetrahedra of the solid for each site, from which on a stand-in pays
+constexpr int kSurfaceSteps = 20;             // iterations of its surface's optimisation, per level
+constexpr std::size_t kFewestVertices = 100;  // of its surface
+constexpr std::size_t kFewerTriangles = 4;    // triangles of the surface given for each vertex of its surface, at least
 
 }  // namespace
 

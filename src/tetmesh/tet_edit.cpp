@@ -272,7 +272,8 @@ void TetEdit::link_sides() {
 
 bool TetEdit::exchange(std::span<const Index> old, std::span<const Tetrahedron> fresh,
                        const std::vector<Index>* slots) {
-  if (!slots && !std::all_of(fresh.begin(), fresh.end(), [&](const Tetrahedron& t) { return positive(t); })) return false;
+  if (!slots && !std::all_of(fresh.begin(), fresh.end(), [&](const Tetrahedron& t) { return positive(t); }))
+    return false;
   if (!collect_sides(old, fresh) || !sides_match() || loses_kept_edge(old, fresh)) return false;
   Change change{Change::replaced};
   if (recording_) {

@@ -16,7 +16,7 @@ class TetEdit {
     std::array<Index, 4> across;  // as tet_adjacency
     double shape;                 // dihedral_shape
     std::int32_t region;
-    std::uint8_t kept;            // bit k: facet k stays as it is
+    std::uint8_t kept;  // bit k: facet k stays as it is
     bool alive;
   };
 
@@ -79,8 +79,8 @@ class TetEdit {
     bool odd;          // whether sorting them took an odd permutation
     bool fresh;
     std::uint8_t kept;
-    Index tet;         // the one outside, or the place among the fresh ones
-    int facet;         // of it
+    Index tet;  // the one outside, or the place among the fresh ones
+    int facet;  // of it
   };
 
   double shape_of(const Tetrahedron& corners) const;

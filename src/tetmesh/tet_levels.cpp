@@ -53,8 +53,7 @@ std::vector<Vec3> far_corners(const Diagram& diagram, const std::vector<Vec3>& s
   }
   std::vector<Index> order(seeds.size());
   std::iota(order.begin(), order.end(), Index{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Index a, Index b) { return cells[a].second > cells[b].second; });
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return cells[a].second > cells[b].second; });
   const std::vector<std::array<Index, 2>> edges = dual_edges(polyhedra);
   const Csr<Index> around = group_into_rows<Index>(seeds.size(), [&](const auto& put) {
     for (const auto& [a, b] : edges) {

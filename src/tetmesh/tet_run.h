@@ -1,4 +1,5 @@
-// What the phases of a tetrahedral meshing run have in common: the run of its sites, what is asked for, and the account.
+// What the phases of a tetrahedral meshing run have in common: the run of its sites, what is asked for, and the
+// account.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +15,13 @@
 namespace bisector {
 
 struct TetRun {
-  CvtRun sites;        // in the solid, or in what stands in for it while they are free
+  CvtRun sites;  // in the solid, or in what stands in for it while they are free
   SolidBackend& solid;
-  Backend& boundary;   // of the solid, with a density of its own
+  Backend& boundary;  // of the solid, with a density of its own
   const FeatureGraph& features;
   const SizedSolid& sized;
   const TetOptions& options;
-  std::size_t wanted = 0;  // vertices
+  std::size_t wanted = 0;       // vertices
   double seconds_boundary = 0;  // spent on remeshing the boundary
   double done = 0;              // fraction of the whole run, for progress
 };

@@ -28,23 +28,26 @@ constexpr double kPerVolume = 2 * 0.9235 * 0.9235 * 0.9235;
 // Vertices of an equilateral triangulation per area, 2 / sqrt(3), of which each counts half: the other half of its cell
 // is outside.
 constexpr double kPerArea = 1 / std::numbers::sqrt3;
-constexpr double kMostVertices = 1e8;  // that may be asked for
-constexpr double kLongest = 2;         // lengths h at an edge's end, beyond which the edge is bisected
+constexpr double kMostVertices = 1e8;         // that may be asked for
+constexpr double kLongest = 2;                // lengths h at an edge's end, beyond which the edge is bisected
 constexpr std::size_t kMostTets = 2'000'000;  // unless the input has more
-constexpr int kRounds = 6;             // of refinement and calibration
-constexpr int kTrials = 40;            // factors tried by a calibration
-constexpr double kCalibrated = 1e-3;   // relative error of the edge length, at which a calibration ends
-constexpr double kNarrowest = 1e-9;    // relative width of the interval of factors, at which it gives up
-constexpr double kOutside = -1e-6;     // least barycentric coordinate of a point that counts as within the background mesh
+constexpr int kRounds = 6;                    // of refinement and calibration
+constexpr int kTrials = 40;                   // factors tried by a calibration
+constexpr double kCalibrated = 1e-3;          // relative error of the edge length, at which a calibration ends
+constexpr double kNarrowest = 1e-9;           // relative width of the interval of factors, at which it gives up
+constexpr double kOutside = -1e-6;  // least barycentric coordinate of a point that counts as within the background mesh
 constexpr double kLeastDensity = 1e-100, kMostDensity = 1e100;  // of an attribute
 
 double volume_of(const TetMesh& mesh, const Tetrahedron& t) {
-  return std::abs(rounded_six_volume(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]])) / 6;
+  return std::abs(
+             rounded_six_volume(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]])) /
+         6;
 }
 
 // Volumes and areas, over which the number of vertices is an integral.
 struct Extent {
-  Extent(const TetMesh& mesh, const TriangleMesh& boundary) : volumes(mesh.tets.size()), areas(boundary.triangles.size()) {
+  Extent(const TetMesh& mesh, const TriangleMesh& boundary)
+      : volumes(mesh.tets.size()), areas(boundary.triangles.size()) {
     parallel_each(volumes.size(), [&](std::size_t t) { volumes[t] = volume_of(mesh, mesh.tets[t]); });
     parallel_each(areas.size(), [&](std::size_t t) {
       const auto [a, b, c] = boundary.triangles[t];
@@ -63,7 +66,8 @@ struct TetEstimate {
   double vertices = 0, mean_edge = 0;
 };
 
-TetEstimate estimate(const Extent& extent, const TetMesh& mesh, const TriangleMesh& boundary, const std::vector<double>& h) {
+TetEstimate estimate(const Extent& extent, const TetMesh& mesh, const TriangleMesh& boundary,
+                     const std::vector<double>& h) {
   const auto over_tets = [&](auto&& f) {
     return fixed_sum(extent.volumes.size(), [&](std::size_t t) {
       double sum = 0;
@@ -82,7 +86,8 @@ TetEstimate estimate(const Extent& extent, const TetMesh& mesh, const TriangleMe
 }
 
 double uniform_edge(const Extent& extent, double vertices) {
-  double low = 0, high = std::cbrt(kPerVolume * extent.volume / vertices) + std::sqrt(kPerArea * extent.area / vertices);
+  double low = 0,
+         high = std::cbrt(kPerVolume * extent.volume / vertices) + std::sqrt(kPerArea * extent.area / vertices);
   while (estimate_tet_vertices(extent.volume, extent.area, high) > vertices) high *= 2;
   for (int k = 0; k < 200 && high - low > 1e-12 * high; ++k) {
     const double h = 0.5 * (low + high);
@@ -98,10 +103,11 @@ void check_bounds(const SizingOptions& field, const SizingTarget& target) {
     throw Error("sizing: give either a number of vertices or a positive edge length");
   if (!positive(field.gradation)) throw Error("sizing: the gradation inside a solid must be positive; correct it");
   for (const double bound : {field.min_edge, field.max_edge})
-    if (bound != 0 && !positive(bound)) throw Error("sizing: the least and largest edge length must be positive; correct them");
+    if (bound != 0 && !positive(bound))
+      throw Error("sizing: the least and largest edge length must be positive; correct them");
   if (field.max_edge > 0 && field.min_edge > field.max_edge)
-    throw Error(fmt::format("sizing: the least edge length {:g} is larger than the largest {:g}; correct them", field.min_edge,
-                            field.max_edge));
+    throw Error(fmt::format("sizing: the least edge length {:g} is larger than the largest {:g}; correct them",
+                            field.min_edge, field.max_edge));
 }
 
 void check_samples(const SizeSamples& sizes) {
@@ -113,7 +119,8 @@ void check_samples(const SizeSamples& sizes) {
       if (v >= points) throw Error(fmt::format("sizing: the background mesh has no vertex {}; correct it", v));
   for (std::size_t k = 0; k < points; ++k)
     if (!positive(sizes.lengths[k]))
-      throw Error(fmt::format("sizing: the edge length {:g} of point {} is not positive; correct it", sizes.lengths[k], k));
+      throw Error(
+          fmt::format("sizing: the edge length {:g} of point {} is not positive; correct it", sizes.lengths[k], k));
 }
 
 void check_attribute(const std::vector<double>& attribute, std::size_t vertices) {
@@ -133,11 +140,13 @@ void check(const TetMesh& mesh, const TetSizingOptions& options, const SizingTar
 }
 
 // The samples from which the field of lengths grows, up to a factor.
-SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options, double uniform) {
+SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
+                       double uniform) {
   if (!options.sizes.points.empty()) return options.sizes;
   SizeSamples samples;
   if (options.field.kind == DensityKind::attribute) {
-    samples.points.assign(mesh.vertices.begin(), mesh.vertices.begin() + static_cast<std::ptrdiff_t>(options.field.attribute.size()));
+    samples.points.assign(mesh.vertices.begin(),
+                          mesh.vertices.begin() + static_cast<std::ptrdiff_t>(options.field.attribute.size()));
     for (double rho : options.field.attribute) samples.lengths.push_back(std::pow(rho, -0.2));
     if (samples.points.size() == mesh.vertices.size()) samples.tets = mesh.tets;
     return samples;
@@ -365,8 +374,8 @@ class Refiner {
     }
   }
 
-  static void split_triangles(Index a, Index b, Index m, std::vector<Triangle>& triangles, std::vector<std::int32_t>& labels,
-                              Around& at) {
+  static void split_triangles(Index a, Index b, Index m, std::vector<Triangle>& triangles,
+                              std::vector<std::int32_t>& labels, Around& at) {
     const auto found = at.find(key(a, b));
     if (found == at.end()) return;
     const std::vector<Index> around = std::move(found->second);
@@ -409,11 +418,10 @@ class Refiner {
 void set_uniform(const Extent& extent, const SizingTarget& target, SizedSolid& sized) {
   const auto count = static_cast<double>(target.vertices);
   sized.edge_length = target.vertices ? uniform_edge(extent, count) : target.edge_length;
-  const double wanted =
-      target.vertices ? count : estimate_tet_vertices(extent.volume, extent.area, sized.edge_length);
+  const double wanted = target.vertices ? count : estimate_tet_vertices(extent.volume, extent.area, sized.edge_length);
   if (wanted > kMostVertices)
-    throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones", sized.edge_length,
-                            kMostVertices));
+    throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones",
+                            sized.edge_length, kMostVertices));
   sized.vertices = static_cast<std::size_t>(std::llround(wanted));
 }
 

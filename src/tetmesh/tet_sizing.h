@@ -15,11 +15,11 @@ namespace bisector {
 
 // A solid whose tetrahedra can carry the density.
 struct SizedSolid {
-  TetMesh mesh;                 // the input's, its vertices first, edges bisected; regions, marks and feature edges follow
+  TetMesh mesh;  // the input's, its vertices first, edges bisected; regions, marks and feature edges follow
   std::vector<double> lengths;  // h at each vertex; empty if uniform
   EdgeSplits splits;
-  double edge_length = 0;       // the mean aimed at
-  std::size_t vertices = 0;     // that the result should have
+  double edge_length = 0;    // the mean aimed at
+  std::size_t vertices = 0;  // that the result should have
 
   std::vector<double> volume_density() const;   // (edge_length / h)^5, for Solid; empty if uniform
   std::vector<double> surface_density() const;  // (edge_length / h)^4, for Surface

@@ -10,7 +10,7 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kRing = 10;  // tetrahedra around an edge that is removed, at most
-constexpr int kDepth = 3;          // steps from the first facet that is removed to the last one removed with it, at most
+constexpr int kDepth = 3;  // steps from the first facet that is removed to the last one removed with it, at most
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double shape(const TetEdit& mesh, Index a, Index b, Index c, Index d) {
@@ -74,7 +74,7 @@ struct Sandwich {
   double beat;  // shape that everything new must exceed
 
   struct Part {
-    std::vector<Index> old;  // tetrahedra on either side of the facets
+    std::vector<Index> old;                   // tetrahedra on either side of the facets
     std::vector<std::array<Index, 2>> edges;  // around the facets, in turn; each gives a tetrahedron with a and b
     double shape = kInfinity;
   };

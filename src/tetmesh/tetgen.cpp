@@ -20,13 +20,13 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/orientation.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "core/orientation.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/tet_topology.h"
-#include "tetmesh/carve.h"
 #include "tetgen/protocol.h"
+#include "tetmesh/carve.h"
 
 extern char** environ;
 
@@ -114,10 +114,8 @@ class Child {
       if (said_.size() > 8192) said_.erase(0, said_.size() - 4096);
       if (polls[0].revents & POLLOUT) {
         const ssize_t n = ::send(channel_.get(), request.data() + sent, request.size() - sent, MSG_NOSIGNAL);
-        if (n > 0)
-          sent += static_cast<std::size_t>(n);
-        else if (errno != EAGAIN && errno != EINTR)
-          sent = request.size();
+        if (n > 0) sent += static_cast<std::size_t>(n);
+        else if (errno != EAGAIN && errno != EINTR) sent = request.size();
         if (sent == request.size()) ::shutdown(channel_.get(), SHUT_WR);
       }
       if (polls[0].revents & (POLLIN | POLLHUP | POLLERR)) listening = receive(channel_.get(), reply);

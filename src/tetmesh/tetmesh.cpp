@@ -38,7 +38,8 @@ constexpr double kPlaced = 0.82, kExtracted = 0.85;
 
 void check_options(const TetOptions& options) {
   if (!options.seeds.empty()) {
-    if (options.seeds.size() < kFewest) throw Error(fmt::format("a tetrahedral mesh needs at least {} seeds; give more", kFewest));
+    if (options.seeds.size() < kFewest)
+      throw Error(fmt::format("a tetrahedral mesh needs at least {} seeds; give more", kFewest));
     return;
   }
   if ((options.vertices > 0) == (options.edge_length > 0))
@@ -62,8 +63,8 @@ FinishedBoundary place_sites(TetRun& run, const BoundaryShare& share) {
   return finished;
 }
 
-// If that leaves too few sites, there is no room inside for what the boundary did not take: it is done again from the free
-// sites, and the boundary takes more.
+// If that leaves too few sites, there is no room inside for what the boundary did not take: it is done again from the
+// free sites, and the boundary takes more.
 FinishedBoundary place_enough_sites(TetRun& run) {
   const PlacedSeeds free = run.sites.seeds;
   const double done = run.done;
@@ -152,7 +153,8 @@ TriangleMesh boundary_of(const TetMesh& mesh) {
   std::sort(marks.begin(), marks.end());
   for (Triangle t : surface.triangles) {
     std::sort(t.begin(), t.end());
-    const auto mark = std::lower_bound(marks.begin(), marks.end(), std::pair{t, std::numeric_limits<std::int32_t>::min()});
+    const auto mark =
+        std::lower_bound(marks.begin(), marks.end(), std::pair{t, std::numeric_limits<std::int32_t>::min()});
     surface.labels.push_back(mark != marks.end() && mark->first == t ? mark->second : 0);
   }
   return surface;
@@ -194,7 +196,8 @@ void check_boundary(const TetMesh& solid) {
 void check_attribute(const TetOptions& options, std::size_t vertices) {
   const SizingOptions& field = options.sizing.field;
   if (field.kind == DensityKind::attribute && options.sizing.sizes.points.empty() && field.attribute.size() != vertices)
-    throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex", field.attribute.size(), vertices));
+    throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex", field.attribute.size(),
+                            vertices));
 }
 
 TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& context) {
@@ -206,8 +209,8 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
                                                     : SizingTarget{options.seeds.size(), 0};
   SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
   if (sized.vertices < kFewest)
-    throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones", options.edge_length,
-                            sized.vertices, kFewest));
+    throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones",
+                            options.edge_length, sized.vertices, kFewest));
   const FeatureGraph features = split_features(graph, sized.splits);
   const Solid solid(sized.mesh, sized.volume_density());
   TriangleMesh outside = boundary_of(sized.mesh);
@@ -238,7 +241,8 @@ TetOptions follow_vertices(const TetOptions& options, const WeldResult& welded) 
   }
   for (auto& edge : moved.features.given)
     for (Index& v : edge) {
-      if (v >= welded.vertex_of.size()) throw Error(fmt::format("feature edge of vertex {}: the mesh has none; correct it", v));
+      if (v >= welded.vertex_of.size())
+        throw Error(fmt::format("feature edge of vertex {}: the mesh has none; correct it", v));
       v = welded.vertex_of[v];
     }
   std::erase_if(moved.features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });

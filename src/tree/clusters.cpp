@@ -13,10 +13,10 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kLeastPoints = 12;  // in each half of a cluster that is split, about
-constexpr double kOutOfRound = 0.15;      // rms of a tight cluster in radii, where that is more than ClusterOptions::delta
-constexpr double kDamping = 0.1;          // of the regression that gives an axis, in the sum of the points' variances
-constexpr double kConverged = 1e-3;       // relative change of the energy that ends Lloyd's iteration
-constexpr int kRounds = 12;               // of splitting, at most
+constexpr double kOutOfRound = 0.15;  // rms of a tight cluster in radii, where that is more than ClusterOptions::delta
+constexpr double kDamping = 0.1;      // of the regression that gives an axis, in the sum of the points' variances
+constexpr double kConverged = 1e-3;   // relative change of the energy that ends Lloyd's iteration
+constexpr int kRounds = 12;           // of splitting, at most
 
 double energy(const Vec3& p, const BranchCylinder& c) {
   const Vec3 d = p - c.centre;
@@ -55,13 +55,17 @@ class Clustering {
   double fit() {
     members_.assign(result_.cylinders.size(), {});
     for (std::size_t i = 0; i < points_.size(); ++i)
-      if (const Index c = result_.label[i]; c != kNone && !result_.fixed[c]) members_[c].push_back(static_cast<Index>(i));
+      if (const Index c = result_.label[i]; c != kNone && !result_.fixed[c])
+        members_[c].push_back(static_cast<Index>(i));
     std::vector<double> energies(members_.size(), 0);
-    parallel_each(members_.size(), [&](std::size_t c) {
-      if (result_.fixed[c] || members_[c].empty()) return;
-      fit(c);
-      for (const Index i : members_[c]) energies[c] += energy(points_[i], result_.cylinders[c]);
-    }, 4);
+    parallel_each(
+        members_.size(),
+        [&](std::size_t c) {
+          if (result_.fixed[c] || members_[c].empty()) return;
+          fit(c);
+          for (const Index i : members_[c]) energies[c] += energy(points_[i], result_.cylinders[c]);
+        },
+        4);
     double sum = 0;
     for (const double e : energies) sum += e;
     return sum;

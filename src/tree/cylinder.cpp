@@ -16,8 +16,8 @@ using MinCircle = CGAL::Min_sphere_of_spheres_d<CGAL::Min_sphere_of_points_d_tra
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int kSteps = 8;          // of Gauss-Newton
-constexpr double kLargest = 2;     // radius, in bounding radii
+constexpr int kSteps = 8;       // of Gauss-Newton
+constexpr double kLargest = 2;  // radius, in bounding radii
 
 Vec3 to_vec3(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 

@@ -8,12 +8,12 @@
 namespace bisector {
 
 struct BranchCylinder {
-  Vec3 centre;                // on the axis, in the middle of the points along it
-  Vec3 axis;                  // of length 1
-  double radius = 0;          // least squares; at most twice the bounding one
-  double bounding_radius = 0; // of the smallest circle around the points' projections along the axis
-  double length = 0;          // of the points along the axis
-  double rms = 0;             // distance of the points from the surface of radius `radius`
+  Vec3 centre;                 // on the axis, in the middle of the points along it
+  Vec3 axis;                   // of length 1
+  double radius = 0;           // least squares; at most twice the bounding one
+  double bounding_radius = 0;  // of the smallest circle around the points' projections along the axis
+  double length = 0;           // of the points along the axis
+  double rms = 0;              // distance of the points from the surface of radius `radius`
 };
 
 // The cylinder of points along `axis`, or along their principal direction where it is zero. The thesis takes the

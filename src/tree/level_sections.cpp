@@ -59,7 +59,9 @@ Slices cut_slices(const std::vector<Vec3>& points, const Csr<Index>& neighbours,
       band[i] = static_cast<Index>(distance[i] / width);
       order.push_back(static_cast<Index>(i));
     }
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return std::pair{band[a], a} < std::pair{band[b], b}; });
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
+    return std::pair{band[a], a} < std::pair{band[b], b};
+  });
   result.of_point.assign(points.size(), kNone);
   std::vector<Index> members;
   for (const Index start : order) {
@@ -85,7 +87,8 @@ Slices cut_slices(const std::vector<Vec3>& points, const Csr<Index>& neighbours,
       spread += v * v.transpose();
     }
     // Of a thin ring two eigenvalues are half the squared radius, of a short piece of a twig the lower two.
-    const double middle = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread, Eigen::EigenvaluesOnly).eigenvalues()[1];
+    const double middle =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread, Eigen::EigenvaluesOnly).eigenvalues()[1];
     slice.radius = std::sqrt(std::max(0.0, 2 * middle / static_cast<double>(members.size())));
     result.slices.push_back(slice);
   }
@@ -122,9 +125,9 @@ std::vector<Index> join_slices(const std::vector<Slice>& slices, double width, s
     const Slice& s = slices[k];
     const Index up = s.parent == kNone ? kNone : section[s.parent];
     const bool small = s.points < kLeastPoints;
-    const bool joins = up != kNone && (small || (children[s.parent] == 1 &&
-                                                 static_cast<double>(s.band - first_band[up] + 1) * width <=
-                                                     kSectionLength * std::max(radius[up], s.radius)));
+    const bool joins =
+        up != kNone && (small || (children[s.parent] == 1 && static_cast<double>(s.band - first_band[up] + 1) * width <=
+                                                                 kSectionLength * std::max(radius[up], s.radius)));
     if (joins) {
       section[k] = up;
       if (!small) radius[up] = std::max(radius[up], s.radius);
@@ -145,7 +148,8 @@ LevelSections level_sections(const std::vector<Vec3>& points, const Csr<Index>& 
   std::vector<double> lengths;
   lengths.reserve(neighbours.values.size());
   for (std::size_t i = 0; i < neighbours.rows(); ++i)
-    for (const Index* j = neighbours.begin(i); j != neighbours.end(i); ++j) lengths.push_back(norm(points[*j] - points[i]));
+    for (const Index* j = neighbours.begin(i); j != neighbours.end(i); ++j)
+      lengths.push_back(norm(points[*j] - points[i]));
   ShortestPaths paths = shortest_paths(neighbours, lengths, root_points(points, neighbours, lowest, width));
   result.distance = std::move(paths.distance);
   Slices slices = cut_slices(points, neighbours, result.distance, width);

@@ -22,8 +22,9 @@ constexpr double kQuarter = 0.5522847498;  // of a circle's quadrant as a cubic:
 
 // The axis: fitted the less closely, the more its bends narrow the branch.
 constexpr std::array<double, 4> kLooser{0, 0.25, 0.5, 1};  // tolerances added, as shares of the radius
-constexpr double kNarrowing = 1.2;  // ratio of the radius to what bends leave of it, at most, before a looser axis is tried
-constexpr double kBend = 0.9;       // radius over the axis' radius of curvature, at most
+constexpr double kNarrowing =
+    1.2;                       // ratio of the radius to what bends leave of it, at most, before a looser axis is tried
+constexpr double kBend = 0.9;  // radius over the axis' radius of curvature, at most
 
 // The wall's rows: as many as keep the error of its sections.
 constexpr double kSectionError = 0.006;  // of the radius, in each direction across the axis
@@ -36,7 +37,7 @@ constexpr double kShrinking = 0.8;  // ratio of one step
 constexpr int kShrinkings = 12;     // steps
 
 // The mesh.
-constexpr int kChordHalvings = 8;                  // of a knot interval, at most
+constexpr int kChordHalvings = 8;                 // of a knot interval, at most
 constexpr int kFewestSides = 6, kMostSides = 48;  // of a ring
 
 struct SurfacePoint {
@@ -339,8 +340,8 @@ void add_stations(const BranchSurface& s, double a, double b, double tolerance, 
 int sides_for(const BranchSurface& s, double tolerance) {
   const double largest = *std::max_element(s.radii.begin(), s.radii.end());
   if (tolerance >= largest) return kFewestSides;
-  return static_cast<int>(std::clamp(std::ceil(std::numbers::pi / std::acos(1 - tolerance / largest)), double{kFewestSides},
-                                     double{kMostSides}));
+  return static_cast<int>(std::clamp(std::ceil(std::numbers::pi / std::acos(1 - tolerance / largest)),
+                                     double{kFewestSides}, double{kMostSides}));
 }
 
 }  // namespace

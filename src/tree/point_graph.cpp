@@ -80,14 +80,16 @@ std::vector<std::unique_ptr<Part>> make_parts(const std::vector<Vec3>& points, c
       part_of[c] = parts.size();
       parts.push_back(std::make_unique<Part>());
     }
-  for (std::size_t i = 0; i < points.size(); ++i) parts[part_of[graph.component[i]]]->add(static_cast<Index>(i), points[i]);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    parts[part_of[graph.component[i]]]->add(static_cast<Index>(i), points[i]);
   if (parts.front()->ids.empty()) parts.erase(parts.begin());
   for (auto& part : parts) part->tree = std::make_unique<KdTree>(3, part->set);
   return parts;
 }
 
 void check_points(const std::vector<Vec3>& points) {
-  if (points.size() < 2) throw Error(fmt::format("{} distinct points are no point cloud; give at least 2", points.size()));
+  if (points.size() < 2)
+    throw Error(fmt::format("{} distinct points are no point cloud; give at least 2", points.size()));
   for (std::size_t i = 0; i < points.size(); ++i)
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(points[i][k]))
@@ -193,13 +195,16 @@ std::vector<Bridge> shortest_bridges(const std::vector<Vec3>& points, const Poin
     const auto largest = static_cast<Index>(std::max_element(size.begin(), size.end()) - size.begin());
     // By the cut property the shortest gap of any component is in the tree: the largest need not be asked.
     std::vector<Bridge> gap(points.size());
-    parallel_each(points.size(), [&](std::size_t i) {
-      if (component[i] == largest) return;
-      OutsideComponent result(component, component[i]);
-      for (const auto& part : parts)
-        if (part->several || component[part->ids.front()] != component[i]) result.look_in(*part, points[i]);
-      gap[i] = {static_cast<Index>(i), result.point(), std::sqrt(result.distance())};
-    }, 256);
+    parallel_each(
+        points.size(),
+        [&](std::size_t i) {
+          if (component[i] == largest) return;
+          OutsideComponent result(component, component[i]);
+          for (const auto& part : parts)
+            if (part->several || component[part->ids.front()] != component[i]) result.look_in(*part, points[i]);
+          gap[i] = {static_cast<Index>(i), result.point(), std::sqrt(result.distance())};
+        },
+        256);
     std::vector<Bridge> best(graph.components, {kNone, kNone, 0});
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (component[i] == largest) continue;

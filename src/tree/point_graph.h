@@ -13,7 +13,7 @@ struct PointGraph {
   Csr<Index> neighbours;         // symmetric, ascending: each point's nearest ones and those it is a nearest one of
   std::vector<Index> component;  // of each point; numbered by the lowest point in it
   std::size_t components = 0;
-  double spacing = 0;            // median distance of a point from its k-th nearest, in the points' unit
+  double spacing = 0;  // median distance of a point from its k-th nearest, in the points' unit
 };
 
 // Each point is joined to its `k` nearest. Throws Error for fewer than two points and for coordinates that are not

@@ -12,7 +12,7 @@ namespace bisector {
 
 struct PolylineFoot {
   std::size_t segment = 0;
-  double t = 0;         // in the segment, in [0, 1]
+  double t = 0;  // in the segment, in [0, 1]
   Vec3 point;
   double distance = std::numeric_limits<double>::infinity();
 };

@@ -15,9 +15,9 @@ constexpr std::size_t kWindow = 5;  // nodes of the axis that a radius is the me
 constexpr double kTangent = 6;      // length in radii that tells a direction
 
 // Another parent is looked for where a base is far from its parent's surface.
-constexpr double kFar = 3;      // distance in radii of the base
-constexpr double kTurn = 3;     // what a gap across the base's direction counts more than one along it, in its length
-constexpr double kBetter = 0.6;  // cost of the gap to another parent over that to the present one, at most
+constexpr double kFar = 3;        // distance in radii of the base
+constexpr double kTurn = 3;       // what a gap across the base's direction counts more than one along it, in its length
+constexpr double kBetter = 0.6;   // cost of the gap to another parent over that to the present one, at most
 constexpr double kThinner = 0.7;  // radius of a parent over its child's, at least
 
 // A child becomes the rest of its parent's branch where it goes on straighter and thicker.
@@ -33,12 +33,16 @@ class Reattachment {
     std::vector<char> open(limbs_.size(), 0);
     for (std::size_t b = 0; b < limbs_.size(); ++b) {
       const Limb& limb = limbs_[b];
-      if (limb.parent != kNone && gap_to(limb, limbs_[limb.parent]).length > kFar * (base_radius(limb) + noise_)) open[b] = 1;
+      if (limb.parent != kNone && gap_to(limb, limbs_[limb.parent]).length > kFar * (base_radius(limb) + noise_))
+        open[b] = 1;
     }
     std::vector<Index> wanted(limbs_.size(), kNone);
-    parallel_each(limbs_.size(), [&](std::size_t b) {
-      if (open[b]) wanted[b] = best_parent(static_cast<Index>(b));
-    }, 1);
+    parallel_each(
+        limbs_.size(),
+        [&](std::size_t b) {
+          if (open[b]) wanted[b] = best_parent(static_cast<Index>(b));
+        },
+        1);
     for (std::size_t b = 0; b < limbs_.size(); ++b)
       if (wanted[b] != kNone && !descends(wanted[b], static_cast<Index>(b))) limbs_[b].parent = wanted[b];
   }
@@ -174,7 +178,8 @@ class Reattachment {
     branch.axis.insert(branch.axis.end(), rest.axis.begin() + from, rest.axis.end());
     branch.radii.insert(branch.radii.end(), rest.radii.begin() + from, rest.radii.end());
     std::vector<Index> all;
-    std::merge(branch.points.begin(), branch.points.end(), rest.points.begin(), rest.points.end(), std::back_inserter(all));
+    std::merge(branch.points.begin(), branch.points.end(), rest.points.begin(), rest.points.end(),
+               std::back_inserter(all));
     branch.points = std::move(all);
     rest = {};
     for (Limb& child : limbs_)

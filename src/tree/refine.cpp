@@ -21,13 +21,13 @@ constexpr double kOutOfRound = 0.1;
 constexpr std::size_t kLeastPoints = 6;  // outside the parent
 constexpr std::size_t kFewPoints = 2;    // that are enough if they are this many times as far outside as needed:
 constexpr double kFarProtrusion = 3;
-constexpr double kLeastProtrusion = 1;   // in the branch's own radii, beyond the surface of its parent
-constexpr double kThickestTwig = 1;      // the same in noise, whichever is less: thinner twigs may be lost
-constexpr double kBump = 0.3;            // in radii of the parent: forks and bark stick out so far
+constexpr double kLeastProtrusion = 1;  // in the branch's own radii, beyond the surface of its parent
+constexpr double kThickestTwig = 1;     // the same in noise, whichever is less: thinner twigs may be lost
+constexpr double kBump = 0.3;           // in radii of the parent: forks and bark stick out so far
 
 // Which branch is a part of another, not its parent: most of its points lie on that one's surface, and few far from it.
 constexpr double kTwinShare = 0.6;
-constexpr std::size_t kFarShare = 10;    // one of the points in so many may be far
+constexpr std::size_t kFarShare = 10;     // one of the points in so many may be far
 constexpr std::size_t kTwinSamples = 64;  // points looked at
 
 // Where a branch starts on its parent.
@@ -37,23 +37,19 @@ constexpr int kRootSteps = 24;       // places looked at straight on backwards
 constexpr double kRootReach = 3;     // up to so many times the base's distance from the parent's axis
 
 // Radii.
-constexpr double kOwnNoise = 1.2;     // noise taken out of a radius, in the deviation of the branch's own points, at most
+constexpr double kOwnNoise = 1.2;  // noise taken out of a radius, in the deviation of the branch's own points, at most
 constexpr double kLeastRadius = 0.3;  // of the noisy surface's: noise feigns no more than the rest
 
 class Refinement {
  public:
   Refinement(const std::vector<Vec3>& points, const Csr<Index>& neighbours, std::vector<Limb> limbs,
              const RefineOptions& options)
-      : points_(points),
-        neighbours_(neighbours),
-        limbs_(std::move(limbs)),
-        options_(options),
-        merged_(limbs_.size(), 0),
-        support_(limbs_.size()),
-        deviation_(limbs_.size(), 0) {}
+      : points_(points), neighbours_(neighbours), limbs_(std::move(limbs)), options_(options),
+        merged_(limbs_.size(), 0), support_(limbs_.size()), deviation_(limbs_.size(), 0) {}
 
   void fit_all() {
-    parallel_each(limbs_.size(), [&](std::size_t b) { fit(b); }, 1);
+    parallel_each(
+        limbs_.size(), [&](std::size_t b) { fit(b); }, 1);
   }
 
   // Children's points in their parent's surface go to the parent; children with hardly any others are merged.
@@ -96,9 +92,12 @@ class Refinement {
     std::vector<Box> boxes(limbs_.size());
     for (std::size_t b = 0; b < limbs_.size(); ++b) boxes[b] = bounding_box(limbs_[b].axis);
     std::vector<Index> twin(limbs_.size(), kNone);
-    parallel_each(limbs_.size(), [&](std::size_t b) {
-      if (!merged_[b] && limbs_[b].parent != kNone) twin[b] = find_twin(b, boxes);
-    }, 1);
+    parallel_each(
+        limbs_.size(),
+        [&](std::size_t b) {
+          if (!merged_[b] && limbs_[b].parent != kNone) twin[b] = find_twin(b, boxes);
+        },
+        1);
     for (std::size_t b = 0; b < limbs_.size(); ++b) {
       if (twin[b] == kNone) continue;
       Index into = twin[b];
@@ -127,8 +126,8 @@ class Refinement {
     }
   }
 
-  // Makes each child start where its free part, straight on backwards, meets its parent's axis. Near a fork its points are
-  // in its parent's clusters, and the skeleton leads into it from too far below.
+  // Makes each child start where its free part, straight on backwards, meets its parent's axis. Near a fork its points
+  // are in its parent's clusters, and the skeleton leads into it from too far below.
   void root_all() {
     for (std::size_t b = 0; b < limbs_.size(); ++b)
       if (limbs_[b].parent != kNone) root(b);
@@ -140,20 +139,23 @@ class Refinement {
     for (std::size_t b = 0; b < limbs_.size(); ++b)
       if (limbs_[b].parent != kNone) children[limbs_[b].parent].push_back(static_cast<Index>(b));
     std::vector<std::vector<std::pair<Index, Index>>> given(limbs_.size());  // child, point
-    parallel_each(limbs_.size(), [&](std::size_t b) {
-      if (children[b].empty()) return;
-      for (const Index i : limbs_[b].points) {
-        double least = off_surface(limbs_[b], points_[i]);
-        if (least <= kSurface * options_.noise) continue;
-        Index best = kNone;
-        for (const Index child : children[b])
-          if (const double off = std::abs(off_surface(limbs_[child], points_[i])); off < least) {
-            least = off;
-            best = child;
+    parallel_each(
+        limbs_.size(),
+        [&](std::size_t b) {
+          if (children[b].empty()) return;
+          for (const Index i : limbs_[b].points) {
+            double least = off_surface(limbs_[b], points_[i]);
+            if (least <= kSurface * options_.noise) continue;
+            Index best = kNone;
+            for (const Index child : children[b])
+              if (const double off = std::abs(off_surface(limbs_[child], points_[i])); off < least) {
+                least = off;
+                best = child;
+              }
+            if (best != kNone && least <= kSurface * options_.noise) given[b].emplace_back(best, i);
           }
-        if (best != kNone && least <= kSurface * options_.noise) given[b].emplace_back(best, i);
-      }
-    }, 1);
+        },
+        1);
     for (std::size_t b = 0; b < limbs_.size(); ++b) {
       if (given[b].empty()) continue;
       std::vector<Index> gone;
@@ -162,7 +164,8 @@ class Refinement {
         limbs_[child].points.push_back(i);
       }
       std::vector<Index> left;
-      std::set_difference(limbs_[b].points.begin(), limbs_[b].points.end(), gone.begin(), gone.end(), std::back_inserter(left));
+      std::set_difference(limbs_[b].points.begin(), limbs_[b].points.end(), gone.begin(), gone.end(),
+                          std::back_inserter(left));
       limbs_[b].points = std::move(left);
     }
     for (Limb& limb : limbs_) std::sort(limb.points.begin(), limb.points.end());
@@ -172,13 +175,16 @@ class Refinement {
   void sprout() {
     std::vector<Index> owner(points_.size(), kNone);
     const std::size_t before = limbs_.size();
-    parallel_each(before, [&](std::size_t b) {
-      const double skin = skin_of(quantile(limbs_[b].radii, 0.5));
-      for (const Index i : limbs_[b].points) {
-        const PolylineFoot foot = nearest_on_polyline(limbs_[b].axis, points_[i]);
-        if (foot.distance > skin + (1 + kBump) * value_at(limbs_[b].radii, foot)) owner[i] = static_cast<Index>(b);
-      }
-    }, 1);
+    parallel_each(
+        before,
+        [&](std::size_t b) {
+          const double skin = skin_of(quantile(limbs_[b].radii, 0.5));
+          for (const Index i : limbs_[b].points) {
+            const PolylineFoot foot = nearest_on_polyline(limbs_[b].axis, points_[i]);
+            if (foot.distance > skin + (1 + kBump) * value_at(limbs_[b].radii, foot)) owner[i] = static_cast<Index>(b);
+          }
+        },
+        1);
     std::vector<char> gone(points_.size(), 0);
     for (std::size_t start = 0; start < points_.size(); ++start) {
       const Index b = owner[start];
@@ -200,7 +206,8 @@ class Refinement {
     merged_.assign(limbs_.size(), 0);
     support_.resize(limbs_.size());
     deviation_.resize(limbs_.size(), 0);
-    parallel_each(limbs_.size() - before, [&](std::size_t k) { fit(before + k); }, 1);
+    parallel_each(
+        limbs_.size() - before, [&](std::size_t k) { fit(before + k); }, 1);
   }
 
   void reattach() {
@@ -290,7 +297,8 @@ class Refinement {
     for (std::size_t q = 0; q < limbs_.size(); ++q) {
       if (q == b || merged_[q] || limbs_[q].points.size() <= own.size()) continue;
       const Limb& limb = limbs_[q];
-      const double reach = *std::max_element(limb.radii.begin(), limb.radii.end()) * (1 + kOutOfRound) + kSurface * options_.noise;
+      const double reach =
+          *std::max_element(limb.radii.begin(), limb.radii.end()) * (1 + kOutOfRound) + kSurface * options_.noise;
       bool apart = false;
       for (int axis = 0; axis < 3; ++axis)
         apart = apart || box.lo[axis] > boxes[q].hi[axis] + reach || box.hi[axis] < boxes[q].lo[axis] - reach;
@@ -357,8 +365,8 @@ class Refinement {
     return places;
   }
 
-  // The length up to which most of the points of a branch are on the surface of its parent: where those inside outnumber
-  // the others most.
+  // The length up to which most of the points of a branch are on the surface of its parent: where those inside
+  // outnumber the others most.
   static double exit_length(std::vector<Place> places) {
     std::sort(places.begin(), places.end(),
               [](const Place& a, const Place& b) { return std::tie(a.along, a.point) < std::tie(b.along, b.point); });

@@ -22,9 +22,10 @@ struct RefineOptions {
   int passes = 3;    // of fitting, giving points to parents, and merging
 };
 
-// `limbs` come parents first, with axes and points; radii are not used. `neighbours` is the graph of the points. Branches
-// that do not stand out of their parent, or lie in the surface of another, are merged into it; their children become its
-// children. Points that hang together and are left off the surface of their branch become branches of their own.
+// `limbs` come parents first, with axes and points; radii are not used. `neighbours` is the graph of the points.
+// Branches that do not stand out of their parent, or lie in the surface of another, are merged into it; their children
+// become its children. Points that hang together and are left off the surface of their branch become branches of their
+// own.
 std::vector<Limb> refine_limbs(const std::vector<Vec3>& points, const Csr<Index>& neighbours, std::vector<Limb> limbs,
                                const RefineOptions& options, const Context& context = {});
 

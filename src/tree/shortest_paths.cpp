@@ -12,8 +12,8 @@ namespace {
 struct Edge {
   double length;
 };
-using Graph =
-    boost::compressed_sparse_row_graph<boost::directedS, boost::no_property, Edge, boost::no_property, Index, std::size_t>;
+using Graph = boost::compressed_sparse_row_graph<boost::directedS, boost::no_property, Edge, boost::no_property, Index,
+                                                 std::size_t>;
 
 Graph make_graph(const Csr<Index>& neighbours, const std::vector<double>& lengths) {
   std::vector<std::pair<Index, Index>> ends;
@@ -38,11 +38,10 @@ ShortestPaths shortest_paths(const Csr<Index>& neighbours, const std::vector<dou
   paths.distance.resize(neighbours.rows());
   paths.previous.resize(neighbours.rows());
   const auto index = get(boost::vertex_index, graph);
-  boost::dijkstra_shortest_paths(graph, sources.begin(), sources.end(),
-                                 boost::make_iterator_property_map(paths.previous.begin(), index),
-                                 boost::make_iterator_property_map(paths.distance.begin(), index),
-                                 get(&Edge::length, graph), index, std::less<>(), boost::closed_plus<double>(kFar), kFar,
-                                 0.0, boost::dijkstra_visitor<>());
+  boost::dijkstra_shortest_paths(
+      graph, sources.begin(), sources.end(), boost::make_iterator_property_map(paths.previous.begin(), index),
+      boost::make_iterator_property_map(paths.distance.begin(), index), get(&Edge::length, graph), index, std::less<>(),
+      boost::closed_plus<double>(kFar), kFar, 0.0, boost::dijkstra_visitor<>());
   return paths;
 }
 

@@ -14,8 +14,8 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kNearClusters = 16;  // nearest clusters that gaps are measured to
-// What makes links longer, so that paths go straight on: the length added for a link across an axis, and for a gap, as a
-// multiple of its own.
+// What makes links longer, so that paths go straight on: the length added for a link across an axis, and for a gap, as
+// a multiple of its own.
 constexpr double kTurn = 1.5;
 constexpr double kGap = 3;
 
@@ -38,7 +38,8 @@ Paths paths_from_roots(const std::vector<ClusterLink>& links, std::size_t cluste
     arcs.push_back({l.from, l.to, l.length});
     arcs.push_back({l.to, l.from, l.length});
   }
-  std::sort(arcs.begin(), arcs.end(), [](const Arc& a, const Arc& b) { return std::tie(a.from, a.to) < std::tie(b.from, b.to); });
+  std::sort(arcs.begin(), arcs.end(),
+            [](const Arc& a, const Arc& b) { return std::tie(a.from, a.to) < std::tie(b.from, b.to); });
   Csr<Index> neighbours;
   std::vector<double> lengths;
   auto arc = arcs.begin();
@@ -52,7 +53,8 @@ Paths paths_from_roots(const std::vector<ClusterLink>& links, std::size_t cluste
   const ShortestPaths paths = shortest_paths(neighbours, lengths, roots);
 
   Paths result{paths.previous, {}};
-  std::vector<std::size_t> depth(clusters, 0);  // decides between clusters at one distance, which may be parent and child
+  std::vector<std::size_t> depth(clusters,
+                                 0);  // decides between clusters at one distance, which may be parent and child
   for (std::size_t c = 0; c < clusters; ++c) {
     if (!std::isfinite(paths.distance[c])) continue;
     result.order.push_back(static_cast<Index>(c));
@@ -115,27 +117,30 @@ void link_across_gaps(const std::vector<Vec3>& points, const std::vector<Index>&
   const KdTree tree(3, set);
   const std::size_t count = std::min(kNearClusters + 1, centres.size());
   std::vector<std::vector<ClusterLink>> found(cylinders.size());
-  parallel_each(cylinders.size(), [&](std::size_t c) {
-    std::vector<Index> near(count);
-    std::vector<double> squared(count);
-    const double at[3] = {centres[c].x, centres[c].y, centres[c].z};
-    tree.knnSearch(at, count, near.data(), squared.data());
-    for (const Index other : near) {
-      if (members[c].empty() || members[other].empty()) continue;
-      if (component[members[c].front()] == component[members[other].front()]) continue;
-      ClusterLink link{std::min(static_cast<Index>(c), other), std::max(static_cast<Index>(c), other), {}, 0, 0};
-      double least = std::numeric_limits<double>::infinity();
-      for (const Index i : members[link.from])
-        for (const Index j : members[link.to])
-          if (const double d = norm2(points[i] - points[j]); d < least) {
-            least = d;
-            link.junction = 0.5 * (points[i] + points[j]);
-          }
-      link.gap = std::sqrt(least);
-      link.length = length_of(link, cylinders);
-      found[c].push_back(link);
-    }
-  }, 16);
+  parallel_each(
+      cylinders.size(),
+      [&](std::size_t c) {
+        std::vector<Index> near(count);
+        std::vector<double> squared(count);
+        const double at[3] = {centres[c].x, centres[c].y, centres[c].z};
+        tree.knnSearch(at, count, near.data(), squared.data());
+        for (const Index other : near) {
+          if (members[c].empty() || members[other].empty()) continue;
+          if (component[members[c].front()] == component[members[other].front()]) continue;
+          ClusterLink link{std::min(static_cast<Index>(c), other), std::max(static_cast<Index>(c), other), {}, 0, 0};
+          double least = std::numeric_limits<double>::infinity();
+          for (const Index i : members[link.from])
+            for (const Index j : members[link.to])
+              if (const double d = norm2(points[i] - points[j]); d < least) {
+                least = d;
+                link.junction = 0.5 * (points[i] + points[j]);
+              }
+          link.gap = std::sqrt(least);
+          link.length = length_of(link, cylinders);
+          found[c].push_back(link);
+        }
+      },
+      16);
   // A gap between clusters that the bridges have made neighbours is measured here too; the pair stays once.
   for (const auto& some : found) links.insert(links.end(), some.begin(), some.end());
   std::stable_sort(links.begin(), links.end(), [](const ClusterLink& a, const ClusterLink& b) {
@@ -161,12 +166,12 @@ void weigh_links(const std::vector<BranchCylinder>& cylinders, std::vector<Clust
   }
 }
 
-std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, const std::vector<BranchCylinder>& cylinders,
-                                        const std::vector<Index>& roots) {
+std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links,
+                                        const std::vector<BranchCylinder>& cylinders, const std::vector<Index>& roots) {
   const Paths paths = paths_from_roots(links, cylinders.size(), roots);
   std::vector<SkeletonNode> nodes;
   std::vector<Index> node_of(cylinders.size(), kNone);
-  std::vector<Vec3> entry(cylinders.size());       // of the path into each cluster
+  std::vector<Vec3> entry(cylinders.size());  // of the path into each cluster
   std::vector<std::size_t> children(cylinders.size(), 0);
   for (const Index c : paths.order) {
     const Index up = paths.parent[c];
@@ -175,7 +180,8 @@ std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, c
       for (const ClusterLink& l : links)
         if ((l.from == c || l.to == c) && (!nearest || l.length < nearest->length)) nearest = &l;
       const BranchCylinder& root = cylinders[c];
-      const Vec3 way = nearest ? root.centre - nearest->junction : (-0.5 * std::max(root.length, root.radius)) * root.axis;
+      const Vec3 way =
+          nearest ? root.centre - nearest->junction : (-0.5 * std::max(root.length, root.radius)) * root.axis;
       nodes.push_back({root.centre + way, root.radius, kNone, kNone});
       node_of[c] = static_cast<Index>(nodes.size());
       nodes.push_back({root.centre, root.radius, node_of[c] - 1, c});
@@ -189,7 +195,8 @@ std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, c
     nodes.push_back({cylinders[c].centre, cylinders[c].radius, node_of[c] - 1, c});
   }
   for (const Index c : paths.order)
-    if (children[c] == 0 && paths.parent[c] != c) nodes.push_back({2 * cylinders[c].centre - entry[c], cylinders[c].radius, node_of[c], kNone});
+    if (children[c] == 0 && paths.parent[c] != c)
+      nodes.push_back({2 * cylinders[c].centre - entry[c], cylinders[c].radius, node_of[c], kNone});
   return nodes;
 }
 

@@ -42,7 +42,7 @@ void weigh_links(const std::vector<BranchCylinder>& cylinders, std::vector<Clust
 // The tree of shortest paths from the root clusters, every parent before its children: centres, junctions between them,
 // and beyond the centre of each leaf and root the mirror image of its junction. Without loops by construction. Clusters
 // that no link leads to a root are left out.
-std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links, const std::vector<BranchCylinder>& cylinders,
-                                        const std::vector<Index>& roots);
+std::vector<SkeletonNode> make_skeleton(const std::vector<ClusterLink>& links,
+                                        const std::vector<BranchCylinder>& cylinders, const std::vector<Index>& roots);
 
 }  // namespace bisector

@@ -25,10 +25,10 @@ namespace {
 constexpr std::size_t kLeastPoints = 20;  // that a tree is made from
 constexpr double kSliceSpacings = 3;      // thickness of the slices that clusters start from, in spacings of the points
 constexpr double kLeastSlice = 0.006;     // their least thickness, in the unit cube
-constexpr double kThicker = 1.3;          // ratio of the slices' thickness to the last, while there are too many clusters
-constexpr double kSlender = 4;            // radius of a cluster over its rms from which on the rms is taken for the noise
-constexpr double kAxisTolerance = 0.3;    // distance of fitted axes from the nodes, in the branch's median radius
-constexpr double kLeastTip = 0.3;         // of the base radius: what tolerances of a pointed branch's mesh go by, at least
+constexpr double kThicker = 1.3;        // ratio of the slices' thickness to the last, while there are too many clusters
+constexpr double kSlender = 4;          // radius of a cluster over its rms from which on the rms is taken for the noise
+constexpr double kAxisTolerance = 0.3;  // distance of fitted axes from the nodes, in the branch's median radius
+constexpr double kLeastTip = 0.3;  // of the base radius: what tolerances of a pointed branch's mesh go by, at least
 
 // A plate of points at the bottom that is taken for ground: how low, how many of the points, how wide beside the tree.
 constexpr double kPlateHeight = 0.02, kPlateWidth = 0.5;
@@ -36,10 +36,10 @@ constexpr std::size_t kPlateShare = 10;  // one point in so many
 
 // The points that the tree is made from, in the unit cube.
 struct Scan {
-  std::vector<Vec3> points;      // distinct
-  std::vector<Index> of_input;   // point of each input point, or kNone
+  std::vector<Vec3> points;     // distinct
+  std::vector<Index> of_input;  // point of each input point, or kNone
   Vec3 origin;
-  double unit = 1;               // length in the input of 1 here
+  double unit = 1;  // length in the input of 1 here
 };
 
 void check_options(const TreeOptions& options) {
@@ -71,7 +71,9 @@ Scan prepare(const std::vector<Vec3>& input, const TreeOptions& options, TreeRes
   if (order.empty() && result.ground_points > 0)
     throw Error(fmt::format("all {} points are below the ground ({}); lower it", input.size(), options.ground));
   const auto key = [&](Index i) { return std::tie(input[i].x, input[i].y, input[i].z); };
-  sort_in_parallel(order, [&](Index a, Index b) { return std::tuple_cat(key(a), std::tie(a)) < std::tuple_cat(key(b), std::tie(b)); });
+  sort_in_parallel(order, [&](Index a, Index b) {
+    return std::tuple_cat(key(a), std::tie(a)) < std::tuple_cat(key(b), std::tie(b));
+  });
   std::vector<Index> twin(input.size());
   for (std::size_t k = 0; k < order.size(); ++k)
     twin[order[k]] = k > 0 && key(order[k - 1]) == key(order[k]) ? twin[order[k - 1]] : order[k];
@@ -106,9 +108,10 @@ void warn_of_ground(const Scan& scan, const Context& context) {
   const Box plate = bounding_box(low);
   const double wide = std::min(plate.hi.x - plate.lo.x, plate.hi.y - plate.lo.y);
   if (kPlateShare * low.size() > scan.points.size() && wide > kPlateWidth * std::max(box.hi.x, box.hi.y))
-    context.warn(fmt::format("the lowest 2 % of the height hold {} of {} points, as wide as the tree: if they are the "
-                             "ground, give its height",
-                             low.size(), scan.points.size()));
+    context.warn(
+        fmt::format("the lowest 2 % of the height hold {} of {} points, as wide as the tree: if they are the "
+                    "ground, give its height",
+                    low.size(), scan.points.size()));
 }
 
 struct Network {
@@ -191,7 +194,8 @@ std::vector<Limb> rough_limbs(const Scan& scan, const Network& network, const Cl
     for (std::size_t k = 0; k < branch.nodes.size(); ++k) {
       const SkeletonNode& node = nodes[branch.nodes[k]];
       limb.axis.push_back(node.position);
-      if (node.cluster != kNone && (k > 0 || branch.parent == kNone)) limb_of[node.cluster] = static_cast<Index>(limbs.size());
+      if (node.cluster != kNone && (k > 0 || branch.parent == kNone))
+        limb_of[node.cluster] = static_cast<Index>(limbs.size());
     }
     limbs.push_back(std::move(limb));
   }
@@ -252,10 +256,13 @@ void describe_branches(const std::vector<Limb>& limbs, TreeResult& result) {
 }
 
 void loft(const std::vector<Limb>& limbs, TreeResult& result) {
-  parallel_each(limbs.size(), [&](std::size_t b) {
-    const double tolerance = kAxisTolerance * upper_median(limbs[b].radii);
-    result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, tolerance);
-  }, 1);
+  parallel_each(
+      limbs.size(),
+      [&](std::size_t b) {
+        const double tolerance = kAxisTolerance * upper_median(limbs[b].radii);
+        result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, tolerance);
+      },
+      1);
 }
 
 }  // namespace
@@ -315,10 +322,13 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
 TriangleMesh tree_mesh(const TreeResult& tree, double tolerance) {
   if (!(tolerance > 0)) throw Error(fmt::format("the tolerance is {}; give a positive number", tolerance));
   std::vector<TriangleMesh> parts(tree.branches.size());
-  parallel_each(parts.size(), [&](std::size_t b) {
-    const TreeBranch& branch = tree.branches[b];
-    parts[b] = branch_mesh(branch.surface, tolerance * std::max(branch.tip_radius, kLeastTip * branch.base_radius));
-  }, 1);
+  parallel_each(
+      parts.size(),
+      [&](std::size_t b) {
+        const TreeBranch& branch = tree.branches[b];
+        parts[b] = branch_mesh(branch.surface, tolerance * std::max(branch.tip_radius, kLeastTip * branch.base_radius));
+      },
+      1);
   TriangleMesh mesh;
   for (std::size_t b = 0; b < parts.size(); ++b) {
     const auto first = static_cast<Index>(mesh.vertices.size());

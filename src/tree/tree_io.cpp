@@ -89,7 +89,8 @@ void write_skeleton(const std::string& path, const TreeResult& tree) {
   std::size_t edges = 0;
   for (const TreeNode& node : tree.skeleton) edges += node.parent != kNone;
   std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
+      "z\n"
       "property double radius\nproperty int branch\nproperty int order\n"
       "element edge {}\nproperty int vertex1\nproperty int vertex2\nend_header\n",
       tree.skeleton.size(), edges);
@@ -109,10 +110,11 @@ void write_skeleton(const std::string& path, const TreeResult& tree) {
 
 void write_tree_labels(const std::string& path, const std::vector<Vec3>& points, const TreeResult& tree) {
   if (tree.branch.size() != points.size())
-    throw Error(fmt::format("{}: {} labels for {} points; give the points that the tree was made from", io::name_of(path),
-                            tree.branch.size(), points.size()));
+    throw Error(fmt::format("{}: {} labels for {} points; give the points that the tree was made from",
+                            io::name_of(path), tree.branch.size(), points.size()));
   std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
+      "z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int label\nend_header\n",
       points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {

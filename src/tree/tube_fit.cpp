@@ -13,10 +13,10 @@ namespace bisector {
 namespace {
 
 // Stations: the points of the axis that are fitted.
-constexpr double kStationPoints = 10;         // points of the scan between two, about
-constexpr double kLongest = 1.5;              // distance of two in the branch's thickness, where points are few
+constexpr double kStationPoints = 10;  // points of the scan between two, about
+constexpr double kLongest = 1.5;       // distance of two in the branch's thickness, where points are few
 constexpr std::size_t kMostStations = 120;
-constexpr std::size_t kLeastPoints = 6;       // of the scan, for a fit
+constexpr std::size_t kLeastPoints = 6;  // of the scan, for a fit
 
 // Steps.
 constexpr int kCentringSteps = 2;  // to the middle of the points
@@ -35,7 +35,8 @@ constexpr double kLeastCentring = 0.001, kMostCentring = 1;
 // The largest radius, in the spread of points about their middle: that of a third of a circle where the points are near
 // the surface, that of less than half of one where they are a cloud.
 constexpr double kLargestRing = 1.9, kLargestCloud = 1.15;
-constexpr double kRing = 0.2, kCloud = 0.35;  // rms distance from the surface, in the spread, up to and from which they are so
+constexpr double kRing = 0.2,
+                 kCloud = 0.35;  // rms distance from the surface, in the spread, up to and from which they are so
 
 // Sums of squares of linear forms of few unknowns, as the normal equations of least squares.
 class NormalEquations {
@@ -52,7 +53,8 @@ class NormalEquations {
       right_[row] += weight * coefficients[i] * value;
       for (std::size_t j = 0; j < n; ++j)
         if (coefficients[j] != 0)
-          entries_.emplace_back(row, static_cast<Eigen::Index>(unknowns[j]), weight * coefficients[i] * coefficients[j]);
+          entries_.emplace_back(row, static_cast<Eigen::Index>(unknowns[j]),
+                                weight * coefficients[i] * coefficients[j]);
     }
   }
 
@@ -73,13 +75,15 @@ class NormalEquations {
 
 class TubeFit {
  public:
-  TubeFit(const std::vector<Vec3>& points, const std::vector<Vec3>& line, double noise) : points_(points), noise_(noise) {
+  TubeFit(const std::vector<Vec3>& points, const std::vector<Vec3>& line, double noise)
+      : points_(points), noise_(noise) {
     std::vector<double> distances;
     for (const Vec3& p : points) distances.push_back(nearest_on_polyline(line, p).distance);
     const double length = polyline_length(line);
     spread_ = std::max({quantile(std::move(distances), 0.5), 0.5 * noise, 1e-3 * length});
     const double thick = std::max(spread_, 2 * noise);
-    const double step = std::clamp(kStationPoints * length / static_cast<double>(points.size() + 1), thick, kLongest * thick);
+    const double step =
+        std::clamp(kStationPoints * length / static_cast<double>(points.size() + 1), thick, kLongest * thick);
     const double segments = std::clamp(length / std::max(step, 1e-9), 1.0, double{kMostStations});
     tube_.axis = resample_polyline(line, static_cast<std::size_t>(segments) + 1);
     tube_.radii.assign(tube_.axis.size(), spread_);
@@ -119,7 +123,8 @@ class TubeFit {
     for (std::size_t i = 0; i < points_.size(); ++i) {
       if (weights[i] == 0) continue;
       add_ring(equations, points_[i], feet_[i], weights[i]);
-      const double pull = (1 - feet_[i].t) * stations_[feet_[i].segment].pull + feet_[i].t * stations_[feet_[i].segment + 1].pull;
+      const double pull =
+          (1 - feet_[i].t) * stations_[feet_[i].segment].pull + feet_[i].t * stations_[feet_[i].segment + 1].pull;
       add_pull(equations, points_[i], feet_[i], pull * weights[i]);
     }
     add_smoothness(equations);
@@ -145,9 +150,7 @@ class TubeFit {
   }
 
  private:
-  static double tukey(double ratio) {
-    return std::abs(ratio) < 1 ? (1 - ratio * ratio) * (1 - ratio * ratio) : 0;
-  }
+  static double tukey(double ratio) { return std::abs(ratio) < 1 ? (1 - ratio * ratio) * (1 - ratio * ratio) : 0; }
 
   bool beyond(const PolylineFoot& foot) const {
     return (foot.segment == 0 && foot.t == 0) || (foot.segment + 2 == tube_.axis.size() && foot.t == 1);
@@ -222,7 +225,8 @@ class TubeFit {
   void add_pull(NormalEquations& equations, const Vec3& p, const PolylineFoot& foot, double weight) const {
     const std::size_t a = 4 * foot.segment, b = a + 4;
     const Vec3 out = p - foot.point;
-    for (std::size_t k = 0; k < 3; ++k) equations.add<2>({a + k, b + k}, {1 - foot.t, foot.t}, out[static_cast<int>(k)], weight);
+    for (std::size_t k = 0; k < 3; ++k)
+      equations.add<2>({a + k, b + k}, {1 - foot.t, foot.t}, out[static_cast<int>(k)], weight);
   }
 
   void move(const NormalEquations& equations) {
@@ -234,7 +238,8 @@ class TubeFit {
       const double length = norm(change), most = std::max(spread_, noise_);
       if (length > most) change *= most / length;
       tube_.axis[k] += change;
-      tube_.radii[k] = std::clamp(tube_.radii[k] + x[at + 3], 0.2 * spread_, std::max(stations_[k].largest, 0.2 * spread_));
+      tube_.radii[k] =
+          std::clamp(tube_.radii[k] + x[at + 3], 0.2 * spread_, std::max(stations_[k].largest, 0.2 * spread_));
     }
   }
 

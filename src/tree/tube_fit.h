@@ -18,9 +18,9 @@ struct Tube {
 // distances from the axis differ least from the radius, with Tukey's weights against points of other branches, and with
 // axis and radius smooth where points are few. `line`, of at least two distinct points, is where the axis starts from.
 // The end is moved to the points' end, less a radius for a rounded tip. `noise` is the standard deviation of points off
-// the surface: where the radius is not much more, the axis keeps to the middle of the points, as a circle through a cloud
-// of noise means nothing. Radii are those of the noisy surface. Few or no points give the line and radii from what there
-// is.
+// the surface: where the radius is not much more, the axis keeps to the middle of the points, as a circle through a
+// cloud of noise means nothing. Radii are those of the noisy surface. Few or no points give the line and radii from
+// what there is.
 Tube fit_tube(const std::vector<Vec3>& points, const std::vector<Vec3>& line, double noise);
 
 // The non-increasing values nearest to the given ones in the sense of weighted least squares (pool adjacent violators).

@@ -35,7 +35,8 @@ std::vector<Index> singletons(std::size_t n) {
 }
 
 // Vertices whose triangles, linked through edges, fall apart into several fans.
-std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std::size_t vertices, const EdgeTable& table) {
+std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std::size_t vertices,
+                                    const EdgeTable& table) {
   std::vector<Index> fans = singletons(3 * triangles.size());
   const auto corner_at = [&](std::size_t half_edge, Index v) {
     const std::size_t t = half_edge / 3, k = half_edge % 3;
@@ -54,20 +55,15 @@ std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std:
   return singular;
 }
 
-// The diagram as a cell complex. Sets and first visits are kept in arrays over the whole diagram, but what one cell's examination
-// touches belongs to that cell alone.
+// The diagram as a cell complex. Sets and first visits are kept in arrays over the whole diagram, but what one cell's
+// examination touches belongs to that cell alone.
 class Complex {
  public:
   Complex(const Surface& surface, const RestrictedPolygons& polygons)
-      : triangles_(surface.mesh.triangles),
-        diagram_(polygons),
-        begin_(first_polygons(polygons, triangles_.size())),
-        table_(edge_table(triangles_, surface.mesh.vertices.size())),
-        twin_(3 * triangles_.size(), kBorder),
-        polygon_at_(surface.mesh.vertices.size(), kNone),
-        piece_at_(surface.mesh.vertices.size(), kNone),
-        parts_(singletons(polygons.pairs.size())),
-        lines_(singletons(polygons.labels.size())) {
+      : triangles_(surface.mesh.triangles), diagram_(polygons), begin_(first_polygons(polygons, triangles_.size())),
+        table_(edge_table(triangles_, surface.mesh.vertices.size())), twin_(3 * triangles_.size(), kBorder),
+        polygon_at_(surface.mesh.vertices.size(), kNone), piece_at_(surface.mesh.vertices.size(), kNone),
+        parts_(singletons(polygons.pairs.size())), lines_(singletons(polygons.labels.size())) {
     std::vector<std::size_t> around;
     for (std::size_t e = 0; e < table_.edges.size(); ++e) {
       around.clear();
@@ -117,7 +113,8 @@ class Complex {
   static constexpr Index kBorder = kNone, kSeveral = kNone - 1;
 
   enum class Kind : unsigned char { piece, crossing, end, branching };
-  // What lies on the boundary towards the cell `other`: an entry, or its crossing of a mesh edge of two, one or more triangles.
+  // What lies on the boundary towards the cell `other`: an entry, or its crossing of a mesh edge of two, one or more
+  // triangles.
   struct Contact {
     Index other;
     Kind kind;
@@ -136,8 +133,9 @@ class Complex {
   struct Scratch {
     std::vector<Contact> contacts;
     std::vector<Meeting> meetings;
-    std::vector<Index> border;                   // entries on the surface's border
-    std::vector<std::array<Index, 2>> closures;  // consecutive entries of the boundary that are joined for its loops only
+    std::vector<Index> border;  // entries on the surface's border
+    std::vector<std::array<Index, 2>>
+        closures;  // consecutive entries of the boundary that are joined for its loops only
 
     void clear() {
       contacts.clear();
@@ -243,8 +241,8 @@ class Complex {
     }
   }
 
-  // An end of the side e of polygon p on a mesh edge: another cell's bisector crosses the mesh edge there, or a piece of the border
-  // meets the next in a mesh vertex.
+  // An end of the side e of polygon p on a mesh edge: another cell's bisector crosses the mesh edge there, or a piece
+  // of the border meets the next in a mesh vertex.
   void read_end(Index p, std::size_t e, bool forward, Index twin, Scratch& s, CellCounts& counts) {
     const Index entry = static_cast<Index>(e);
     const bool on_border = twin == kBorder;
@@ -252,7 +250,11 @@ class Complex {
     const Index other = diagram_.labels[side];
     if (!is_edge(other)) {
       ++counts.vertices;
-      s.contacts.push_back({other, on_border ? Kind::end : twin == kSeveral ? Kind::branching : Kind::crossing, entry, 0});
+      s.contacts.push_back({other,
+                            on_border          ? Kind::end
+                            : twin == kSeveral ? Kind::branching
+                                               : Kind::crossing,
+                            entry, 0});
       if (!on_border) return;
       ++counts.border_vertices;
       s.closures.push_back({entry, static_cast<Index>(side)});
@@ -275,7 +277,8 @@ class Complex {
 
   void conclude_cell(Index cell, const CellCounts& counts, const Scratch& s, BallReport& report) {
     const Index *begin = of_cell_.begin(cell), *end = of_cell_.end(cell);
-    BallReport::Cell found{cell, counts.vertices - counts.edges + static_cast<long long>(of_cell_.size(cell)), 0, 0, 0, 0, {}, {}};
+    BallReport::Cell found{
+        cell, counts.vertices - counts.edges + static_cast<long long>(of_cell_.size(cell)), 0, 0, 0, 0, {}, {}};
     found.components = count_roots(parts_, begin, end);
     found.border_parts = count_roots(lines_, s.border.data(), s.border.data() + s.border.size());
     found.border_euler = counts.border_vertices - static_cast<long long>(s.border.size());
@@ -368,20 +371,21 @@ class Complex {
 
   const std::vector<Triangle>& triangles_;
   const RestrictedPolygons& diagram_;
-  std::vector<std::size_t> begin_;   // first polygon of each triangle
+  std::vector<std::size_t> begin_;  // first polygon of each triangle
   EdgeTable table_;
-  std::vector<Index> twin_;          // of each half-edge of a triangle with polygons
-  std::map<std::size_t, std::vector<std::size_t>> several_;  // all half-edges on the same mesh edge, where more than two
-  Csr<Index> of_cell_;               // polygons of each cell
-  std::vector<Index> polygon_at_;    // of each mesh vertex
-  std::vector<Index> piece_at_;      // of each mesh vertex: a piece of the border
-  std::vector<Index> parts_;         // sets of polygons
-  std::vector<Index> lines_;         // sets of entries
+  std::vector<Index> twin_;  // of each half-edge of a triangle with polygons
+  std::map<std::size_t, std::vector<std::size_t>>
+      several_;                    // all half-edges on the same mesh edge, where more than two
+  Csr<Index> of_cell_;             // polygons of each cell
+  std::vector<Index> polygon_at_;  // of each mesh vertex
+  std::vector<Index> piece_at_;    // of each mesh vertex: a piece of the border
+  std::vector<Index> parts_;       // sets of polygons
+  std::vector<Index> lines_;       // sets of entries
 };
 
 // Back from polygons and entries of the diagram with strips to those of the diagram given.
-void restore_indices(const RestrictedPolygons& merged, const std::vector<Index>& source, const RestrictedPolygons& given,
-                     BallReport& report) {
+void restore_indices(const RestrictedPolygons& merged, const std::vector<Index>& source,
+                     const RestrictedPolygons& given, BallReport& report) {
   const auto restore = [&](std::vector<std::size_t>& items, bool entries) {
     std::size_t n = 0;
     for (const std::size_t item : items) {

@@ -131,13 +131,12 @@ void Clipper::take(Index slot, const Index* labels, std::size_t count) {
     const Line &before = lines_[polygon_.edges[previous(k)]], &after = lines_[polygon_.edges[k]];
     if (is_edge(before.slot) && is_edge(after.slot))
       polygon_.corners[k] = {local_[after.slot & ~kEdgeLabel], kCornerSlack * largest_};
-    else
-      add_corner(before, after, polygon_.corners[k]);
+    else add_corner(before, after, polygon_.corners[k]);
   }
 }
 
-// A closed chain of corners, each where two lines that follow each other meet, that all lie strictly within every other line
-// is the boundary of the clipped facet: each is a vertex of it, and two on one line end that line's edge.
+// A closed chain of corners, each where two lines that follow each other meet, that all lie strictly within every other
+// line is the boundary of the clipped facet: each is a vertex of it, and two on one line end that line's edge.
 bool Clipper::confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count) {
   start(slot);
   place_lines();
@@ -294,10 +293,10 @@ void Clipper::bound_polygon() {
   }
 }
 
-// In the facet's plane with origin at the seed's foot, the lines' normals are the parts of m along the plane, and the lines
-// cross at (c2 t1 - c1 t2) / (t1 . m2). All data are within the facet's distance P of the seed, and with rounded data and
-// operations each term of the numerator is off by less than 250 u P |m1| |m2| and the determinant by 150 u |m1| |m2|
-// (the normal's own error, at most 60 u, included), which bounds the error of the quotient as coded.
+// In the facet's plane with origin at the seed's foot, the lines' normals are the parts of m along the plane, and the
+// lines cross at (c2 t1 - c1 t2) / (t1 . m2). All data are within the facet's distance P of the seed, and with rounded
+// data and operations each term of the numerator is off by less than 250 u P |m1| |m2| and the determinant by 150 u
+// |m1| |m2| (the normal's own error, at most 60 u, included), which bounds the error of the quotient as coded.
 bool Clipper::meet(const Line& before, const Line& after, Corner& corner) const {
   const double determinant = dot(before.along, after.m);
   const double squares = before.squared * after.squared;
@@ -306,8 +305,9 @@ bool Clipper::meet(const Line& before, const Line& after, Corner& corner) const 
   const double inverse = 1 / determinant;
   Vec3 w = inverse * (after.offset * before.along - before.offset * after.along);
   if (!(square > kShallow * squares)) {
-    // The determinant's error takes w off both lines; what is left then is an error along them, which hardly changes an area.
-    // Only the lines' normals in the plane will do for it: m times the error of w across the plane may be far larger.
+    // The determinant's error takes w off both lines; what is left then is an error along them, which hardly changes an
+    // area. Only the lines' normals in the plane will do for it: m times the error of w across the plane may be far
+    // larger.
     const Vec3 n = facet_->normal;
     const double left_before = before.offset - dot(cross(before.along, n), w);
     const double left_after = after.offset - dot(cross(after.along, n), w);
@@ -359,8 +359,7 @@ Moments Clipper::integrate() {
       const double squared_c = norm2(vertex(c));
       sum += triangle_moments(a + vertex(b) + vertex(c), squared_a + squared_b + squared_c, area);
       squared_b = squared_c;
-    } else
-      sum += triangle_moments(a, vertex(b), vertex(c), densities_[apex], densities_[b], densities_[c], area);
+    } else sum += triangle_moments(a, vertex(b), vertex(c), densities_[apex], densities_[b], densities_[c], area);
   }
   return sum;
 }

@@ -23,16 +23,17 @@ class Clipper {
   void begin(const Facet& facet);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
-  // The same, if the result is bounded by the lines with these labels in this cyclic order (that of an earlier diagram with
-  // nearby seeds), and that is certain without exact arithmetic. Otherwise false, and nothing is known.
+  // The same, if the result is bounded by the lines with these labels in this cyclic order (that of an earlier diagram
+  // with nearby seeds), and that is certain without exact arithmetic. Otherwise false, and nothing is known.
   bool confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count);
   // Takes the whole facet, which the caller knows to lie in the cell.
   void take(Index slot);
-  // Takes the polygon bounded by the lines with these labels in this cyclic order, which the caller knows to be the result.
+  // Takes the polygon bounded by the lines with these labels in this cyclic order, which the caller knows to be the
+  // result.
   void take(Index slot, const Index* labels, std::size_t count);
 
-  // The last polygon, counter-clockwise: vertex k relative to the seed, and the label (a slot or a facet edge) of the edge
-  // that starts there.
+  // The last polygon, counter-clockwise: vertex k relative to the seed, and the label (a slot or a facet edge) of the
+  // edge that starts there.
   std::size_t size() const { return polygon_.size; }
   const Vec3& vertex(std::size_t k) const { return polygon_.corners[k].at; }
   Index label(std::size_t k) const { return lines_[polygon_.edges[k]].slot; }
@@ -101,7 +102,8 @@ class Clipper {
   bool visit(Index other);
   void bound_polygon();
   void cut(Index other, const Vec3& towards, double squared);
-  // Whether m points out of the polygon: for a bisector it does, for a facet edge it depends on which way that was taken.
+  // Whether m points out of the polygon: for a bisector it does, for a facet edge it depends on which way that was
+  // taken.
   bool points_out(const Line& line) const {
     return !is_edge(line.slot) || facet_->origin[line.slot & ~kEdgeLabel] != (line.slot & ~kEdgeLabel);
   }
@@ -128,9 +130,9 @@ class Clipper {
   std::vector<Line> lines_;   // all that ever cut; the first three are the facet's edges
   std::size_t line_count_ = 0;
   Polygon polygon_, kept_;
-  std::vector<Screen> screens_;   // direct-mapped by slot
-  std::vector<Splat> splats_;     // the polygon's corners, scaled
-  double scale_ = 1;              // of the screen
+  std::vector<Screen> screens_;  // direct-mapped by slot
+  std::vector<Splat> splats_;    // the polygon's corners, scaled
+  double scale_ = 1;             // of the screen
   std::vector<signed char> sides_;
   std::vector<double> densities_;
   bool uncertain_ = false, wider_ = false;

@@ -18,7 +18,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Facets that meet in corner m, counter-clockwise seen from outside.
 constexpr Index kCornerFacets[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
 // The two corners that are not in the set, by the bits of a set of two.
-constexpr unsigned char kOtherCorners[13][2] = {{}, {}, {}, {2, 3}, {}, {1, 3}, {0, 3}, {}, {}, {1, 2}, {0, 2}, {}, {0, 1}};
+constexpr unsigned char kOtherCorners[13][2] = {{}, {}, {},     {2, 3}, {}, {1, 3}, {0, 3},
+                                                {}, {}, {1, 2}, {0, 2}, {}, {0, 1}};
 constexpr unsigned char kBefore[3] = {2, 0, 1}, kAfter[3] = {1, 2, 0};
 constexpr Index kFirstSeedKey = 4;
 
@@ -155,7 +156,8 @@ inline void TetClipper::start(const TetFrame& tet) {
     set_vertex(vertices_[m], local_[m], kCornerSlack * largest_);
     for (std::size_t e = 0; e < 3; ++e) {
       vertices_[m].on[e] = kCornerFacets[m][e];
-      vertices_[m].adjacent[e] = kCornerFacets[m][e];  // leaving a facet along the edge of the other two leads to the corner opposite it
+      vertices_[m].adjacent[e] =
+          kCornerFacets[m][e];  // leaving a facet along the edge of the other two leads to the corner opposite it
     }
   }
 }
@@ -179,12 +181,12 @@ void TetClipper::take(const TetFrame& tet, const std::vector<Index>& labels,
     for (std::size_t e = 0; e < 3; ++e) vertex.on[e] = planes[triples[v][e]];
     if (std::max({vertex.on[0], vertex.on[1], vertex.on[2]}) < 4)
       set_vertex(vertex, local_[6 - vertex.on[0] - vertex.on[1] - vertex.on[2]], kCornerSlack * largest_);
-    else
-      place(vertex);
+    else place(vertex);
   }
 }
 
-// Cuts by the neighbours from k on that may cut, up to four of the `count` listed. False if the polyhedron is empty then.
+// Cuts by the neighbours from k on that may cut, up to four of the `count` listed. False if the polyhedron is empty
+// then.
 inline bool TetClipper::cut_by_block(std::size_t k, std::size_t count) {
   if (k >= loaded_) load(k + 4);
   if (!bounded_) bound();
@@ -223,7 +225,8 @@ void TetClipper::narrow(const TetFrame& around) {
   }
   collect();
   std::sort(bounding_.begin(), bounding_.end(), [&](Index a, Index b) {
-    return planes_[a].squared != planes_[b].squared ? planes_[a].squared < planes_[b].squared : planes_[a].key < planes_[b].key;
+    return planes_[a].squared != planes_[b].squared ? planes_[a].squared < planes_[b].squared
+                                                    : planes_[a].key < planes_[b].key;
   });
   narrowed_.clear();
   for (const Index plane : bounding_)
@@ -235,7 +238,8 @@ void TetClipper::narrow(const TetFrame& around) {
 
 inline unsigned TetClipper::planes_that_may_cut(const ScreenBlock& block) const {
   return may_cut(block, reach_.margin, [&](const auto& test) {
-    for (const Vertex *v = vertices_.data(), *end = v + size_; v != end; ++v) test(v->scaled[0], v->scaled[1], v->scaled[2]);
+    for (const Vertex *v = vertices_.data(), *end = v + size_; v != end; ++v)
+      test(v->scaled[0], v->scaled[1], v->scaled[2]);
   });
 }
 
@@ -267,7 +271,7 @@ inline std::size_t TetClipper::count_outside(const Plane& by) {
   for (std::size_t v = 0; v < size_; ++v) {
     const Vertex& vertex = vertices_[v];
     const double along = dot(vertex.at, by.n), error = vertex.slack * one_norm;
-    const bool inside = along + error < limits.before, outside = along - error > limits.behind;
+    const bool inside = along + error<limits.before, outside = along - error> limits.behind;
     certain &= inside | outside;
     sides[v] = static_cast<signed char>(inside - outside);
     removed[count] = static_cast<Index>(v);
@@ -279,8 +283,9 @@ inline std::size_t TetClipper::count_outside(const Plane& by) {
   for (std::size_t v = 0; v < size_; ++v) {
     const Vertex& vertex = vertices_[v];
     if (sides[v] == 0)
-      sides[v] = static_cast<signed char>(exact_side(frame(), exact(planes_[vertex.on[0]]), exact(planes_[vertex.on[1]]),
-                                                     exact(planes_[vertex.on[2]]), exact(by)));
+      sides[v] =
+          static_cast<signed char>(exact_side(frame(), exact(planes_[vertex.on[0]]), exact(planes_[vertex.on[1]]),
+                                              exact(planes_[vertex.on[2]]), exact(by)));
     if (sides[v] < 0) removed[count++] = static_cast<Index>(v);
   }
   return count;
@@ -306,7 +311,8 @@ bool TetClipper::cut(std::size_t neighbour) {
   const Index plane = static_cast<Index>(plane_count_++);
   planes_[plane] = by;
 
-  // The edges that leave what is outside. Each end outside has the edge's planes in the order that its new end will have.
+  // The edges that leave what is outside. Each end outside has the edge's planes in the order that its new end will
+  // have.
   Boundary* boundary = boundary_.data();
   std::size_t fresh = 0;
   for (std::size_t k = 0; k < outside; ++k) {
@@ -327,7 +333,9 @@ bool TetClipper::cut(std::size_t neighbour) {
     reserve(size_ += fresh - outside);
     boundary = boundary_.data();
   }
-  const auto place_of = [&](std::size_t k) { return k < outside ? removed_[k] : static_cast<Index>(before + k - outside); };
+  const auto place_of = [&](std::size_t k) {
+    return k < outside ? removed_[k] : static_cast<Index>(before + k - outside);
+  };
   for (std::size_t k = 0; k < fresh; ++k) starting_[boundary[k].u()] = ending_[boundary[k].v()] = place_of(k);
   for (std::size_t k = 0; k < fresh; ++k) {
     const Index u = boundary[k].u(), v = boundary[k].v(), at = place_of(k);
@@ -368,8 +376,8 @@ inline void TetClipper::place(Vertex& v) {
   else place_on_edge(v, planes_[a], planes_[b], planes_[c]);
 }
 
-// The edge is q_0 + t e, from its first end in order, and t = (k - n . q_0) / (n . e). All data are within the tetrahedron's
-// distance P of the seed, so with rounded data and operations t is off by less than 20 u P |n| / |n . e|.
+// The edge is q_0 + t e, from its first end in order, and t = (k - n . q_0) / (n . e). All data are within the
+// tetrahedron's distance P of the seed, so with rounded data and operations t is off by less than 20 u P |n| / |n . e|.
 inline void TetClipper::place_on_edge(Vertex& v, const Plane& f, const Plane& g, const Plane& bisector) {
   // The facets opposite two corners meet along the edge of the other two.
   const unsigned pair = (1u << (f.slot & ~kFacetLabel)) | (1u << (g.slot & ~kFacetLabel));
@@ -380,13 +388,12 @@ inline void TetClipper::place_on_edge(Vertex& v, const Plane& f, const Plane& g,
   if (!(slope * slope > kSteep * (bisector.squared * norm2(e)))) return place_exactly(v, f, g, bisector);
   const double inverse = 1 / slope;
   const double t = inverse * (bisector.k - dot(bisector.n, local_[ends[0]]));
-  set_vertex(v, local_[ends[0]] + t * e,
-             200 * kUnit * largest_ * (bisector.length * taxicab(e) * std::abs(inverse)));
+  set_vertex(v, local_[ends[0]] + t * e, 200 * kUnit * largest_ * (bisector.length * taxicab(e) * std::abs(inverse)));
 }
 
-// As Clipper::meet: in the facet's plane with origin at the seed's foot, where the bisectors are the lines with the directions
-// t = n x m, which cross at (c_b t_a - c_a t_b) / (t_a . m_b). Data and operations are those bounded there. However small the
-// angle, the vertex stays in the facet.
+// As Clipper::meet: in the facet's plane with origin at the seed's foot, where the bisectors are the lines with the
+// directions t = n x m, which cross at (c_b t_a - c_a t_b) / (t_a . m_b). Data and operations are those bounded there.
+// However small the angle, the vertex stays in the facet.
 inline void TetClipper::place_on_facet(Vertex& v, const Plane& f, const Plane& a, const Plane& b) {
   const Vec3 along_a = cross(f.n, a.n), along_b = cross(f.n, b.n);
   const double determinant = dot(along_a, b.n);
@@ -396,16 +403,17 @@ inline void TetClipper::place_on_facet(Vertex& v, const Plane& f, const Plane& a
   const double offset_a = a.k - f.k * dot(f.n, a.n), offset_b = b.k - f.k * dot(f.n, b.n);
   Vec3 w = inverse * (offset_b * along_a - offset_a * along_b);
   if (!(square > kShallow * squares)) {
-    // The determinant's error takes w off both lines; what is left then is an error along them, which hardly changes a volume.
+    // The determinant's error takes w off both lines; what is left then is an error along them, which hardly changes a
+    // volume.
     const double left_a = offset_a - dot(cross(along_a, f.n), w), left_b = offset_b - dot(cross(along_b, f.n), w);
     w += inverse * (left_b * along_a - left_a * along_b);
   }
   set_vertex(v, f.k * f.n + w, 2000 * kUnit * largest_ * (a.length * b.length * std::abs(inverse)));
 }
 
-// Cramer's rule. All data are within the tetrahedron's distance P of the seed, and with rounded data and operations each term of
-// the numerator is off by less than 20 u P |a| |b| |c| and the determinant by 20 u |a| |b| |c|, which bounds the error of the
-// quotient as coded.
+// Cramer's rule. All data are within the tetrahedron's distance P of the seed, and with rounded data and operations
+// each term of the numerator is off by less than 20 u P |a| |b| |c| and the determinant by 20 u |a| |b| |c|, which
+// bounds the error of the quotient as coded.
 inline void TetClipper::place_at_planes(Vertex& v, const Plane& a, const Plane& b, const Plane& c) {
   const Vec3 bc = cross(b.n, c.n), ca = cross(c.n, a.n), ab = cross(a.n, b.n);
   const double determinant = dot(a.n, bc);
@@ -414,8 +422,8 @@ inline void TetClipper::place_at_planes(Vertex& v, const Plane& a, const Plane& 
   const double inverse = 1 / determinant;
   Vec3 p = inverse * (a.k * bc + b.k * ca + c.k * ab);
   if (!(square > kShallow * squares)) {
-    // The rounding of the determinant and the products takes p off the planes; what is left then is an error along them, which
-    // hardly changes a volume.
+    // The rounding of the determinant and the products takes p off the planes; what is left then is an error along
+    // them, which hardly changes a volume.
     const double left_a = a.k - dot(a.n, p), left_b = b.k - dot(b.n, p), left_c = c.k - dot(c.n, p);
     p += inverse * (left_a * bc + left_b * ca + left_c * ab);
   }
@@ -488,8 +496,8 @@ double TetClipper::density(const Vertex& v) const {
   return std::min(std::max(value, std::min({r[0], r[1], r[2], r[3]})), std::max({r[0], r[1], r[2], r[3]}));
 }
 
-// Tetrahedra from one vertex, the apex, to the triangles that each facet is fanned into from where its edge with the least
-// key starts; the apex is where the first facet's fan starts. Facets in order of their keys.
+// Tetrahedra from one vertex, the apex, to the triangles that each facet is fanned into from where its edge with the
+// least key starts; the apex is where the first facet's fan starts. Facets in order of their keys.
 template <bool kUniform>
 Moments TetClipper::integrate() {
   if (whole()) return moved(tet_->moments, local_[tet_->order[0]]);

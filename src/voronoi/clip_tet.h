@@ -17,8 +17,8 @@ namespace bisector {
 
 // One tetrahedron as the clipping reads it. Facet k is the one opposite corner k.
 struct TetFrame {
-  // `ranks`: what orders the corners, e.g. their vertices' indices; whatever has to agree on the two sides of a facet or around an
-  // edge follows that order.
+  // `ranks`: what orders the corners, e.g. their vertices' indices; whatever has to agree on the two sides of a facet
+  // or around an edge follows that order.
   TetFrame(const std::array<Vec3, 4>& corners, const Tetrahedron& ranks, const double* density, double six_volume);
   TetFrame() = default;
 
@@ -44,14 +44,14 @@ class TetClipper {
   void reset(const SortedSeeds& seeds, const Neighbours& neighbours);
   // The cell that the following calls are about.
   void begin(Index slot);
-  // For many tetrahedra within `around`: from here on passes over those of the cell's first neighbours that the others keep from
-  // bounding anything there.
+  // For many tetrahedra within `around`: from here on passes over those of the cell's first neighbours that the others
+  // keep from bounding anything there.
   void narrow(const TetFrame& around);
   // Clips the tetrahedron, which must outlive the use of the result. False if the (perturbed) intersection is empty.
   bool clip(const TetFrame& tet);
 
-  // Takes the polyhedron that these planes bound (labels, the tetrahedron's facets last) with these vertices, as triples of
-  // positions among them, which the caller knows to be the result.
+  // Takes the polyhedron that these planes bound (labels, the tetrahedron's facets last) with these vertices, as
+  // triples of positions among them, which the caller knows to be the result.
   void take(const TetFrame& tet, const std::vector<Index>& labels, const std::vector<std::array<Index, 3>>& triples);
   // Takes the whole tetrahedron.
   void take(const TetFrame& tet);
@@ -88,11 +88,11 @@ class TetClipper {
     double k;
     double length;   // upper bound of |n|
     double squared;  // |n|^2
-    Index key;       // order of labels: facets, by descending rank of the corner opposite, then seeds by the caller's index
-    Index slot;      // of the other seed, or kFacetLabel | k
+    Index key;   // order of labels: facets, by descending rank of the corner opposite, then seeds by the caller's index
+    Index slot;  // of the other seed, or kFacetLabel | k
   };
-  // A vertex in dual form: its planes, counter-clockwise seen from outside, and for each the vertex at the other end of the edge that
-  // leaves it.
+  // A vertex in dual form: its planes, counter-clockwise seen from outside, and for each the vertex at the other end of
+  // the edge that leaves it.
   struct Vertex {
     Vec3 at;
     double slack;
@@ -132,7 +132,7 @@ class TetClipper {
 
   const SortedSeeds* seeds_ = nullptr;
   const Neighbours* neighbours_ = nullptr;
-  double scale_ = 1;             // of the screen
+  double scale_ = 1;  // of the screen
 
   // The cell: its neighbours in ascending distance, the first `loaded_` of them in `listed_` and `blocks_`.
   Index slot_ = 0;
@@ -145,22 +145,22 @@ class TetClipper {
 
   // The polyhedron: planes that ever cut it, the first four being the facets, and its vertices.
   const TetFrame* tet_ = nullptr;
-  Vec3 local_[4];                // the corners relative to the seed
-  double largest_ = 0;           // absolute coordinate of local_
-  double tet_squared_ = 0;       // upper bound of the squared distance of any point of the tetrahedron
+  Vec3 local_[4];           // the corners relative to the seed
+  double largest_ = 0;      // absolute coordinate of local_
+  double tet_squared_ = 0;  // upper bound of the squared distance of any point of the tetrahedron
   std::vector<Plane> planes_;
   std::size_t plane_count_ = 0;
   std::vector<Vertex> vertices_;
   std::size_t size_ = 0;
 
-  bool bounded_ = false;         // what follows is that of the polyhedron
+  bool bounded_ = false;  // what follows is that of the polyhedron
   Reach reach_;
 
   bool collected_ = false;       // what follows is that of the polyhedron
   std::vector<Index> bounding_;  // planes in order of their keys
   std::vector<Index> a_vertex_;  // of each plane, or kNone
 
-  bool labelled_ = false;        // the same
+  bool labelled_ = false;  // the same
   std::vector<Index> labels_;
   std::vector<Index> position_;  // of each plane in labels_
 

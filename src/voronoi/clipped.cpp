@@ -59,7 +59,7 @@ struct ClippedVoronoi::Work {
   std::uint64_t generation = 0;
   std::vector<std::vector<Chunk>> rounds;
   std::size_t round_count = 0;
-  std::vector<char> known;       // of each slot: it has been reached
+  std::vector<char> known;  // of each slot: it has been reached
 
   struct Start {
     Index slot, tet;
@@ -71,7 +71,8 @@ struct ClippedVoronoi::Work {
   Walker& walker();
   std::vector<Chunk>& next_round(std::size_t chunks);
   template <class Starts>
-  void walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk, CellMoments& result, bool want_polyhedra) const;
+  void walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk, CellMoments& result,
+            bool want_polyhedra) const;
   void take_whole(Index slot, Walker& walker, Chunk& chunk, CellMoments& result, bool want_polyhedra) const;
   std::vector<Start> walk_boundary(CellMoments& result, bool want_polyhedra);
   void walk_inner(std::vector<Start> frontier, CellMoments& result, bool want_polyhedra);
@@ -82,11 +83,8 @@ struct ClippedVoronoi::Work {
 };
 
 ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
-    : solid(s),
-      inner_whole(inner == InnerCells::whole && s.density.empty()),
-      boundary(s.boundary, kListsInSpace),
-      frames(tet_frames(s)),
-      enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0) {}
+    : solid(s), inner_whole(inner == InnerCells::whole && s.density.empty()), boundary(s.boundary, kListsInSpace),
+      frames(tet_frames(s)), enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0) {}
 
 Walker& ClippedVoronoi::Work::walker() {
   Walker& walker = walkers.local();
@@ -179,8 +177,8 @@ std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::newly_reached(con
   return reached;
 }
 
-// The cells that meet the boundary, from the tetrahedra under the triangles that they meet. A part of such a cell that the
-// boundary does not bound would be all of the cell, so this finds every part.
+// The cells that meet the boundary, from the tetrahedra under the triangles that they meet. A part of such a cell that
+// the boundary does not bound would be all of the cell, so this finds every part.
 std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(CellMoments& result, bool want_polyhedra) {
   std::vector<Index> slots;
   known.assign(seeds().x.size(), false);
@@ -292,7 +290,8 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
       labels += from.labels.size();
       vertices += from.triples.size();
     }
-  sort_in_parallel(items, [](const Item& a, const Item& b) { return a.tet != b.tet ? a.tet < b.tet : a.cell < b.cell; });
+  sort_in_parallel(items,
+                   [](const Item& a, const Item& b) { return a.tet != b.tet ? a.tet < b.tet : a.cell < b.cell; });
   polyhedra = {};
   polyhedra.pairs.reserve(items.size());
   polyhedra.label_offsets.reserve(items.size() + 1);
@@ -301,7 +300,8 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
   polyhedra.triples.reserve(vertices);
   polyhedra.vertices.reserve(vertices);
   const auto append = [](auto& to, const auto& from, std::size_t begin, std::size_t end) {
-    to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(begin), from.begin() + static_cast<std::ptrdiff_t>(end));
+    to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(begin),
+              from.begin() + static_cast<std::ptrdiff_t>(end));
   };
   for (const Item& item : items) {
     const ClippedPolyhedra& from = *item.from;
@@ -318,7 +318,8 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
 ClippedVoronoi::ClippedVoronoi(const Solid& solid, InnerCells inner) : work_(std::make_unique<Work>(solid, inner)) {}
 ClippedVoronoi::~ClippedVoronoi() = default;
 
-DiagramWork ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
+DiagramWork ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want,
+                                     Diagram& diagram) {
   return work_->evaluate(seeds, source, want, diagram);
 }
 

@@ -1,7 +1,8 @@
 // Clipped Voronoi diagrams of solids: exact combinatorics, closed-form moments (thesis 5.4).
 //
-// The diagram is that of exact arithmetic on the given coordinates, made unique by simulation of simplicity (exact.h): it
-// depends on the seeds and the solid alone, not on the source of neighbours, the clipping order or the number of threads.
+// The diagram is that of exact arithmetic on the given coordinates, made unique by simulation of simplicity (exact.h):
+// it depends on the seeds and the solid alone, not on the source of neighbours, the clipping order or the number of
+// threads.
 #pragma once
 
 #include <memory>
@@ -17,7 +18,8 @@ namespace bisector {
 
 // How cells that do not meet the boundary are treated.
 enum class InnerCells {
-  whole,    // taken whole, without regard to the tetrahedra, once they are proven to lie inside; only where the density is uniform
+  whole,    // taken whole, without regard to the tetrahedra, once they are proven to lie inside; only where the density
+            // is uniform
   clipped,  // cut up like the others
 };
 
@@ -27,9 +29,9 @@ class ClippedVoronoi {
   explicit ClippedVoronoi(const Solid& solid, InnerCells inner = InnerCells::whole);
   ~ClippedVoronoi();
 
-  // Sets the moments of every cell in the solid, zero for a seed whose cell lies outside, and of the polygons of the boundary and the
-  // polyhedra what is wanted. `moments.triangles` are the incident boundary triangles of each cell: seeds with any are boundary
-  // seeds. Between calls memory is kept, and the last diagram serves for first guesses.
+  // Sets the moments of every cell in the solid, zero for a seed whose cell lies outside, and of the polygons of the
+  // boundary and the polyhedra what is wanted. `moments.triangles` are the incident boundary triangles of each cell:
+  // seeds with any are boundary seeds. Between calls memory is kept, and the last diagram serves for first guesses.
   DiagramWork evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
 
  private:
@@ -37,13 +39,14 @@ class ClippedVoronoi {
   std::unique_ptr<Work> work_;
 };
 
-// The dual tetrahedra: sets of four seeds whose cells meet in a vertex inside the solid, each ascending, sorted, without
-// repetition.
+// The dual tetrahedra: sets of four seeds whose cells meet in a vertex inside the solid, each ascending, sorted,
+// without repetition.
 std::vector<Tetrahedron> dual_tets(const ClippedPolyhedra& polyhedra);
 
-// The certificate of a reported diagram. On each tetrahedron each inner facet {i, j} must occur once in cell i and once in j with
-// the same vertices, each facet of the tetrahedron must be tiled as from its other side, and every bisector facet of a cell
-// taken whole must have a counterpart. Returns the number of tetrahedra and whole cells where that fails.
+// The certificate of a reported diagram. On each tetrahedron each inner facet {i, j} must occur once in cell i and once
+// in j with the same vertices, each facet of the tetrahedron must be tiled as from its other side, and every bisector
+// facet of a cell taken whole must have a counterpart. Returns the number of tetrahedra and whole cells where that
+// fails.
 std::size_t count_untiled(const Solid& solid, const ClippedPolyhedra& polyhedra);
 
 }  // namespace bisector

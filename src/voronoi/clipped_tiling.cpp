@@ -25,7 +25,8 @@ class Tiling {
  public:
   Tiling(const Solid& solid, const ClippedPolyhedra& polyhedra) : solid_(solid), p_(polyhedra) {
     first_.assign(solid.mesh.tets.size() + 1, 0);
-    while (first_whole_ < p_.pairs.size() && p_.pairs[first_whole_].tet != kNone) ++first_[p_.pairs[first_whole_++].tet + 1];
+    while (first_whole_ < p_.pairs.size() && p_.pairs[first_whole_].tet != kNone)
+      ++first_[p_.pairs[first_whole_++].tet + 1];
     for (std::size_t t = 0; t + 1 < first_.size(); ++t) first_[t + 1] += first_[t];
     for (std::size_t k = 0; k < first_whole_; ++k)
       for (std::size_t l = p_.label_offsets[k]; l < p_.label_offsets[k + 1]; ++l)
@@ -119,7 +120,8 @@ class Tiling {
     return 6 - (label & ~kFacetLabel) - (others.first & ~kFacetLabel) - (others.second & ~kFacetLabel);
   }
 
-  // What tiles facet k of the tetrahedron, with its edges named by the vertices opposite them, as the other side names them.
+  // What tiles facet k of the tetrahedron, with its edges named by the vertices opposite them, as the other side names
+  // them.
   std::vector<std::pair<Index, Corners>> on_facet(Index tet, Index k, const std::vector<FacetOf>& facets) const {
     const auto common = [&](Index label) {
       return is_facet(label) ? kFacetLabel | solid_.mesh.tets[tet][label & ~kFacetLabel] : label;
@@ -146,7 +148,8 @@ class Tiling {
   bool whole_has(Index cell, Index label) const {
     const std::size_t k = whole_of(cell);
     if (k == kMissing) return false;
-    return std::binary_search(p_.labels.data() + p_.label_offsets[k], p_.labels.data() + p_.label_offsets[k + 1], label);
+    return std::binary_search(p_.labels.data() + p_.label_offsets[k], p_.labels.data() + p_.label_offsets[k + 1],
+                              label);
   }
 
   bool met_cell(Index cell) const {
@@ -166,12 +169,19 @@ class Tiling {
 std::size_t count_untiled(const Solid& solid, const ClippedPolyhedra& polyhedra) {
   const Tiling tiling(solid, polyhedra);
   std::atomic<std::size_t> failed{0};
-  parallel_each(solid.mesh.tets.size(), [&](std::size_t t) {
-    if (solid.six_volumes[t] > 0 && !tiling.tet_tiled(static_cast<Index>(t))) failed.fetch_add(1, std::memory_order_relaxed);
-  }, 64);
-  parallel_each(tiling.wholes(), [&](std::size_t k) {
-    if (!tiling.whole_tiled(k)) failed.fetch_add(1, std::memory_order_relaxed);
-  }, 64);
+  parallel_each(
+      solid.mesh.tets.size(),
+      [&](std::size_t t) {
+        if (solid.six_volumes[t] > 0 && !tiling.tet_tiled(static_cast<Index>(t)))
+          failed.fetch_add(1, std::memory_order_relaxed);
+      },
+      64);
+  parallel_each(
+      tiling.wholes(),
+      [&](std::size_t k) {
+        if (!tiling.whole_tiled(k)) failed.fetch_add(1, std::memory_order_relaxed);
+      },
+      64);
   return failed.load();
 }
 

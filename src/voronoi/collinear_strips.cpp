@@ -41,7 +41,8 @@ RestrictedPolygons CollinearStrips::merged(std::vector<Index>& source) const {
     copy_below(triangle);
     std::vector<std::size_t> order(chain.cells.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return chain.cells[a] < chain.cells[b]; });
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return chain.cells[a] < chain.cells[b]; });
     for (const std::size_t r : order) {
       append_strip(chain, r, all.labels);
       all.pairs.push_back({triangle, chain.cells[r]});
@@ -110,8 +111,8 @@ CollinearStrips::Cells CollinearStrips::walk(std::size_t begin, std::size_t end,
   return cells;
 }
 
-// Vertices that no facet uses are taken to be where the vertex is from which they are reached first: that changes nothing
-// but the division of triangles without area.
+// Vertices that no facet uses are taken to be where the vertex is from which they are reached first: that changes
+// nothing but the division of triangles without area.
 void CollinearStrips::place_loose_vertices() {
   for (const auto& [v, cell] : owner_) position_[v] = surface_.mesh.vertices[v];
   for (bool changed = true; changed;) {

@@ -1,5 +1,5 @@
-// How exactly collinear triangles are divided among cells. The diagram leaves them out, but the cells of the triangles around them cross
-// them, too.
+// How exactly collinear triangles are divided among cells. The diagram leaves them out, but the cells of the triangles
+// around them cross them, too.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +15,8 @@
 
 namespace bisector {
 
-// Divides collinear triangles as the cells cross their edges. A cell is convex and so meets a line in one interval; the cells
-// along an edge are a list without repeats, and a vertex between the ends splits that list at its owner.
+// Divides collinear triangles as the cells cross their edges. A cell is convex and so meets a line in one interval; the
+// cells along an edge are a list without repeats, and a vertex between the ends splits that list at its owner.
 class CollinearStrips {
  public:
   // Surface and polygons must outlive the object.
@@ -37,7 +37,7 @@ class CollinearStrips {
   struct Chain {
     Index low, middle, high;  // corners
     Cells cells;
-    std::size_t split = 0;    // the middle corner lies in cells[split]
+    std::size_t split = 0;  // the middle corner lies in cells[split]
   };
 
   static Edge edge_of(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
@@ -52,11 +52,11 @@ class CollinearStrips {
 
   const Surface& surface_;
   const RestrictedPolygons& polygons_;
-  std::vector<Index> flat_;          // collinear triangles of three different vertices
-  std::map<Edge, Cells> cells_;      // along edges, from the lower vertex
-  std::map<Index, Index> owner_;     // of vertices
+  std::vector<Index> flat_;       // collinear triangles of three different vertices
+  std::map<Edge, Cells> cells_;   // along edges, from the lower vertex
+  std::map<Index, Index> owner_;  // of vertices
   std::map<Index, Vec3> position_;
-  std::map<Index, Chain> chains_;    // of the triangles that could be read
+  std::map<Index, Chain> chains_;  // of the triangles that could be read
 };
 
 }  // namespace bisector

@@ -14,14 +14,15 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<Index, Kernel>;
-using CellBase = CGAL::Triangulation_cell_base_with_info_3<Index, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
+using CellBase =
+    CGAL::Triangulation_cell_base_with_info_3<Index, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
 using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
 
 constexpr std::size_t kLargestCluster = 256;
 
 struct Clusters {
-  std::vector<Index> root;                    // of each finite cell
-  std::vector<std::vector<Index>> vertices;   // of the clusters of more than one cell, by root; else empty
+  std::vector<Index> root;                   // of each finite cell
+  std::vector<std::vector<Index>> vertices;  // of the clusters of more than one cell, by root; else empty
 };
 
 Index find(std::vector<Index>& parent, Index i) {

@@ -13,14 +13,14 @@ namespace bisector {
 
 // Integrals over the restricted or clipped cells; positions are relative to the seed.
 struct CellMoments {
-  std::vector<Moments> cells;      // by seed; zero for an empty cell
+  std::vector<Moments> cells;  // by seed; zero for an empty cell
   // The mass, or a quarter of the median mass of the six nearest seeds where that is more: a scale for steps that does
   // not vanish with the cell.
   std::vector<double> step_mass;
-  double mass = 0;                 // sum over the cells
-  double energy = 0;               // sum of the second moments: the CVT energy
-  Csr<Index> triangles;            // incident triangles of each cell, of the surface or the solid's boundary, ascending
-  Certification certification;     // as Backend::evaluate() reports it
+  double mass = 0;              // sum over the cells
+  double energy = 0;            // sum of the second moments: the CVT energy
+  Csr<Index> triangles;         // incident triangles of each cell, of the surface or the solid's boundary, ascending
+  Certification certification;  // as Backend::evaluate() reports it
   DiagramSeconds seconds;
 };
 
@@ -55,8 +55,12 @@ struct DiagramWork {
 // Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it.
 enum class Want : unsigned { moments = 0, polygons = 1, polyhedra = 2, dual = 4 };
 
-constexpr Want operator|(Want a, Want b) { return static_cast<Want>(static_cast<unsigned>(a) | static_cast<unsigned>(b)); }
-constexpr Want operator&(Want a, Want b) { return static_cast<Want>(static_cast<unsigned>(a) & static_cast<unsigned>(b)); }
+constexpr Want operator|(Want a, Want b) {
+  return static_cast<Want>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
+}
+constexpr Want operator&(Want a, Want b) {
+  return static_cast<Want>(static_cast<unsigned>(a) & static_cast<unsigned>(b));
+}
 constexpr bool includes(Want set, Want parts) { return (set & parts) == parts; }
 
 // The diagram of some seeds. Parts that were not asked for are empty.

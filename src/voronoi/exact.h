@@ -4,9 +4,10 @@
 //   h_j[m] = |q_m - x_j|^2 - |q_m - x_i|^2 + (w_i - w_j)(1, 1, 1),   positive on the side of i,
 // and the line through the edge opposite corner m is the unit row e_m. Two consecutive rows a, b of a convex polygon in
 // counter-clockwise order meet at the point a x b with denominator det(1, a, b) > 0, so the side of that point
-// with respect to a row c is the sign of det(c, a, b): degree 2, 4 and 6 for vertices of type A, B and C (thesis 4.3.4).
-// The determinant is affine in the infinitesimal weights w_0 >> w_1 >> ... > 0 (simulation of simplicity, Edelsbrunner
-// and Muecke 1990): where its constant part vanishes, the first nonzero cofactor in ascending seed index decides.
+// with respect to a row c is the sign of det(c, a, b): degree 2, 4 and 6 for vertices of type A, B and C
+// (thesis 4.3.4). The determinant is affine in the infinitesimal weights w_0 >> w_1 >> ... > 0 (simulation of
+// simplicity, Edelsbrunner and Muecke 1990): where its constant part vanishes, the first nonzero cofactor in ascending
+// seed index decides.
 #pragma once
 
 #include "core/geometry.h"
@@ -15,9 +16,9 @@ namespace bisector {
 
 // One line on a triangle: the bisector towards a seed, or the edge opposite a corner.
 struct ExactLine {
-  Vec3 seed;          // position of the other seed
-  Index index = 0;    // of the other seed, in the caller's numbering
-  int corner = -1;    // 0..2: the edge opposite that corner, and seed and index are unused
+  Vec3 seed;        // position of the other seed
+  Index index = 0;  // of the other seed, in the caller's numbering
+  int corner = -1;  // 0..2: the edge opposite that corner, and seed and index are unused
 
   static ExactLine bisector(const Vec3& seed, Index index) { return {seed, index, -1}; }
   static ExactLine edge(int corner) { return {{}, 0, corner}; }

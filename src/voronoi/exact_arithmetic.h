@@ -24,7 +24,8 @@ inline Exact difference_of_squares(const Vec3& q, const Vec3& x_i, const Vec3& x
   return sum;
 }
 
-// The perturbed sign of a determinant whose constant part vanishes: that of its first nonzero cofactor in ascending seed index, or 0.
+// The perturbed sign of a determinant whose constant part vanishes: that of its first nonzero cofactor in ascending
+// seed index, or 0.
 template <std::size_t kMost>
 class Cofactors {
  public:
@@ -49,7 +50,8 @@ class Cofactors {
   std::size_t count_ = 0;
 };
 
-// Brings coordinates near 1, by a power of two, which keeps the numerators and denominators of vertices within the range of double.
+// Brings coordinates near 1, by a power of two, which keeps the numerators and denominators of vertices within the
+// range of double.
 class ExactScaling {
  public:
   // For what lies about as far from the seed as the corners do.

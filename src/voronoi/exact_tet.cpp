@@ -21,8 +21,9 @@ Row cross(const Row& a, const Row& b, const Row& c) {
 
 Exact dot(const Row& a, const Row& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]; }
 
-// The rows of planes, in barycentric coordinates or, where only bisectors take part, as coefficients of (p - x_i, 1), of lower
-// degree. The latter basis has the opposite orientation, so `unit` carries the sign that makes denominators positive.
+// The rows of planes, in barycentric coordinates or, where only bisectors take part, as coefficients of (p - x_i, 1),
+// of lower degree. The latter basis has the opposite orientation, so `unit` carries the sign that makes denominators
+// positive.
 struct Basis {
   const ExactTetFrame& frame;
   bool euclidean;
@@ -53,8 +54,8 @@ bool is_bisector(const ExactPlane& plane) { return plane.facet < 0; }
 
 }  // namespace
 
-int exact_side(const ExactTetFrame& frame, const ExactPlane& plane_a, const ExactPlane& plane_b, const ExactPlane& plane_c,
-               const ExactPlane& plane_d) {
+int exact_side(const ExactTetFrame& frame, const ExactPlane& plane_a, const ExactPlane& plane_b,
+               const ExactPlane& plane_c, const ExactPlane& plane_d) {
   const Basis basis{frame, is_bisector(plane_a) && is_bisector(plane_b) && is_bisector(plane_c)};
   const Row a = basis.row(plane_a), b = basis.row(plane_b), c = basis.row(plane_c), d = basis.row(plane_d);
   const Row lambda = cross(a, b, c);
@@ -82,7 +83,8 @@ Vec3 exact_vertex(const ExactTetFrame& given, const ExactPlane& given_a, const E
                   const ExactPlane& given_c) {
   const ExactScaling scaling(given.corners, given.seed);
   const ExactTetFrame frame = scaling.scaled_frame(given);
-  const ExactPlane a = scaling.scaled_bound(given_a), b = scaling.scaled_bound(given_b), c = scaling.scaled_bound(given_c);
+  const ExactPlane a = scaling.scaled_bound(given_a), b = scaling.scaled_bound(given_b),
+                   c = scaling.scaled_bound(given_c);
 
   const Basis basis{frame, is_bisector(a) && is_bisector(b) && is_bisector(c)};
   const Row lambda = cross(basis.row(a), basis.row(b), basis.row(c));
@@ -90,8 +92,7 @@ Vec3 exact_vertex(const ExactTetFrame& given, const ExactPlane& given_a, const E
   Vec3 local;
   for (int k = 0; k < 3; ++k) {
     Exact numerator = 0;
-    if (basis.euclidean)
-      numerator = lambda[static_cast<std::size_t>(k)];
+    if (basis.euclidean) numerator = lambda[static_cast<std::size_t>(k)];
     else
       for (std::size_t m = 0; m < 4; ++m)
         numerator = numerator + lambda[m] * (Exact(frame.corners[m][k]) - Exact(frame.seed[k]));
@@ -105,7 +106,8 @@ double exact_six_volume(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3&
   const Vec3* ends[3] = {&b, &c, &d};
   for (std::size_t r = 0; r < 3; ++r)
     for (int k = 0; k < 3; ++k) e[r][static_cast<std::size_t>(k)] = Exact((*ends[r])[k]) - Exact(a[k]);
-  const Exact volume = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+  const Exact volume = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
+                       e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
                        e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
   const double rounded = CGAL::to_double(volume);
   return rounded != 0 ? rounded : sign(volume) * std::numeric_limits<double>::denorm_min();

@@ -8,8 +8,8 @@
 
 namespace bisector {
 
-// The rule of all sums over a cell: terms in ascending index of triangle or tetrahedron, by blocks of 32, the blocks' sums
-// likewise.
+// The rule of all sums over a cell: terms in ascending index of triangle or tetrahedron, by blocks of 32, the blocks'
+// sums likewise.
 class FixedTreeSum {
  public:
   void add(const Moments& term) {

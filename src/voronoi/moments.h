@@ -1,4 +1,5 @@
-// Closed-form moments of triangles and tetrahedra with a linear density: mass, first moment and second moment about the origin.
+// Closed-form moments of triangles and tetrahedra with a linear density: mass, first moment and second moment about the
+// origin.
 #pragma once
 
 #include "core/geometry.h"
@@ -24,8 +25,7 @@ inline constexpr double kSixth = 1.0 / 6, kTwentyFourth = 1.0 / 24, kOneHundredT
 
 // The moments about x of a shape whose moments about `origin` are m; `to_origin` is origin - x.
 inline Moments moved(const Moments& m, const Vec3& to_origin) {
-  return {m.mass, m.mass * to_origin + m.first,
-          m.mass * norm2(to_origin) + 2 * dot(to_origin, m.first) + m.second};
+  return {m.mass, m.mass * to_origin + m.first, m.mass * norm2(to_origin) + 2 * dot(to_origin, m.first) + m.second};
 }
 
 // Moments of a triangle of signed area `area` with density 1, from the sum of its corners and of their squared lengths.
@@ -34,7 +34,8 @@ inline Moments triangle_moments(const Vec3& sum, double squares, double area) {
 }
 
 // Moments of the triangle (a, b, c) with the density linear, ra, rb and rc at the corners.
-inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, double ra, double rb, double rc, double area) {
+inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, double ra, double rb, double rc,
+                                double area) {
   const double s = ra + rb + rc;
   const Vec3 first = (s + ra) * a + (s + rb) * b + (s + rc) * c;
   const double squares = (s + ra + ra) * norm2(a) + (s + rb + rb) * norm2(b) + (s + rc + rc) * norm2(c);
@@ -42,8 +43,8 @@ inline Moments triangle_moments(const Vec3& a, const Vec3& b, const Vec3& c, dou
   return {(kThird * area) * s, (kTwelfth * area) * first, (kThirtieth * area) * (squares + products)};
 }
 
-// Moments of a tetrahedron with one corner at the origin, the others a, b, c, and density 1, times 6, 24 and 120: what is to be added
-// up of many. `six_volume` is det(a, b, c).
+// Moments of a tetrahedron with one corner at the origin, the others a, b, c, and density 1, times 6, 24 and 120: what
+// is to be added up of many. `six_volume` is det(a, b, c).
 inline Moments tet_terms(const Vec3& a, const Vec3& b, const Vec3& c, double six_volume) {
   const Vec3 sum = a + b + c;
   return {six_volume, six_volume * sum, six_volume * (norm2(sum) + (norm2(a) + norm2(b) + norm2(c)))};

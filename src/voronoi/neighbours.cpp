@@ -9,8 +9,8 @@
 #include <optional>
 
 #include "core/parallel.h"
-#include "voronoi/delaunay.h"
 #include "spatial/hilbert.h"
+#include "voronoi/delaunay.h"
 
 namespace bisector {
 namespace {
@@ -19,13 +19,13 @@ constexpr std::size_t kFirstLeast = 6;  // else the search is repeated with a la
 constexpr std::uint64_t kPlaceMask = 1023;
 constexpr std::size_t kCandidates = kPlaceMask + 1;  // and with a smaller one beyond these
 constexpr int kTrials = 12;
-constexpr double kGrowth = 1.6;          // of the radius, from level to level
-constexpr int kRingLevel = 6;            // the rung at which `nearest` turns to the Delaunay triangulation
+constexpr double kGrowth = 1.6;  // of the radius, from level to level
+constexpr int kRingLevel = 6;    // the rung at which `nearest` turns to the Delaunay triangulation
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Distances are compared after rounding; this keeps what a list leaves out beyond its radius all the same.
 constexpr double kBelow = 1 - 1e-9;
-constexpr double kMostLost = 0.3;        // of a radius, before lists are built again
+constexpr double kMostLost = 0.3;  // of a radius, before lists are built again
 
 // Distance and place in one key: squared distances are positive, so their bits sort like them; the last ten give way.
 std::uint64_t sort_key(double squared, std::size_t place) {
@@ -74,7 +74,8 @@ struct Neighbours::Search {
   }
 };
 
-// Sorts the first n keys, all of squared distances below `limit`: spread over buckets, what is left is a step or two each.
+// Sorts the first n keys, all of squared distances below `limit`: spread over buckets, what is left is a step or two
+// each.
 void Neighbours::Search::sort_keys(std::size_t n, double limit) {
   constexpr std::size_t kBuckets = 64, kFew = 16;
   if (!(limit > 1e-290 && limit < kInfinity)) return std::sort(keys.data(), keys.data() + n);
@@ -214,8 +215,8 @@ bool Neighbours::update() {
   return true;
 }
 
-// Lists for the seeds [begin, end) from one search around their box; a failing search is repeated with another radius. False
-// if the box is too large to be worth it.
+// Lists for the seeds [begin, end) from one search around their box; a failing search is repeated with another radius.
+// False if the box is too large to be worth it.
 bool Neighbours::list_run(std::size_t begin, std::size_t end, const Box& box, Search& search) {
   const std::vector<Vec3>& x = seeds_->x;
   if (!(search.radius > 0)) search.radius = std::max(box.diagonal(), 1e-6 * seeds_->extent);

@@ -31,14 +31,14 @@ struct NeighbourList {
   int level = 0;
 };
 
-// How long first lists are: at most `most`, from searches whose radius aims at `mean`. A planar cell has six neighbours and is
-// certified by about 16 nearest seeds; a cell in space has 15 and needs about 42.
+// How long first lists are: at most `most`, from searches whose radius aims at `mean`. A planar cell has six neighbours
+// and is certified by about 16 nearest seeds; a cell in space has 15 and needs about 42.
 struct ListLength {
   static constexpr std::size_t kMost = 96;
   std::size_t most = 40;
   double mean = 28;
-  double power = 0.5;    // the inverse of the seeds' dimension, about: of the radius in terms of their number
-  double longest = 5;    // diagonal of the box of seeds that share a search, in radii
+  double power = 0.5;  // the inverse of the seeds' dimension, about: of the radius in terms of their number
+  double longest = 5;  // diagonal of the box of seeds that share a search, in radii
 };
 inline constexpr ListLength kListsInSpace{88, 72, 1.0 / 3, 3};
 
@@ -51,8 +51,8 @@ class Neighbours {
   void build(const SortedSeeds& seeds, NeighbourSource source);
   // No lists at first: each is grown on demand, from about `radius` on.
   void build_on_demand(const SortedSeeds& seeds, double radius);
-  // For the same slots at new positions: sorts the lists of the last build anew and shortens them and their certificates by
-  // how far seeds have moved since. False if that is not worth it and build() has to be called.
+  // For the same slots at new positions: sorts the lists of the last build anew and shortens them and their
+  // certificates by how far seeds have moved since. False if that is not worth it and build() has to be called.
   bool update();
 
   NeighbourList list(Index slot) const;
@@ -60,8 +60,8 @@ class Neighbours {
   NeighbourList wider(Index slot, const NeighbourList& shorter) const;
   // A slot whose distance to q is the least up to rounding.
   Index nearest(const Vec3& q) const { return tree_.nearest(q); }
-  // Writes the `count` (at least 1) slots nearest to `slot`, or all others if there are fewer, in ascending distance; ties go
-  // to the lower index of the caller. Returns how many. Depends on the seeds alone.
+  // Writes the `count` (at least 1) slots nearest to `slot`, or all others if there are fewer, in ascending distance;
+  // ties go to the lower index of the caller. Returns how many. Depends on the seeds alone.
   std::size_t nearest_to(Index slot, std::size_t count, Index* slots) const;
   // All slots within `radius` of q, and some of the others.
   std::vector<Index> around(const Vec3& q, double radius) const;
@@ -80,14 +80,14 @@ class Neighbours {
   const SortedSeeds* seeds_ = nullptr;
   SeedTree tree_;
   ListLength length_;
-  std::vector<Index> first_;             // room for length_.most per slot
-  std::vector<unsigned char> count_;     // of the lists of first_
+  std::vector<Index> first_;          // room for length_.most per slot
+  std::vector<unsigned char> count_;  // of the lists of first_
   std::vector<double> radius_;
-  std::vector<Vec3> built_x_;            // positions and radii of the last build
+  std::vector<Vec3> built_x_;  // positions and radii of the last build
   std::vector<double> built_radius_;
   std::vector<unsigned char> built_count_;
-  bool use_rings_ = false;               // the first lists are Delaunay rings
-  bool on_demand_ = false;               // there are no first lists, and they grow from first_radius_ on
+  bool use_rings_ = false;  // the first lists are Delaunay rings
+  bool on_demand_ = false;  // there are no first lists, and they grow from first_radius_ on
   double first_radius_ = 0;
   std::unique_ptr<LastRung> last_rung_;
   std::unique_ptr<std::atomic<Grown*>[]> heads_;  // grown lists of each slot, the longest first

@@ -4,7 +4,8 @@
 
 namespace bisector {
 
-void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot, RestrictedPolygons& out) {
+void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
+                    RestrictedPolygons& out) {
   out.pairs.push_back({triangle, seeds.id[slot]});
   const std::size_t first = clipper.first_corner();
   for (std::size_t e = 0; e < clipper.size(); ++e) {

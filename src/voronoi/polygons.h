@@ -9,8 +9,10 @@
 
 namespace bisector {
 
-// Appends the clipper's polygon on the triangle, starting at the edge of the smallest label; slots become the caller's indices.
-void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot, RestrictedPolygons& out);
+// Appends the clipper's polygon on the triangle, starting at the edge of the smallest label; slots become the caller's
+// indices.
+void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
+                    RestrictedPolygons& out);
 
 // The first polygon of each triangle, and one past the last.
 std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles);

@@ -27,8 +27,8 @@ void append_polyhedron(TetClipper& clipper, const SortedSeeds& seeds, Index tet,
   std::vector<Vertex> vertices;
   for (Index v = 0; v < clipper.vertex_count(); ++v) {
     const std::array<Index, 3> on = clipper.triple(v);
-    vertices.push_back({{static_cast<std::uint16_t>(on[0]), static_cast<std::uint16_t>(on[1]),
-                         static_cast<std::uint16_t>(on[2])}, v});
+    vertices.push_back(
+        {{static_cast<std::uint16_t>(on[0]), static_cast<std::uint16_t>(on[1]), static_cast<std::uint16_t>(on[2])}, v});
   }
   std::sort(vertices.begin(), vertices.end(), [](const Vertex& a, const Vertex& b) { return a.triple < b.triple; });
   for (const Vertex& v : vertices) {

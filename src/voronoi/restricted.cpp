@@ -14,8 +14,8 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
-constexpr std::size_t kRanges = 8;  // of triangles, in the sort by cells
+constexpr std::size_t kMostRemembered = 64;                    // pairs of a facet that are searched for an earlier one
+constexpr std::size_t kRanges = 8;                             // of triangles, in the sort by cells
 constexpr std::size_t kMostFacets = 512, kFewestChunks = 256;  // of a chunk; and chunks, where facets are few and large
 constexpr std::size_t kPointsAtOnce = 256, kCellsAtOnce = 256;  // of a parallel loop
 
@@ -69,20 +69,20 @@ struct RestrictedVoronoi::Work {
   SortedSeeds seeds;
   Neighbours neighbours;
   NeighbourSource built_source = NeighbourSource::nearest;
-  std::vector<Index> owner;   // slot of each used vertex
-  std::vector<Index> hint;    // owner's seed index in the last diagram
+  std::vector<Index> owner;                // slot of each used vertex
+  std::vector<Index> hint;                 // owner's seed index in the last diagram
   std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
-  std::uint64_t generation = 0;  // of `seeds`
+  std::uint64_t generation = 0;            // of `seeds`
   ThreadLocal<Walker> walkers;
-  std::size_t chunk_size = 1;           // facets
+  std::size_t chunk_size = 1;                        // facets
   std::vector<Index> first_entry, last_first_entry;  // of each facet, in its chunk
-  bool followed = false;                // the slots are those of the last diagram
+  bool followed = false;                             // the slots are those of the last diagram
   struct Item {
     Index facet, moments;
   };
-  std::vector<Item> items;              // by cell, then by triangle
+  std::vector<Item> items;  // by cell, then by triangle
   std::vector<std::size_t> cell_begin;
-  std::vector<Index> cursor;            // by range of triangles and slot
+  std::vector<Index> cursor;  // by range of triangles and slot
 
   Work(const Surface& s, ListLength lists) : surface(s), neighbours(lists) {}
 
@@ -197,8 +197,8 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
   });
 }
 
-// Brings the entries into the order of cells and, in each, of triangles: a stable counting sort over the triangles in their
-// order, in a fixed number of ranges.
+// Brings the entries into the order of cells and, in each, of triangles: a stable counting sort over the triangles in
+// their order, in a fixed number of ranges.
 void RestrictedVoronoi::Work::sort_items() {
   const std::size_t slots = seeds.x.size(), triangles = surface.facet_of.size();
   const std::size_t range = (triangles + kRanges - 1) / kRanges;
@@ -230,7 +230,9 @@ void RestrictedVoronoi::Work::sort_items() {
   items.resize(total);
   parallel_chunks(triangles, range, [&](std::size_t r, std::size_t begin, std::size_t end) {
     Index* next = cursor.data() + r * slots;
-    for_each_entry(begin, end, [&](Index facet, const Entry& entry) { items[next[entry.slot]++] = {facet, entry.moments}; });
+    for_each_entry(begin, end, [&](Index facet, const Entry& entry) {
+      items[next[entry.slot]++] = {facet, entry.moments};
+    });
   });
 }
 
@@ -241,13 +243,15 @@ PairCounts RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellM
   result.triangles.offsets.assign(seed_count + 1, 0);
   for (std::size_t i = 0; i < seed_count; ++i) {
     const Index s = seeds.slot[i];
-    result.triangles.offsets[i + 1] = result.triangles.offsets[i] + (s == kNone ? 0 : cell_begin[s + 1] - cell_begin[s]);
+    result.triangles.offsets[i + 1] =
+        result.triangles.offsets[i] + (s == kNone ? 0 : cell_begin[s + 1] - cell_begin[s]);
   }
   result.triangles.values.resize(items.size());
   parallel_chunks(slots, kCellsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       Index* triangles = result.triangles.values.data() + result.triangles.offsets[seeds.id[s]];
-      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) *triangles++ = surface.summaries[items[k].facet].triangle;
+      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k)
+        *triangles++ = surface.summaries[items[k].facet].triangle;
     }
   });
   PairCounts counts;
@@ -304,8 +308,8 @@ DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Ne
   return work;
 }
 
-// Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of triangles,
-// then cells.
+// Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of
+// triangles, then cells.
 void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
   polygons = {};
   polygons.pairs.reserve(items.size());
@@ -325,7 +329,8 @@ void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
               [&](std::size_t a, std::size_t b) { return from.pairs[a].cell < from.pairs[b].cell; });
     for (const std::size_t k : order) {
       polygons.pairs.push_back(from.pairs[k]);
-      const auto begin = static_cast<std::ptrdiff_t>(from.offsets[k]), end = static_cast<std::ptrdiff_t>(from.offsets[k + 1]);
+      const auto begin = static_cast<std::ptrdiff_t>(from.offsets[k]),
+                 end = static_cast<std::ptrdiff_t>(from.offsets[k + 1]);
       polygons.labels.insert(polygons.labels.end(), from.labels.begin() + begin, from.labels.begin() + end);
       polygons.vertices.insert(polygons.vertices.end(), from.vertices.begin() + begin, from.vertices.begin() + end);
       polygons.offsets.push_back(polygons.labels.size());
@@ -342,7 +347,8 @@ DiagramWork RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, Neighbou
   return work_->evaluate(seeds, source, true, want, diagram);
 }
 
-DiagramWork RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram) {
+DiagramWork RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want,
+                                     Diagram& diagram) {
   return work_->evaluate(seeds, source, false, want, diagram);
 }
 

@@ -1,8 +1,8 @@
 // Restricted Voronoi diagrams of surfaces: exact combinatorics, closed-form moments (thesis 4.3, 5.4.2).
 //
 // The diagram is that of exact arithmetic on the given coordinates, made unique by simulation of simplicity (see
-// exact.h): it depends on the seeds and the mesh alone, not on the source of neighbours, the clipping order or the number
-// of threads.
+// exact.h): it depends on the seeds and the mesh alone, not on the source of neighbours, the clipping order or the
+// number of threads.
 #pragma once
 
 #include <memory>
@@ -22,8 +22,8 @@ class RestrictedVoronoi {
   explicit RestrictedVoronoi(const Surface& surface, ListLength lists = {});
   ~RestrictedVoronoi();
 
-  // Sets the moments of every cell, and the polygons if they are wanted. Between calls memory is kept, and the owners of the last
-  // diagram serve as first guesses.
+  // Sets the moments of every cell, and the polygons if they are wanted. Between calls memory is kept, and the owners
+  // of the last diagram serve as first guesses.
   DiagramWork evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
   // Only who meets whom: of the moments the `triangles`, and the polygons if they are wanted.
   DiagramWork trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);

@@ -1,5 +1,6 @@
-// A screen in single precision for the clippers of triangles and of tetrahedra: it passes over most bisectors that do not cut a
-// polygon or polyhedron, and over none that does. Coordinates are relative to the cell's seed, scaled into the range of float.
+// A screen in single precision for the clippers of triangles and of tetrahedra: it passes over most bisectors that do
+// not cut a polygon or polyhedron, and over none that does. Coordinates are relative to the cell's seed, scaled into
+// the range of float.
 #pragma once
 
 #include <algorithm>
@@ -42,8 +43,8 @@ struct Reach {
   float margin = 0;    // by how much a product of a vertex and the vector to a neighbour may be off, scaled
 
   Reach() = default;
-  // From the largest squared distance of a vertex and the largest error of a vertex. (r + e)^2 <= r^2 (1 + a) + e^2 (1 + 1/a), and no
-  // point is farther than the domain's corners, at the squared distance `domain`.
+  // From the largest squared distance of a vertex and the largest error of a vertex. (r + e)^2 <= r^2 (1 + a) + e^2 (1
+  // + 1/a), and no point is farther than the domain's corners, at the squared distance `domain`.
   Reach(double vertices, double slack, double domain, double scale)
       : squared(std::min(domain, vertices * (1 + 1e-6) + 4e6 * (slack * slack))) {
     const double scaling = scale * scale;
@@ -59,8 +60,9 @@ struct Reach {
 
 // Bit m is set if bisector m of the block may cut. `each_vertex(test)` calls test(x, y, z) for all vertices.
 //
-// With |d| < 2 r, r the reach, a product as coded is off by less than 2e-6 |d| r < 4e-6 r^2, and by less than 4 r slack for the
-// vertex's own error. Bisectors with |d| >= 2 r do not cut at all. Whatever overflows or is not a number counts as cutting.
+// With |d| < 2 r, r the reach, a product as coded is off by less than 2e-6 |d| r < 4e-6 r^2, and by less than 4 r slack
+// for the vertex's own error. Bisectors with |d| >= 2 r do not cut at all. Whatever overflows or is not a number counts
+// as cutting.
 template <class EachVertex>
 inline unsigned may_cut(const ScreenBlock& block, float margin, const EachVertex& each_vertex) {
   const auto load = [](const float* p) { return *reinterpret_cast<const FourFloats*>(p); };

@@ -32,7 +32,8 @@ bool same_sense(const Triangle& a, const Triangle& b) {
 // The mesh with its tetrahedra turned positive.
 TetMesh oriented(TetMesh mesh) {
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    if (!finite(mesh.vertices[v])) throw Error("vertex " + std::to_string(v) + " has a coordinate that is not finite; correct it");
+    if (!finite(mesh.vertices[v]))
+      throw Error("vertex " + std::to_string(v) + " has a coordinate that is not finite; correct it");
   for (std::size_t t = 0; t < mesh.tets.size(); ++t)
     for (const Index v : mesh.tets[t])
       if (v >= mesh.vertices.size())
@@ -107,11 +108,8 @@ TriangleMesh boundary_of(const Solid& solid) {
 }  // namespace
 
 Solid::Solid(TetMesh given, std::vector<double> given_density)
-    : mesh(oriented(std::move(given))),
-      density(std::move(given_density)),
-      six_volumes(volumes_of(mesh)),
-      adjacent(adjacency_of(mesh, six_volumes)),
-      boundary(boundary_of(*this), density) {
+    : mesh(oriented(std::move(given))), density(std::move(given_density)), six_volumes(volumes_of(mesh)),
+      adjacent(adjacency_of(mesh, six_volumes)), boundary(boundary_of(*this), density) {
   each_boundary_facet(*this, [&](Index t, int) { tet_of_triangle.push_back(t); });
   volume = kSixth * fixed_sum(six_volumes.size(), [&](std::size_t t) { return six_volumes[t]; });
   mass = volume;

@@ -30,7 +30,8 @@ double median_nearby(const SortedSeeds& seeds, const Neighbours& neighbours, Ind
 
 void set_step_masses(const SortedSeeds& seeds, const Neighbours& neighbours, CellMoments& result) {
   result.step_mass.assign(result.cells.size(), -1);
-  complete_step_masses(seeds, [&]() -> const Neighbours& { return neighbours; }, result);
+  complete_step_masses(
+      seeds, [&]() -> const Neighbours& { return neighbours; }, result);
 }
 
 void complete_step_masses(const SortedSeeds& seeds, const std::function<const Neighbours&()>& neighbours,

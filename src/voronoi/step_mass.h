@@ -1,5 +1,5 @@
-// The mass that scales a seed's step: its cell's, or a quarter of the median mass of the six nearest seeds where that is more, so
-// that a vanishing cell does not take an enormous step.
+// The mass that scales a seed's step: its cell's, or a quarter of the median mass of the six nearest seeds where that
+// is more, so that a vanishing cell does not take an enormous step.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,8 @@ namespace bisector {
 
 // Sets result.step_mass from result.cells.
 void set_step_masses(const SortedSeeds& seeds, const Neighbours& neighbours, CellMoments& result);
-// The same where result.step_mass holds the medians already, negative where they are not known; only those need neighbours.
+// The same where result.step_mass holds the medians already, negative where they are not known; only those need
+// neighbours.
 void complete_step_masses(const SortedSeeds& seeds, const std::function<const Neighbours&()>& neighbours,
                           CellMoments& result);
 

@@ -5,8 +5,8 @@
 
 #include "bisector/error.h"
 #include "core/parallel.h"
-#include "voronoi/exact.h"
 #include "spatial/hilbert.h"
+#include "voronoi/exact.h"
 
 namespace bisector {
 

@@ -28,8 +28,8 @@ struct FacetSummary {
   Index triangle;   // index in the mesh
 };
 
-// (b - a) x (c - a) at unit length, each coordinate off by at most 60 units of roundoff; the zero vector exactly when the corners
-// are collinear.
+// (b - a) x (c - a) at unit length, each coordinate off by at most 60 units of roundoff; the zero vector exactly when
+// the corners are collinear.
 Vec3 facet_normal(const Vec3& a, const Vec3& b, const Vec3& c);
 
 struct Surface {
@@ -38,14 +38,14 @@ struct Surface {
   explicit Surface(TriangleMesh mesh, std::vector<double> density = {});
 
   TriangleMesh mesh;
-  std::vector<double> density;       // per vertex, or empty
-  std::vector<Facet> facets;         // in a spatial order; exactly collinear triangles are left out
+  std::vector<double> density;          // per vertex, or empty
+  std::vector<Facet> facets;            // in a spatial order; exactly collinear triangles are left out
   std::vector<FacetSummary> summaries;  // of the facets
-  std::vector<Index> used_vertices;  // of the mesh: those that facets use, in a spatial order
-  std::vector<Index> facet_of;       // of each triangle, or kNone
+  std::vector<Index> used_vertices;     // of the mesh: those that facets use, in a spatial order
+  std::vector<Index> facet_of;          // of each triangle, or kNone
   double area = 0;
-  double mass = 0;                   // integral of the density
-  Box box;                           // of the used vertices
+  double mass = 0;  // integral of the density
+  Box box;          // of the used vertices
 };
 
 }  // namespace bisector

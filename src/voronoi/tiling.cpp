@@ -67,8 +67,8 @@ std::size_t count_untiled(const Surface& surface, const RestrictedPolygons& poly
       for (std::size_t k = begin[t]; k < begin[t + 1]; ++k) {
         const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
         for (std::size_t e = 0; e < size; ++e)
-          sides.push_back({polygons.pairs[k].cell, polygons.labels[first + e], polygons.labels[first + (e + size - 1) % size],
-                           polygons.labels[first + (e + 1) % size]});
+          sides.push_back({polygons.pairs[k].cell, polygons.labels[first + e],
+                           polygons.labels[first + (e + size - 1) % size], polygons.labels[first + (e + 1) % size]});
       }
       if (!tiles(sides)) failed.fetch_add(1, std::memory_order_relaxed);
     }

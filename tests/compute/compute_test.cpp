@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "bisector/error.h"
-#include "core/random.h"
-#include "compute/compute.h"
 #include "backend/cpu_backend.h"
 #include "backend/fallback_backend.h"
-#include "cvt/optimise.h"
+#include "bisector/error.h"
 #include "check/parity.h"
+#include "compute/compute.h"
+#include "core/random.h"
+#include "cvt/optimise.h"
 #include "remesh/remesh.h"
 #include "support/diagram.h"
 #include "support/models.h"
@@ -69,7 +69,8 @@ class Compute : public testing::Test {
 
 TEST_F(Compute, CpuOnRequest) {
   for (const Precision precision : {Precision::automatic, Precision::double_}) {
-    const auto backend = make_backend(surface_, {{.kind = DeviceRequest::Kind::cpu}, precision, NeighbourSource::nearest});
+    const auto backend =
+        make_backend(surface_, {{.kind = DeviceRequest::Kind::cpu}, precision, NeighbourSource::nearest});
     EXPECT_EQ(backend->description().kind, "cpu");
     EXPECT_EQ(backend->description().precision, "double");
     EXPECT_EQ(backend->description().fallback, "");
@@ -78,12 +79,13 @@ TEST_F(Compute, CpuOnRequest) {
     const CellMoments moments = evaluate(*backend, seeds_).moments;
     EXPECT_EQ(moments.certification.cpu, moments.certification.uncertain);
   }
-  EXPECT_THROW(make_backend(surface_, {{.kind = DeviceRequest::Kind::cpu}, Precision::single, NeighbourSource::nearest}), Error);
+  EXPECT_THROW(
+      make_backend(surface_, {{.kind = DeviceRequest::Kind::cpu}, Precision::single, NeighbourSource::nearest}), Error);
 }
 
 TEST(DeviceWords, AreRequests) {
-  for (const char* word : {"auto", "cpu", "vulkan", "vulkan:0", "vulkan:12", "vulkan:00000000-0000-0000-0000-00000000dEaD",
-                           "vulkan:0123456789abcdef0123456789abcdef"})
+  for (const char* word : {"auto", "cpu", "vulkan", "vulkan:0", "vulkan:12",
+                           "vulkan:00000000-0000-0000-0000-00000000dEaD", "vulkan:0123456789abcdef0123456789abcdef"})
     EXPECT_EQ(word_of(parse_device(word)), word);
   EXPECT_EQ(parse_device("auto"), DeviceRequest{});
   EXPECT_EQ(parse_device("vulkan:12").index, 12u);
@@ -91,8 +93,9 @@ TEST(DeviceWords, AreRequests) {
 }
 
 TEST(DeviceWords, OthersAreErrors) {
-  for (const char* word : {"", "gpu", "CPU", "cpu ", "vulkan:", "vulkan:x", "vulkan:-1", "vulkan:1e3", "vulkan:1 ",
-                           "vulkan:1234567890", "vulkann", "vulkan:0000", "vulkan:g0000000-0000-0000-0000-000000000000"}) {
+  for (const char* word :
+       {"", "gpu", "CPU", "cpu ", "vulkan:", "vulkan:x", "vulkan:-1", "vulkan:1e3", "vulkan:1 ", "vulkan:1234567890",
+        "vulkann", "vulkan:0000", "vulkan:g0000000-0000-0000-0000-000000000000"}) {
     try {
       parse_device(word);
       ADD_FAILURE() << word;
@@ -156,7 +159,8 @@ TEST_F(Compute, AFailedDeviceIsReplacedOnce) {
   CpuBackend cpu(surface_, NeighbourSource::nearest);
   const Diagram expected = evaluate(cpu, seeds_);
   std::vector<std::string> warnings;
-  FallbackBackend backend(std::make_unique<FailingBackend>(surface_, 1), NeighbourSource::nearest, collecting(warnings));
+  FallbackBackend backend(std::make_unique<FailingBackend>(surface_, 1), NeighbourSource::nearest,
+                          collecting(warnings));
   EXPECT_EQ(&backend.surface(), &surface_);
   EXPECT_EQ(backend.mass_tolerance(), 1e-6);
   test::expect_same_diagram(evaluate(backend, seeds_), expected);
@@ -184,7 +188,8 @@ class BrokenBackend : public CpuBackend {
 };
 
 TEST_F(Compute, OtherErrorsAreNotTheDevices) {
-  FallbackBackend backend(std::make_unique<BrokenBackend>(surface_, NeighbourSource::nearest), NeighbourSource::nearest, {});
+  FallbackBackend backend(std::make_unique<BrokenBackend>(surface_, NeighbourSource::nearest), NeighbourSource::nearest,
+                          {});
   CellMoments moments;
   EXPECT_THROW(backend.evaluate(seeds_, moments), Error);
   EXPECT_EQ(backend.description().fallback, "");
@@ -273,7 +278,8 @@ TEST_F(Compute, ParitySeesEachDifference) {
   EXPECT_NEAR(by_mass.mass_error, 1e-3, 1e-9);
   EXPECT_FALSE(by_mass.bitwise);
   EXPECT_TRUE(by_mass.same_labels && by_mass.same_dual);
-  EXPECT_NEAR(parity([&](Diagram& d) { d.moments.cells[7].first.x += 1e-3 * mass * length; }).centroid_error, 1e-3, 1e-9);
+  EXPECT_NEAR(parity([&](Diagram& d) { d.moments.cells[7].first.x += 1e-3 * mass * length; }).centroid_error, 1e-3,
+              1e-9);
   EXPECT_NEAR(parity([&](Diagram& d) { d.moments.cells[7].second += 1e-3 * mass * mass; }).energy_error, 1e-3, 1e-9);
   EXPECT_NEAR(parity([&](Diagram& d) { d.moments.mass *= 1 + 1e-3; }).sum_error, 1e-3, 1e-9);
   EXPECT_EQ(parity([](Diagram& d) { d.moments.cells[7].mass = NAN; }).mass_error, INFINITY);
@@ -281,7 +287,8 @@ TEST_F(Compute, ParitySeesEachDifference) {
   EXPECT_FALSE(parity([](Diagram& d) { ++d.polygons.pairs.back().cell; }).same_pairs);
   EXPECT_FALSE(parity([](Diagram& d) { std::swap(d.polygons.labels[0], d.polygons.labels[1]); }).same_labels);
   EXPECT_FALSE(parity([](Diagram& d) { d.polygons = {}; }).same_dual);
-  EXPECT_FALSE(parity([](Diagram& d) { d.polygons.vertices[0].x = std::nextafter(d.polygons.vertices[0].x, 9.0); }).bitwise);
+  EXPECT_FALSE(
+      parity([](Diagram& d) { d.polygons.vertices[0].x = std::nextafter(d.polygons.vertices[0].x, 9.0); }).bitwise);
 }
 
 }  // namespace

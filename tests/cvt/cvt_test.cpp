@@ -17,10 +17,10 @@
 #include "cvt/lbfgs.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
-#include "support/run.h"
 #include "mesh/topology.h"
 #include "support/diagram.h"
 #include "support/models.h"
+#include "support/run.h"
 
 namespace bisector::test {
 namespace {
@@ -401,7 +401,8 @@ TEST(Optimise, OneSeedFindsTheCentroid) {
   EXPECT_LE(free.run.totals.iterations, 10);
 }
 
-// A diagram belongs to the seeds that it was computed for: as long as they stay it is not computed again, and never used for others.
+// A diagram belongs to the seeds that it was computed for: as long as they stay it is not computed again, and never
+// used for others.
 TEST(CvtRunTest, EvaluatesTheSameSeedsOnce) {
   const TriangleMesh mesh = torus(24, 16);
   const Surface surface(mesh);

@@ -64,7 +64,7 @@ TEST(Curvature, OfASphereIsTheReciprocalOfItsRadius) {
 }
 
 TEST(Curvature, OfACylinderIsAcrossItsAxis) {
-  for (const auto &[jitter, tolerance] : {std::pair{0.0, 0.03}, {0.3, 0.06}}) {
+  for (const auto& [jitter, tolerance] : {std::pair{0.0, 0.03}, {0.3, 0.06}}) {
     const int nu = 60, nv = 40;
     const TriangleMesh mesh = tube(nu, nv, 2, 8, jitter, false);
     const PrincipalCurvatures c = principal_curvatures(mesh);

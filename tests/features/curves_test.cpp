@@ -1,4 +1,5 @@
-// Seeds on feature curves: places, gradients along them, which cells a curve runs through, and its recovery in the dual.
+// Seeds on feature curves: places, gradients along them, which cells a curve runs through, and its recovery in the
+// dual.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -149,7 +150,9 @@ TEST(CurveMeasure, PositionsInvertMeasuresAndFollowTheDensity) {
       EXPECT_NEAR(length, 1 / (1 + 3 * p.x), 0.2 * length);
     }
   const PlacedSeeds placed = seeds_on_features(curves, measure, 0.1);
-  EXPECT_EQ(std::count_if(placed.places().begin(), placed.places().end(), [](const SeedPlace& p) { return p.corner != kNone; }), 8);
+  EXPECT_EQ(std::count_if(placed.places().begin(), placed.places().end(),
+                          [](const SeedPlace& p) { return p.corner != kNone; }),
+            8);
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const SeedPlace& p = placed.place(i);
     const Vec3 at = p.corner != kNone ? curves.corner(p.corner) : curves.point(p.curve, p.position);
@@ -165,7 +168,8 @@ TEST(FeatureTrace, IntervalsCoverEachCurveAndBelongToTheNearestSeed) {
     const Surface surface(model.mesh);
     const FeatureCurves curves(sharp_graph(model.mesh), model.mesh.vertices);
     const FeatureTrace trace(surface, curves);
-    for (const std::vector<Vec3>& seeds : {random_seeds(model.mesh, 60, 4), vertex_seeds(model.mesh), grid_seeds(model.mesh, 4, 4, 4)}) {
+    for (const std::vector<Vec3>& seeds :
+         {random_seeds(model.mesh, 60, 4), vertex_seeds(model.mesh), grid_seeds(model.mesh, 4, 4, 4)}) {
       const Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
       const auto traces = trace.trace(diagram.polygons);
       ASSERT_EQ(traces.size(), curves.size());
@@ -216,7 +220,8 @@ TEST_P(Recovery, EveryCurveIsAChainOfDualEdges) {
     const FeatureReport report = recover_features(run, trace, measure, measure.scale(count), options);
     EXPECT_TRUE(report.broken.empty());
 
-    // The chains are edges of the dual, and as long as the curves but for what chords cut off; each corner is among them.
+    // The chains are edges of the dual, and as long as the curves but for what chords cut off; each corner is among
+    // them.
     const Dual& dual = run.diagram(Want::polygons | Want::dual).dual;
     std::set<std::array<Index, 2>> dual_edges;
     for (const Triangle& t : dual.triangles)
@@ -242,7 +247,9 @@ TEST_P(Recovery, EveryCurveIsAChainOfDualEdges) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, Recovery, testing::Range(0, static_cast<int>(featured_models().size())),
-                         [](const auto& test) { return std::string(featured_models()[static_cast<std::size_t>(test.param)].name); });
+                         [](const auto& test) {
+                           return std::string(featured_models()[static_cast<std::size_t>(test.param)].name);
+                         });
 
 TEST(RecoveryReport, AMissingCurveIsReported) {
   const TriangleMesh mesh = box(4);

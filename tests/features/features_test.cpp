@@ -32,8 +32,8 @@ FeatureGraph detect(const TriangleMesh& mesh, FeatureMode mode = FeatureMode::au
 }
 
 std::size_t count(const FeatureGraph& graph, FeatureKind kind) {
-  return static_cast<std::size_t>(std::count_if(graph.curves.begin(), graph.curves.end(),
-                                                [&](const FeatureCurve& c) { return c.kind == kind; }));
+  return static_cast<std::size_t>(
+      std::count_if(graph.curves.begin(), graph.curves.end(), [&](const FeatureCurve& c) { return c.kind == kind; }));
 }
 
 std::size_t count_closed(const FeatureGraph& graph) {
@@ -62,8 +62,7 @@ void expect_consistent(const FeatureGraph& graph) {
   std::map<Index, int> degree;
   for (const Edge& e : graph.edges)
     for (const Index v : e) ++degree[v];
-  for (const auto& [v, d] : degree)
-    EXPECT_TRUE(d == 2 || corners.count(v)) << v;
+  for (const auto& [v, d] : degree) EXPECT_TRUE(d == 2 || corners.count(v)) << v;
 }
 
 // A profile turned about z with n segments: points (r, z) from top to bottom, oriented outward; radius 0 is a pole.
@@ -197,8 +196,7 @@ TEST(Features, AnLBracketKeepsItsValley) {
 TEST(Features, ACreaseThatFadesOutEndsInADart) {
   // A roof whose fold falls from 90 degrees at x = 0 to nothing at x = 1.
   const int n = 40;
-  const TriangleMesh mesh =
-      height_field(n, [](double x, double y) { return -(1 - x) * std::abs(y - 0.5); });
+  const TriangleMesh mesh = height_field(n, [](double x, double y) { return -(1 - x) * std::abs(y - 0.5); });
   const FeatureGraph graph = detect(mesh);
   expect_consistent(graph);
   ASSERT_EQ(count(graph, FeatureKind::crease), 1u);
@@ -256,8 +254,8 @@ TEST(Features, AMoebiusStripHasOneBorder) {
   for (int i = 0; i < n; ++i)
     for (const double w : {-0.3, 0.0, 0.3}) {
       const double a = 2 * kPi * i / n;
-      mesh.vertices.push_back({(1 + w * std::cos(a / 2)) * std::cos(a), (1 + w * std::cos(a / 2)) * std::sin(a),
-                               w * std::sin(a / 2)});
+      mesh.vertices.push_back(
+          {(1 + w * std::cos(a / 2)) * std::cos(a), (1 + w * std::cos(a / 2)) * std::sin(a), w * std::sin(a / 2)});
     }
   for (Index i = 0; i < n; ++i)
     for (Index k = 0; k < 2; ++k) {
@@ -287,8 +285,8 @@ TEST(Features, AVertexOfTwoFansIsACorner) {
   const TriangleMesh one = icosphere(3);
   TriangleMesh mesh = one;
   const Index n = static_cast<Index>(one.vertices.size());
-  for (const Vec3& p : one.vertices) mesh.vertices.push_back({2 * one.vertices[0].x - p.x, 2 * one.vertices[0].y - p.y,
-                                                              2 * one.vertices[0].z - p.z});
+  for (const Vec3& p : one.vertices)
+    mesh.vertices.push_back({2 * one.vertices[0].x - p.x, 2 * one.vertices[0].y - p.y, 2 * one.vertices[0].z - p.z});
   for (const Triangle& t : one.triangles) {
     Triangle other{t[1], t[0], t[2]};
     for (Index& v : other) v = v == 0 ? 0 : v + n;

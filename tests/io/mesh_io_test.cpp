@@ -183,12 +183,14 @@ const std::vector<std::array<float, 9>> kTwoFacets{{0, 0, 0, 1, 0, 0, 0, 1, 0}, 
 
 constexpr const char* kOff = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
 constexpr const char* kObj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1/1/1 3//2 4/3\n";
-constexpr const char* kPly = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
-                             "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
-                             "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
-constexpr const char* kStl = "solid square\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\n"
-                             "endloop\nendfacet\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 1 0\n"
-                             "vertex 0 1 0\nendloop\nendfacet\nendsolid square\n";
+constexpr const char* kPly =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+constexpr const char* kStl =
+    "solid square\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\n"
+    "endloop\nendfacet\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 1 0\n"
+    "vertex 0 1 0\nendloop\nendfacet\nendsolid square\n";
 
 const TriangleMesh kSquare{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}};
 
@@ -248,17 +250,19 @@ TEST_F(Io, ToleratesHowTextIsLaidOut) {
           replaced(plain, "1 1 0", "1. 10e-1 1e-999"), replaced(plain, "\n", " \n")})
       expect_same(read(name, variant), kSquare);
   }
-  expect_same(read("a.off", "# head\n\nOFF # magic\n#\n4 2 0#counts\n0 0 0\n\n#\n1 0 0 # x\n1 1 0\n0 1 0\n"
-                            "3 0 1 2\n3 0 2 3 255 0 0"),
+  expect_same(read("a.off",
+                   "# head\n\nOFF # magic\n#\n4 2 0#counts\n0 0 0\n\n#\n1 0 0 # x\n1 1 0\n0 1 0\n"
+                   "3 0 1 2\n3 0 2 3 255 0 0"),
               kSquare);
   expect_same(read("a.off", "OFF 4 2\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 0.5 0.5 0.5\n3 0 2 3\n"), kSquare);
   for (const char* header : {"COFF", "NOFF", "STOFF", "STCNOFF"})
     expect_same(read("a.off", std::string(header) + "\n4 2 0\n0 0 0 1 2 3 4\n1 0 0 1 2 3 4\n1 1 0 1 2 3 4\n"
                                                     "0 1 0 1 2 3 4\n3 0 1 2\n3 0 2 3\n"),
                 kSquare);
-  expect_same(read("a.obj", "mtllib a.mtl\no thing\nv 0 0 0 1\nv 1 0 \\\n 0\nv 1 1 0 0.5 0.5 0.5\n# path C:\\\n"
-                            "v 0 1 0\nvt 0 0\nvn 0 0 1\ng a\ns off\nusemtl m\nf -4 -3/1 \\\r\n -2//1\n"
-                            "p 1\nf 1/1/1 3/1/1 4/1/1\n"),
+  expect_same(read("a.obj",
+                   "mtllib a.mtl\no thing\nv 0 0 0 1\nv 1 0 \\\n 0\nv 1 1 0 0.5 0.5 0.5\n# path C:\\\n"
+                   "v 0 1 0\nvt 0 0\nvn 0 0 1\ng a\ns off\nusemtl m\nf -4 -3/1 \\\r\n -2//1\n"
+                   "p 1\nf 1/1/1 3/1/1 4/1/1\n"),
               kSquare);
   expect_same(read("a.obj", "f 1 2 3\nf 1 3 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"), kSquare);
   expect_same(read("a.stl", replaced(replaced(kStl, "facet", "FACET"), "solid", "Solid")), kSquare);
@@ -270,14 +274,14 @@ TEST_F(Io, ReadsPlyOfAnyTypeAndOrder) {
   const TriangleMesh little = read("a.ply", rich_ply(false));
   EXPECT_TRUE(warnings_.empty());
   expect_same(read("a.ply", rich_ply(true)), little);
-  const TriangleMesh expected{{{0, 0, 0}, {-3, 0, 0}, {0, 1.5, 0}, {0, 0, 0.1}},
-                              {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}},
-                              {}};
+  const TriangleMesh expected{
+      {{0, 0, 0}, {-3, 0, 0}, {0, 1.5, 0}, {0, 0, 0.1}}, {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}, {}};
   expect_same(little, expected);
   // Faces before vertices.
-  expect_same(read("a.ply", "ply\nformat ascii 1.0\nelement face 2\nproperty list int int vertex_indices\n"
-                            "element vertex 4\nproperty double z\nproperty double x\nproperty double y\n"
-                            "property int extra\nend_header\n3 0 1 2\n3 0 2 3\n0 0 0 7\n0 1 0 7\n0 1 1 7\n0 0 1 7\n"),
+  expect_same(read("a.ply",
+                   "ply\nformat ascii 1.0\nelement face 2\nproperty list int int vertex_indices\n"
+                   "element vertex 4\nproperty double z\nproperty double x\nproperty double y\n"
+                   "property int extra\nend_header\n3 0 1 2\n3 0 2 3\n0 0 0 7\n0 1 0 7\n0 1 1 7\n0 0 1 7\n"),
               kSquare);
 }
 
@@ -292,8 +296,9 @@ TEST_F(Io, ReadsBinaryStlThatBeginsWithSolid) {
 }
 
 TEST_F(Io, CountsWhatItToleratesInOneWarningEach) {
-  const TriangleMesh mesh = read("a.off", "OFF\n7 4 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n2 0 0\n9 9 9\n8 8 8\n"
-                                          "4 0 1 2 3\n3 0 1 2\n3 0 1 4\n3 2 2 3\nmore\nand more\n");
+  const TriangleMesh mesh = read("a.off",
+                                 "OFF\n7 4 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n2 0 0\n9 9 9\n8 8 8\n"
+                                 "4 0 1 2 3\n3 0 1 2\n3 0 1 4\n3 2 2 3\nmore\nand more\n");
   EXPECT_EQ(mesh.vertices.size(), 7u);
   EXPECT_EQ(mesh.triangles.size(), 5u);
   EXPECT_EQ(mesh.face_of_triangle, (std::vector<Index>{0, 0, 1, 2, 3}));
@@ -400,9 +405,10 @@ struct Malformed {
 TEST_F(Io, RefusesMalformedFilesInOneLine) {
   const std::string off = kOff, obj = kObj, ply = kPly, stl = kStl;
   const std::string bstl = binary_stl(kTwoFacets), bply = rich_ply(false);
-  const std::string bply_head = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
-                                "property float y\nproperty float z\nelement face 1\n"
-                                "property list uint int vertex_indices\nend_header\n";
+  const std::string bply_head =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+      "property float y\nproperty float z\nelement face 1\n"
+      "property list uint int vertex_indices\nend_header\n";
   const auto bply_with = [&](float x, std::uint32_t degree, std::int32_t index) {
     std::string bytes = bply_head;
     for (int i = 0; i < 9; ++i) put(bytes, i == 4 ? x : static_cast<float>(i * i));
@@ -580,10 +586,16 @@ TEST_F(Io, SurvivesTruncationAndDamage) {
   write_mesh(path("marked.obj"), marked_square());
   write_mesh(path("marked.ply"), marked_square());
   const std::vector<std::pair<const char*, std::string>> valid{
-      {"a.obj", slurp(path("marked.obj"))}, {"a.ply", slurp(path("marked.ply"))},
-      {"a.off", kOff}, {"a.off", replaced(kOff, "3 0 1 2\n3 0 2 3", "4 0 1 2 3\n4 3 2 1 0")}, {"a.obj", kObj},
-      {"a.ply", kPly}, {"a.ply", rich_ply(false)}, {"a.ply", rich_ply(true)},
-      {"a.stl", kStl}, {"a.stl", binary_stl(kTwoFacets)}};
+      {"a.obj", slurp(path("marked.obj"))},
+      {"a.ply", slurp(path("marked.ply"))},
+      {"a.off", kOff},
+      {"a.off", replaced(kOff, "3 0 1 2\n3 0 2 3", "4 0 1 2 3\n4 3 2 1 0")},
+      {"a.obj", kObj},
+      {"a.ply", kPly},
+      {"a.ply", rich_ply(false)},
+      {"a.ply", rich_ply(true)},
+      {"a.stl", kStl},
+      {"a.stl", binary_stl(kTwoFacets)}};
   SplitMix64 random(1);
   std::size_t refused = 0, accepted = 0;
   for (const auto& [name, bytes] : valid)
@@ -651,11 +663,12 @@ TEST_F(Io, LabelsAndFeatureEdgesRoundTrip) {
 }
 
 TEST_F(Io, ReadsLabelsOfPly) {
-  const std::string head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
-                           "property float z\nelement face 2\nproperty TYPE label\n"
-                           "property list uchar int vertex_indices\nelement edge 2\nproperty float length\n"
-                           "property uchar vertex2\nproperty short vertex1\nend_header\n"
-                           "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 2\nproperty TYPE label\n"
+      "property list uchar int vertex_indices\nelement edge 2\nproperty float length\n"
+      "property uchar vertex2\nproperty short vertex1\nend_header\n"
+      "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
   for (const char* type : {"char", "uchar", "short", "ushort", "int", "uint"}) {
     const TriangleMesh mesh =
         read("a.ply", replaced(head, "TYPE", type) + "5 4 0 1 2 3\n9 3 0 1 2\n1.5 3 2\n2.5 1 2\n");
@@ -722,7 +735,8 @@ TEST_F(Io, ReadsFeatureEdges) {
                                     {"-1 0\n", ":1: index -1 is out of range"},
                                     {"0 1\n# no\n3 1\n", ":3: 3 1 is not an edge"},
                                     {"1 1\n", ":1: 1 1 is not an edge"},
-                                    {"a b\n", ":1: 'a' is not an integer"}, {"", ": the file is empty"}}) {
+                                    {"a b\n", ":1: 'a' is not an integer"},
+                                    {"", ": the file is empty"}}) {
     const std::string file = store("e.txt", text);
     try {
       read_feature_edges(file, kSquare);
@@ -736,9 +750,10 @@ TEST_F(Io, ReadsFeatureEdges) {
 TEST_F(Io, ReadsVertexAttributes) {
   EXPECT_EQ(read_vertex_attribute(store("a.ply", rich_ply(false)), "red"), (std::vector<double>{200, 200, 200, 200}));
   EXPECT_EQ(read_vertex_attribute(store("a.ply", rich_ply(true)), "z"), (std::vector<double>{0, 0, 0, 0.1}));
-  const std::string text = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n"
-                           "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                           "property double size\nend_header\n3 0 1 2\n0 0 0 1.5\n1 0 0 -2\n0 1 0 1e-3\n";
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n"
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property double size\nend_header\n3 0 1 2\n0 0 0 1.5\n1 0 0 -2\n0 1 0 1e-3\n";
   EXPECT_EQ(read_vertex_attribute(store("a.ply", text), "size"), (std::vector<double>{1.5, -2, 1e-3}));
   const auto message = [&](const std::string& file, const char* name) -> std::string {
     largest_allocation = 0;
@@ -764,7 +779,8 @@ TEST_F(Io, ReadsVertexAttributes) {
 TEST_F(Io, ReadsPoints) {
   const std::vector<Vec3> expected{{1, 2, 3}, {-0.5, 1e-3, 4}};
   EXPECT_EQ(read_points(store("a.xyz", "# seeds\n1 2 3\n\n -5e-1\t+0.001 4 0 0 1 # normal\r\n")), expected);
-  for (const auto& [text, place] : {std::pair{"", ": the file is empty"}, {"# none\n", ":2: there is no point"},
+  for (const auto& [text, place] : {std::pair{"", ": the file is empty"},
+                                    {"# none\n", ":2: there is no point"},
                                     {"1 2 3\n1 2\n", ":2: a number is missing"},
                                     {"1 2 inf\n", ":1: a coordinate is not finite"},
                                     {"x y z\n", ":1: 'x' is not a number"}}) {

@@ -214,28 +214,22 @@ std::string gmsh_41(bool binary, bool big) {
   std::string out = binary ? "$MeshFormat\n4.1 1 8\n" : "$MeshFormat\n4.1 0 8\n";
   const auto ints = [&](std::initializer_list<std::int32_t> values) {
     for (const std::int32_t x : values) {
-      if (binary)
-        put(out, x, big);
-      else
-        out += std::to_string(x) + " ";
+      if (binary) put(out, x, big);
+      else out += std::to_string(x) + " ";
     }
   };
   const auto sizes = [&](std::initializer_list<std::uint64_t> values) {
     for (const std::uint64_t x : values) {
-      if (binary)
-        put(out, x, big);
-      else
-        out += std::to_string(x) + "\n";
+      if (binary) put(out, x, big);
+      else out += std::to_string(x) + "\n";
     }
   };
   const auto reals = [&](std::initializer_list<double> values) {
     for (const double x : values) {
       std::ostringstream text;
       text << x << ' ';
-      if (binary)
-        put(out, x, big);
-      else
-        out += text.str();
+      if (binary) put(out, x, big);
+      else out += text.str();
     }
   };
   if (binary) {
@@ -304,19 +298,14 @@ std::string vtk(bool binary, bool new_cells) {
   const auto real = [&](double x) {
     std::ostringstream text;
     text << x << ' ';
-    if (binary)
-      put(out, x, true);
-    else
-      out += text.str();
+    if (binary) put(out, x, true);
+    else out += text.str();
   };
   const auto integers = [&](std::initializer_list<int> values, bool wide = false) {
     for (const int x : values) {
-      if (!binary)
-        out += std::to_string(x) + " ";
-      else if (wide)
-        put<std::int64_t>(out, x, true);
-      else
-        put<std::int32_t>(out, x, true);
+      if (!binary) out += std::to_string(x) + " ";
+      else if (wide) put<std::int64_t>(out, x, true);
+      else put<std::int32_t>(out, x, true);
     }
     out += "\n";
   };

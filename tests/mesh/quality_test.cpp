@@ -312,7 +312,8 @@ TEST(Quality, OfRealModels) {
   }
 }
 
-// Turning any triangles of an orientable mesh over is undone, up to the side that most of them were on; a Moebius strip cannot be.
+// Turning any triangles of an orientable mesh over is undone, up to the side that most of them were on; a Moebius strip
+// cannot be.
 TEST(Orient, UndoesFlips) {
   for (const TriangleMesh& mesh : {icosphere(2), torus(20, 12), wavy_patch(6), two_spheres(), pages()}) {
     SplitMix64 random(3);

@@ -1,6 +1,6 @@
-// One test body for every backend, precision and source of neighbours: the combinatorics are those of the CPU, moments agree to
-// rounding, and runs repeat bit for bit. The reference is always the CPU with the nearest seeds. Errors are relative to cell size
-// as cvt/parity.h defines it.
+// One test body for every backend, precision and source of neighbours: the combinatorics are those of the CPU, moments
+// agree to rounding, and runs repeat bit for bit. The reference is always the CPU with the nearest seeds. Errors are
+// relative to cell size as cvt/parity.h defines it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,10 +20,10 @@
 #include "host/passes/vulkan_backend.h"
 #include "remesh/remesh.h"
 #include "remesh/topology_control.h"
-#include "voronoi/dual.h"
 #include "support/models.h"
 #include "support/run.h"
 #include "support/setups.h"
+#include "voronoi/dual.h"
 
 namespace bisector::test {
 namespace {
@@ -107,9 +107,8 @@ std::vector<SeedSet> seed_sets(const Surface& surface, std::size_t count, Choice
   const TriangleMesh& mesh = surface.mesh;
   const std::vector<Vec3> random = random_seeds(mesh, count, 15);
   const int side = std::max(4, static_cast<int>(std::cbrt(count)));
-  std::vector<SeedSet> sets{{"random", random},
-                            {"clustered", clustered_seeds(mesh, count)},
-                            {"grid", grid_seeds(mesh, side, side, side)}};
+  std::vector<SeedSet> sets{
+      {"random", random}, {"clustered", clustered_seeds(mesh, count)}, {"grid", grid_seeds(mesh, side, side, side)}};
   if (choice == Choice::weighted) return sets;
   sets.push_back({"optimised", optimised_seeds(surface, random)});
   sets.push_back({"vertices", some_vertices(mesh, 2 * count)});
@@ -169,15 +168,15 @@ std::vector<Model> models() {
   add("thin_sheets", 600, [] { return thin_sheets(); });
   add("one_triangle", 2000, [] { return single_triangle(); });  // thousands of cells per facet
   add("box_of_12", 1200, [] { return box(1); });
-  add("fine_sphere", 50, [] { return icosphere(5); });          // hundreds of facets per cell
+  add("fine_sphere", 50, [] { return icosphere(5); });  // hundreds of facets per cell
   add("needles", 300, [] { return needles(); });
   add("collinear", 300, [] { return collinear_among_good(); });
   add("duplicated_triangles", 300, [] { return duplicated_triangles(); });
   add("far_torus", 400, [] { return transformed(torus(32, 20), {1, 1, 1}, {1e6, -2e6, 3e6}); });
   add("tiny_torus", 400, [] { return transformed(torus(32, 20), {1e-6, 1e-6, 1e-6}, {}); });
   add("huge_torus", 400, [] { return transformed(torus(32, 20), {1e6, 1e6, 1e6}, {}); });
-  for (const char* name : {"anchor.off", "beetle.obj", "bunny.off", "camel.off", "elephant.off", "face.obj", "fandisk.off",
-                           "homer.obj", "igea.ply"})
+  for (const char* name : {"anchor.off", "beetle.obj", "bunny.off", "camel.off", "elephant.off", "face.obj",
+                           "fandisk.off", "homer.obj", "igea.ply"})
     all.push_back({name,
                    [name] {
                      const std::string path = shared_model(name);
@@ -212,7 +211,8 @@ struct Problem {
   std::vector<SeedSet> sets;
 };
 
-// With and without density; empty where the model is absent. The last model's are kept for the next setup in the same process.
+// With and without density; empty where the model is absent. The last model's are kept for the next setup in the same
+// process.
 const std::vector<std::unique_ptr<Problem>>& problems_of(const Model& model) {
   static std::string last;
   static std::vector<std::unique_ptr<Problem>> problems;
@@ -258,7 +258,9 @@ struct DiagramCase {
   Model model;
 };
 
-void PrintTo(const DiagramCase& instance, std::ostream* out) { *out << name_of(instance.setup) << " " << instance.model.name; }
+void PrintTo(const DiagramCase& instance, std::ostream* out) {
+  *out << name_of(instance.setup) << " " << instance.model.name;
+}
 
 class Diagrams : public testing::TestWithParam<DiagramCase> {};
 
@@ -458,7 +460,8 @@ std::vector<CertificationCase> certification_cases() {
 
 std::string certification_case_name(const testing::TestParamInfo<CertificationCase>& instance) {
   const auto& [processor, model, grid] = instance.param;
-  return test_name(std::string(processor == Processor::single ? "single_" : "double_") + model + (grid ? "_grid" : "_random"));
+  return test_name(std::string(processor == Processor::single ? "single_" : "double_") + model +
+                   (grid ? "_grid" : "_random"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Parity, Certified, testing::ValuesIn(certification_cases()), certification_case_name);

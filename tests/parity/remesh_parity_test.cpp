@@ -1,5 +1,5 @@
-// Remeshing with densities and features on every backend: in double the whole run is the CPU's bit for bit; in single, where
-// rounding leads to other seeds, their diagrams are the same combinatorially, and features and topology are kept.
+// Remeshing with densities and features on every backend: in double the whole run is the CPU's bit for bit; in single,
+// where rounding leads to other seeds, their diagrams are the same combinatorially, and features and topology are kept.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,13 +13,13 @@
 
 #include "backend/cpu_backend.h"
 #include "remesh/prepare.h"
-#include "remesh/topology_control.h"
 #include "remesh/remesh.h"
-#include "voronoi/ball_property.h"
-#include "voronoi/dual.h"
+#include "remesh/topology_control.h"
 #include "support/featured.h"
 #include "support/models.h"
 #include "support/setups.h"
+#include "voronoi/ball_property.h"
+#include "voronoi/dual.h"
 
 namespace bisector::test {
 namespace {
@@ -44,8 +44,8 @@ TriangleMesh flattened(TriangleMesh mesh, double factor) {
   return mesh;
 }
 
-// Creases with acute and obtuse angles, closed creases, local feature size without features, a border, and sheets that share an
-// edge.
+// Creases with acute and obtuse angles, closed creases, local feature size without features, a border, and sheets that
+// share an edge.
 std::vector<RemeshCase> remesh_cases() {
   return {{"leaning_box", leaning(box(4), 0.8), DensityKind::attribute, 200},
           {"drum", cylinder(32), DensityKind::lfs, 150},
@@ -64,8 +64,7 @@ std::vector<double> graded_density(const TriangleMesh& mesh) {
 }
 
 struct PreparedCase {
-  explicit PreparedCase(const RemeshCase& problem)
-      : PreparedCase(prepared(problem), problem.vertices) {}
+  explicit PreparedCase(const RemeshCase& problem) : PreparedCase(prepared(problem), problem.vertices) {}
 
   RemeshResult run_on(Backend& backend) const { return remesh(backend, features, plan_of(options)); }
 
@@ -135,8 +134,8 @@ double length_of(const FeatureEdges& edges, const std::vector<Vec3>& vertices) {
   return sum;
 }
 
-// The graph of the result's feature edges is the input's, drawn with chords: each corner is there with as many edges, every
-// other vertex has two, and no more length is missing than chords cut off.
+// The graph of the result's feature edges is the input's, drawn with chords: each corner is there with as many edges,
+// every other vertex has two, and no more length is missing than chords cut off.
 void expect_features_kept(const PreparedCase& problem, const RemeshResult& result) {
   const TriangleMesh& mesh = result.mesh;
   EXPECT_EQ(result.features.broken, 0u);
@@ -173,7 +172,9 @@ struct RunCase {
   RemeshCase problem;
 };
 
-void PrintTo(const RunCase& instance, std::ostream* out) { *out << name_of(instance.setup) << " " << instance.problem.name; }
+void PrintTo(const RunCase& instance, std::ostream* out) {
+  *out << name_of(instance.setup) << " " << instance.problem.name;
+}
 
 class RemeshRuns : public testing::TestWithParam<RunCase> {};
 
@@ -202,12 +203,14 @@ TEST_P(RemeshRuns, AreTheCpus) {
   EXPECT_TRUE(dual.triangles == found.mesh.triangles) << "not the dual of its vertices";
 }
 
-// Runs on software devices take seconds; with the other source of neighbours only diagrams and gradients are tried there.
+// Runs on software devices take seconds; with the other source of neighbours only diagrams and gradients are tried
+// there.
 std::vector<RunCase> run_cases() {
   std::vector<RunCase> cases;
   for (const RemeshCase& problem : remesh_cases())
     for (const Setup& setup : setups())
-      if (setup.source == NeighbourSource::nearest || setup.processor == Processor::cpu) cases.push_back({setup, problem});
+      if (setup.source == NeighbourSource::nearest || setup.processor == Processor::cpu)
+        cases.push_back({setup, problem});
   return cases;
 }
 
@@ -239,7 +242,8 @@ TEST_P(PlacedGradients, AreTheCpusAndTheSlopeOfTheEnergy) {
         const double mass = reference.moments.step_mass[i];
         const double length2 = std::max(mass * surface.area / surface.mass, reference.moments.cells[i].second / mass);
         EXPECT_LE(norm(found.gradient.vectors[i] - reference.gradient.vectors[i]),
-                  2 * tolerance_of(setup.processor).cells * mass * std::sqrt(length2)) << "seed " << i;
+                  2 * tolerance_of(setup.processor).cells * mass * std::sqrt(length2))
+            << "seed " << i;
       }
       expect_slopes(*backend, problem, found, {5e-4, 2e-3, 20});
     } else {

@@ -1,6 +1,6 @@
-// One test body for every backend of solids, precision and source of neighbours: pairs, polyhedra and dual are those of the CPU,
-// moments agree to rounding (in double to the bit), and runs repeat bit for bit. The reference is always the CPU with the nearest
-// seeds.
+// One test body for every backend of solids, precision and source of neighbours: pairs, polyhedra and dual are those of
+// the CPU, moments agree to rounding (in double to the bit), and runs repeat bit for bit. The reference is always the
+// CPU with the nearest seeds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "bisector/error.h"
 #include "backend/cpu_backend.h"
+#include "bisector/error.h"
 #include "compute/compute.h"
 #include "host/passes/vulkan_solid_backend.h"
 #include "support/models.h"
@@ -24,8 +24,10 @@ namespace {
 
 // --- Solids ---
 
-// Cells of an n x n x n grid over the unit cube for which keep(i, j, k) holds, in six tetrahedra each about its diagonal.
-TetMesh crate(Index n, const std::function<bool(Index, Index, Index)>& keep = [](Index, Index, Index) { return true; }) {
+// Cells of an n x n x n grid over the unit cube for which keep(i, j, k) holds, in six tetrahedra each about its
+// diagonal.
+TetMesh crate(
+    Index n, const std::function<bool(Index, Index, Index)>& keep = [](Index, Index, Index) { return true; }) {
   TetMesh mesh;
   for (Index k = 0; k <= n; ++k)
     for (Index j = 0; j <= n; ++j)
@@ -73,14 +75,31 @@ std::vector<Model> models() {
       {"tet", [] { return single_tet(); }, 60},
       {"shaken", [] { return shaken_crate(4); }, 60},
       {"ball", [] { return ball(2); }, 120},
-      {"frame", [] { return crate(3, [](Index i, Index j, Index k) { return (i != 1) + (j != 1) + (k != 1) >= 2; }); }, 80},
+      {"frame", [] { return crate(3, [](Index i, Index j, Index k) { return (i != 1) + (j != 1) + (k != 1) >= 2; }); },
+       80},
       {"hollow", [] { return hollow(); }, 150},
       {"islands", [] { return crate(3, [](Index i, Index j, Index k) { return i != 1 && j != 1 && k != 1; }); }, 60},
       {"slivers", [] { return slivers(); }, 40},
-      {"plate", [] { return transformed(crate(3), {1, 1, 0x1p-6}, {}); }, 60},
-      {"far", [] { return transformed(shaken_crate(2), {1, 1, 1}, {1e5, -2e5, 3e5}); }, 60},
-      {"tiny", [] { return transformed(shaken_crate(2), {1e-6, 1e-6, 1e-6}, {}); }, 60},
-      {"huge", [] { return transformed(shaken_crate(2), {1e6, 1e6, 1e6}, {}); }, 60},
+      {"plate",
+       [] {
+         return transformed(crate(3), {1, 1, 0x1p-6}, {});
+       },
+       60},
+      {"far",
+       [] {
+         return transformed(shaken_crate(2), {1, 1, 1}, {1e5, -2e5, 3e5});
+       },
+       60},
+      {"tiny",
+       [] {
+         return transformed(shaken_crate(2), {1e-6, 1e-6, 1e-6}, {});
+       },
+       60},
+      {"huge",
+       [] {
+         return transformed(shaken_crate(2), {1e6, 1e6, 1e6}, {});
+       },
+       60},
   };
 }
 
@@ -218,7 +237,8 @@ std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Setup& setup,
   host::VulkanOptions options;
   options.precision = precision_of(setup.processor);
   options.neighbours = setup.source;
-  return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor).value()), options, inner);
+  return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor).value()), options,
+                                         inner);
 }
 
 struct ModelCase {
@@ -226,7 +246,9 @@ struct ModelCase {
   Model model;
 };
 
-void PrintTo(const ModelCase& instance, std::ostream* out) { *out << name_of(instance.setup) << " " << instance.model.name; }
+void PrintTo(const ModelCase& instance, std::ostream* out) {
+  *out << name_of(instance.setup) << " " << instance.model.name;
+}
 
 class Solids : public testing::TestWithParam<ModelCase> {};
 
@@ -239,8 +261,9 @@ TEST_P(Solids, AreTheCpus) {
     bool uniform;
     InnerCells inner;
   };
-  for (const auto& [name, uniform, inner] : {Mode{"whole", true, InnerCells::whole}, Mode{"clipped", true, InnerCells::clipped},
-                                             Mode{"weighted", false, InnerCells::whole}}) {
+  for (const auto& [name, uniform, inner] :
+       {Mode{"whole", true, InnerCells::whole}, Mode{"clipped", true, InnerCells::clipped},
+        Mode{"weighted", false, InnerCells::whole}}) {
     SCOPED_TRACE(name);
     const Solid solid(mesh, uniform ? std::vector<double>{} : varied_density(mesh));
     CpuSolidBackend cpu(solid, NeighbourSource::nearest, inner);

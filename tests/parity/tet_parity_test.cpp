@@ -1,5 +1,5 @@
-// Tetrahedral meshing on every backend: in double the whole run is the CPU's bit for bit; in single, where rounding leads to
-// other sites, the mesh is as valid.
+// Tetrahedral meshing on every backend: in double the whole run is the CPU's bit for bit; in single, where rounding
+// leads to other sites, the mesh is as valid.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -9,7 +9,6 @@
 #include "bisector/tetmesh.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
-#include "bisector/tetmesh.h"
 #include "support/setups.h"
 #include "support/solids.h"
 
@@ -23,14 +22,18 @@ struct RunCase {
 };
 
 // Features, a reentrant edge, and a density.
-std::vector<RunCase> run_cases() { return {{"box", tet_box(1), false}, {"step", step(), false}, {"graded", tet_box(2), true}}; }
+std::vector<RunCase> run_cases() {
+  return {{"box", tet_box(1), false}, {"step", step(), false}, {"graded", tet_box(2), true}};
+}
 
 struct Instance {
   Setup setup;
   RunCase problem;
 };
 
-void PrintTo(const Instance& instance, std::ostream* out) { *out << name_of(instance.setup) << " " << instance.problem.name; }
+void PrintTo(const Instance& instance, std::ostream* out) {
+  *out << name_of(instance.setup) << " " << instance.problem.name;
+}
 
 TetResult run_on(const RunCase& problem, const ComputeOptions& compute) {
   TetOptions options;
@@ -73,9 +76,8 @@ std::vector<Instance> instances() {
   return all;
 }
 
-INSTANTIATE_TEST_SUITE_P(Parity, TetRuns, testing::ValuesIn(instances()), [](const auto& c) {
-  return name_of(c.param.setup) + "_" + c.param.problem.name;
-});
+INSTANTIATE_TEST_SUITE_P(Parity, TetRuns, testing::ValuesIn(instances()),
+                         [](const auto& c) { return name_of(c.param.setup) + "_" + c.param.problem.name; });
 
 }  // namespace
 }  // namespace bisector::test

@@ -349,8 +349,8 @@ TEST(Nearest, HintsChangeNothing) {
 TEST(SelfIntersections, AreFound) {
   // Two triangles cross; a third, in between by index, has no area, and a fourth touches nothing.
   TriangleMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {1, 1, -1}, {1, 1, 1}, {5, 5, 1},
-                   {9, 9, 9}, {10, 9, 9}, {9, 10, 9}};
+  mesh.vertices = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0},  {1, 1, -1}, {1, 1, 1},
+                   {5, 5, 1}, {9, 9, 9}, {10, 9, 9}, {9, 10, 9}};
   mesh.triangles = {{6, 7, 8}, {0, 1, 2}, {0, 1, 1}, {3, 4, 5}};
   const std::vector<std::array<Index, 2>> expected{{1, 3}};
   EXPECT_EQ(find_self_intersections(mesh), expected);

@@ -92,9 +92,10 @@ Csr<Index> rings_of(const Dual& dual, std::size_t seeds) {
 // The whole dual of seeds on a surface as a patch.
 struct WholePatch {
   explicit WholePatch(TriangleMesh mesh, std::vector<Vec3> given)
-      : surface(std::move(mesh)), seeds(std::move(given)), diagram(diagram_of(surface, seeds, NeighbourSource::nearest)),
-        dual(extract_dual(diagram.polygons)), rings(rings_of(dual, seeds.size())),
-        map(surface, seeds, diagram.moments.triangles, rings), patch(map, nullptr, kGoal) {
+      : surface(std::move(mesh)), seeds(std::move(given)),
+        diagram(diagram_of(surface, seeds, NeighbourSource::nearest)), dual(extract_dual(diagram.polygons)),
+        rings(rings_of(dual, seeds.size())), map(surface, seeds, diagram.moments.triangles, rings),
+        patch(map, nullptr, kGoal) {
     for (Index v = 0; v < seeds.size(); ++v) {
       PatchVertex vertex;
       vertex.x = seeds[v];
@@ -192,7 +193,8 @@ TEST(ImprovePatch, RelaxingNeverCostsAndStaysOnTheSurface) {
   for (const PatchVertex& vertex : patch.vertices()) {
     double nearest = 1;
     for (const Facet& f : whole.surface.facets)
-      nearest = std::min(nearest, norm2(nearest_on_triangle(vertex.x, f.corners[0], f.corners[1], f.corners[2]) - vertex.x));
+      nearest =
+          std::min(nearest, norm2(nearest_on_triangle(vertex.x, f.corners[0], f.corners[1], f.corners[2]) - vertex.x));
     EXPECT_LT(nearest, 1e-28);
   }
 }
@@ -234,7 +236,9 @@ struct Problem {
   TriangleMesh dual() { return dual_mesh(run.seeds.positions(), diagram().dual); }
   QualityReport quality() { return measure_quality(dual()); }
   std::vector<Index> broken_curves() { return check_features(trace, curves, run.seeds.places(), diagram()).broken; }
-  ImproveReport improve_to(std::size_t count, double min_angle = 40) { return improve(run, trace, {min_angle, 91, count}); }
+  ImproveReport improve_to(std::size_t count, double min_angle = 40) {
+    return improve(run, trace, {min_angle, 91, count});
+  }
   // That seeds and diagram belong together and nothing is worse than before.
   void expect_sound(std::size_t count) {
     EXPECT_EQ(run.seeds.size(), count);

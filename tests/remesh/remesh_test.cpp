@@ -29,10 +29,10 @@ struct Case {
 void PrintTo(const Case& problem, std::ostream* out) { *out << problem.name; }
 
 std::vector<Case> cases() {
-  return {{"icosphere_300", icosphere(4), 300, true},    {"icosphere_2000", icosphere(5), 2000, true},
-          {"torus_600", torus(80, 48), 600, true},       {"torus_2000", torus(80, 48), 2000, true},
+  return {{"icosphere_300", icosphere(4), 300, true},     {"icosphere_2000", icosphere(5), 2000, true},
+          {"torus_600", torus(80, 48), 600, true},        {"torus_2000", torus(80, 48), 2000, true},
           {"two_spheres_500", two_spheres(), 500, false}, {"box_1000", box(4), 1000, false},
-          {"box_of_12_500", box(1), 500, false},         {"wavy_patch_700", wavy_patch(40), 700, false}};
+          {"box_of_12_500", box(1), 500, false},          {"wavy_patch_700", wavy_patch(40), 700, false}};
 }
 
 RemeshOptions options_for(std::size_t vertices) {

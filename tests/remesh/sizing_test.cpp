@@ -123,8 +123,8 @@ TEST(Sizing, LengthsOnATriangleLieBetweenThoseOfItsCorners) {
     const auto [a, b, c] = mesh.triangles[t];
     EXPECT_DOUBLE_EQ(target_edge_length(sizing, mesh, t, {0, 1, 0}), target_edge_length(sizing, b));
     const double middle = target_edge_length(sizing, mesh, t, {0.25, 0.25, 0.5});
-    const auto [low, high] = std::minmax({target_edge_length(sizing, a), target_edge_length(sizing, b),
-                                          target_edge_length(sizing, c)});
+    const auto [low, high] =
+        std::minmax({target_edge_length(sizing, a), target_edge_length(sizing, b), target_edge_length(sizing, c)});
     EXPECT_GE(middle, low * (1 - 1e-12));
     EXPECT_LE(middle, high * (1 + 1e-12));
   }

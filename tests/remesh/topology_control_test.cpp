@@ -1,4 +1,5 @@
-// The topological ball property: against theory, against a complex welded from coordinates, and as what topology control ends in.
+// The topological ball property: against theory, against a complex welded from coordinates, and as what topology
+// control ends in.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,8 +36,7 @@ struct Checked {
   BallReport report;
 
   Checked(const TriangleMesh& mesh, const std::vector<Vec3>& seeds)
-      : surface(mesh),
-        diagram(diagram_of(surface, seeds, NeighbourSource::nearest)),
+      : surface(mesh), diagram(diagram_of(surface, seeds, NeighbourSource::nearest)),
         report(check_ball_property(surface, diagram.polygons)) {}
 };
 
@@ -106,7 +106,8 @@ class Welded {
       if (count == 1) once.push_back(s);
     }
     for (const Segment& s : all) vertices.insert(s[1]);
-    return {static_cast<long long>(vertices.size()) - static_cast<long long>(all.size()) + faces, parts(all), parts(once)};
+    return {static_cast<long long>(vertices.size()) - static_cast<long long>(all.size()) + faces, parts(all),
+            parts(once)};
   }
 
   // Euler characteristic, components and ends of what two cells share.
@@ -127,7 +128,8 @@ class Welded {
     for (std::size_t p = 0; p < polygons_.pairs.size(); ++p) {
       const std::size_t first = polygons_.offsets[p], size = polygons_.offsets[p + 1] - first;
       for (std::size_t e = 0; e < size; ++e) {
-        Triangle t{polygons_.pairs[p].cell, polygons_.labels[first + e], polygons_.labels[first + (e + size - 1) % size]};
+        Triangle t{polygons_.pairs[p].cell, polygons_.labels[first + e],
+                   polygons_.labels[first + (e + size - 1) % size]};
         if (is_edge(t[1]) || is_edge(t[2])) continue;
         std::sort(t.begin(), t.end());
         points[t].insert(id_[first + e]);
@@ -252,7 +254,8 @@ TEST(BallProperty, WhereItHoldsTheDualIsHomeomorphic) {
 }
 
 TEST(BallProperty, HoldsForManySeedsOnASphere) {
-  for (std::uint64_t k : {1u, 2u, 3u}) EXPECT_TRUE(Checked(icosphere(4), random_seeds(icosphere(4), 300, k)).report.holds);
+  for (std::uint64_t k : {1u, 2u, 3u})
+    EXPECT_TRUE(Checked(icosphere(4), random_seeds(icosphere(4), 300, k)).report.holds);
 }
 
 TEST(BallProperty, OneCellIsTheWholeSurface) {
@@ -367,7 +370,8 @@ TEST(BallProperty, DuplicatedTrianglesMeetTwice) {
 
 // A cap on an edge is no crack: the same as with the triangle below divided there.
 TEST(BallProperty, CollinearTrianglesLeaveNoCrack) {
-  TriangleMesh cap{{{0, 0, 0}, {4, 0, 0}, {8, 0, 0}, {4, 5, 0}, {4, -5, 0}}, {{0, 1, 3}, {1, 2, 3}, {0, 4, 2}, {0, 2, 1}}, {}};
+  TriangleMesh cap{
+      {{0, 0, 0}, {4, 0, 0}, {8, 0, 0}, {4, 5, 0}, {4, -5, 0}}, {{0, 1, 3}, {1, 2, 3}, {0, 4, 2}, {0, 2, 1}}, {}};
   TriangleMesh divided = cap;
   divided.triangles = {{0, 1, 3}, {1, 2, 3}, {0, 4, 1}, {4, 2, 1}};
   // The same through a chain of collinear triangles, with a vertex that no other triangle uses.
@@ -390,7 +394,8 @@ TEST(BallProperty, CollinearTrianglesLeaveNoCrack) {
         for (const auto& part : got.report.cells[i].parts)
           for (std::size_t p : part) EXPECT_EQ(got.diagram.polygons.pairs.at(p).cell, got.report.cells[i].seed);
       }
-      for (std::size_t i = 0; i < got.report.edges.size(); ++i) EXPECT_EQ(got.report.edges[i].ends, want.report.edges[i].ends);
+      for (std::size_t i = 0; i < got.report.edges.size(); ++i)
+        EXPECT_EQ(got.report.edges[i].ends, want.report.edges[i].ends);
     }
   }
 }
@@ -421,7 +426,8 @@ TEST(BallProperty, DoesNotDependOnThreads) {
     EXPECT_EQ(reports[0].cells[i].loop_parts, reports[1].cells[i].loop_parts);
   }
   ASSERT_EQ(reports[0].edges.size(), reports[1].edges.size());
-  for (std::size_t i = 0; i < reports[0].edges.size(); ++i) EXPECT_EQ(reports[0].edges[i].parts, reports[1].edges[i].parts);
+  for (std::size_t i = 0; i < reports[0].edges.size(); ++i)
+    EXPECT_EQ(reports[0].edges[i].parts, reports[1].edges[i].parts);
 }
 
 // ---- Topology control
@@ -436,8 +442,7 @@ TEST(Sheets, CrossingSheetsGetAVertexEach) {
   Checked c(mesh, seeds);
   ASSERT_FALSE(c.report.holds);
   std::vector<Vec3> vertices = seeds;
-  ASSERT_TRUE(divide_cells(c.surface, c.report, std::numeric_limits<double>::infinity(), c.diagram.polygons,
-                           vertices));
+  ASSERT_TRUE(divide_cells(c.surface, c.report, std::numeric_limits<double>::infinity(), c.diagram.polygons, vertices));
   EXPECT_GT(vertices.size(), seeds.size());
   EXPECT_EQ(count_untiled(c.surface, c.diagram.polygons), 0u);
   const BallReport report = check_ball_property(c.surface, c.diagram.polygons);

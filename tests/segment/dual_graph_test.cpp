@@ -27,9 +27,16 @@ struct Named {
   TriangleMesh mesh;
 };
 std::vector<Named> meshes() {
-  return {{"single_triangle", single_triangle()}, {"sphere", icosphere(2)}, {"torus", torus(9, 5)},
-          {"grid", grid_patch(5, 3)}, {"pages", pages()}, {"two_spheres", two_spheres()}, {"soup", soup(40, 3)},
-          {"duplicated", duplicated_triangles()}, {"needles", needles()}, {"collinear", collinear_among_good()}};
+  return {{"single_triangle", single_triangle()},
+          {"sphere", icosphere(2)},
+          {"torus", torus(9, 5)},
+          {"grid", grid_patch(5, 3)},
+          {"pages", pages()},
+          {"two_spheres", two_spheres()},
+          {"soup", soup(40, 3)},
+          {"duplicated", duplicated_triangles()},
+          {"needles", needles()},
+          {"collinear", collinear_among_good()}};
 }
 
 TEST(DualGraph, IsThePairsOfTrianglesWithCommonEdges) {

@@ -22,14 +22,20 @@ using test::SplitMix64;
 constexpr double kPi = std::numbers::pi;
 constexpr SurfaceType kRound[]{SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder, SurfaceType::cone,
                                SurfaceType::torus};
-constexpr SurfaceType kQuadrics[]{
-    SurfaceType::plane,           SurfaceType::sphere,
-    SurfaceType::cylinder,        SurfaceType::cone,
-    SurfaceType::ellipsoid,       SurfaceType::elliptic_paraboloid,
-    SurfaceType::hyperbolic_paraboloid, SurfaceType::one_sheet_hyperboloid,
-    SurfaceType::two_sheet_hyperboloid, SurfaceType::elliptic_cone,
-    SurfaceType::elliptic_cylinder,     SurfaceType::hyperbolic_cylinder,
-    SurfaceType::parabolic_cylinder,    SurfaceType::plane_pair};
+constexpr SurfaceType kQuadrics[]{SurfaceType::plane,
+                                  SurfaceType::sphere,
+                                  SurfaceType::cylinder,
+                                  SurfaceType::cone,
+                                  SurfaceType::ellipsoid,
+                                  SurfaceType::elliptic_paraboloid,
+                                  SurfaceType::hyperbolic_paraboloid,
+                                  SurfaceType::one_sheet_hyperboloid,
+                                  SurfaceType::two_sheet_hyperboloid,
+                                  SurfaceType::elliptic_cone,
+                                  SurfaceType::elliptic_cylinder,
+                                  SurfaceType::hyperbolic_cylinder,
+                                  SurfaceType::parabolic_cylinder,
+                                  SurfaceType::plane_pair};
 
 Vec3 random_point(SplitMix64& random, double size) {
   return size * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
@@ -149,14 +155,15 @@ TEST_P(EveryType, LocalCoordinatesChangeNothing) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Types, EveryType,
-    testing::Values(SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder, SurfaceType::cone, SurfaceType::torus,
-                    SurfaceType::ellipsoid, SurfaceType::elliptic_paraboloid, SurfaceType::hyperbolic_paraboloid,
-                    SurfaceType::one_sheet_hyperboloid, SurfaceType::two_sheet_hyperboloid, SurfaceType::elliptic_cone,
-                    SurfaceType::elliptic_cylinder, SurfaceType::hyperbolic_cylinder, SurfaceType::parabolic_cylinder,
-                    SurfaceType::plane_pair),
-    [](const auto& test) { return std::string(name_of(test.param)); });
+INSTANTIATE_TEST_SUITE_P(Types, EveryType,
+                         testing::Values(SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder,
+                                         SurfaceType::cone, SurfaceType::torus, SurfaceType::ellipsoid,
+                                         SurfaceType::elliptic_paraboloid, SurfaceType::hyperbolic_paraboloid,
+                                         SurfaceType::one_sheet_hyperboloid, SurfaceType::two_sheet_hyperboloid,
+                                         SurfaceType::elliptic_cone, SurfaceType::elliptic_cylinder,
+                                         SurfaceType::hyperbolic_cylinder, SurfaceType::parabolic_cylinder,
+                                         SurfaceType::plane_pair),
+                         [](const auto& test) { return std::string(name_of(test.param)); });
 
 TEST(Primitive, NamesDiffer) {
   std::set<std::string> names;
@@ -204,7 +211,8 @@ TEST(Classify, FindsTypeAndParameters) {
       Quadric quadric = s.quadric;
       const double factor = random.range(-5, 5);
       for (double& c : quadric.c) c *= factor;
-      const Primitive primitive = classify(quadric, s.centre + random_point(random, 0.3 * scale), 2.5 * scale, 1e-6 * scale);
+      const Primitive primitive =
+          classify(quadric, s.centre + random_point(random, 0.3 * scale), 2.5 * scale, 1e-6 * scale);
       const PrimitiveParameters found = parameters_of(primitive);
       ASSERT_EQ(name_of(found.type), name_of(type)) << i;
 
@@ -298,10 +306,12 @@ TEST(Classify, QuadricsWithoutPointsAreFinite) {
     const Vec3 centre = random_point(random, 2);
     const int rank = i % 4;
     const double c = i % 8 < 4 ? 1 : 1e-12;
-    const Quadric quadric = test::placed(axes, centre, {rank > 0 ? 1.0 : 0.0, rank > 1 ? 0.5 : 0.0, rank > 2 ? 0.3 : 0.0}, 0, c);
+    const Quadric quadric =
+        test::placed(axes, centre, {rank > 0 ? 1.0 : 0.0, rank > 1 ? 0.5 : 0.0, rank > 2 ? 0.3 : 0.0}, 0, c);
     const Primitive found = classify(quadric, centre, 1, 1e-6);
     for (double x : quadric_of(found)->c) EXPECT_TRUE(std::isfinite(x));
-    for (const Vec3& v : {parameters_of(found).centre, parameters_of(found).axis, foot_point(found, random_point(random, 3))})
+    for (const Vec3& v :
+         {parameters_of(found).centre, parameters_of(found).axis, foot_point(found, random_point(random, 3))})
       EXPECT_TRUE(std::isfinite(norm2(v)));
     EXPECT_TRUE(std::isfinite(distance(found, {1, 2, 3})));
   }
@@ -543,8 +553,8 @@ TEST(Fits, BadInputIsAnError) {
 
 TEST(RefineQuadric, NeverGetsWorseAndFindsExactQuadrics) {
   SplitMix64 random(21);
-  for (const SurfaceType type : {SurfaceType::ellipsoid, SurfaceType::one_sheet_hyperboloid, SurfaceType::elliptic_paraboloid,
-                                 SurfaceType::elliptic_cylinder})
+  for (const SurfaceType type : {SurfaceType::ellipsoid, SurfaceType::one_sheet_hyperboloid,
+                                 SurfaceType::elliptic_paraboloid, SurfaceType::elliptic_cylinder})
     for (const double noise : {0.0, 0.01})
       for (int i = 0; i < 5; ++i) {
         const KnownSurface s = test::random_surface(type, random);
@@ -554,7 +564,8 @@ TEST(RefineQuadric, NeverGetsWorseAndFindsExactQuadrics) {
         const Primitive first = classify(start, s.centre, 2, 0);
         const PrimitiveFit fit = refine_quadric(first, samples);
         EXPECT_LE(fit.squared_distance, squared_distance(first, samples) * (1 + 1e-9));
-        EXPECT_NEAR(fit.squared_distance, squared_distance(fit.primitive, samples), 1e-6 * fit.squared_distance + 1e-14);
+        EXPECT_NEAR(fit.squared_distance, squared_distance(fit.primitive, samples),
+                    1e-6 * fit.squared_distance + 1e-14);
         if (noise == 0) {
           EXPECT_LT(fit.squared_distance, 1e-14);
         } else {

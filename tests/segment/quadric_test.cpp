@@ -133,13 +133,14 @@ TEST_P(EveryQuadric, ApproximateDistanceIsAtMostTheExactOne) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Types, EveryQuadric,
-    testing::Values(SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder, SurfaceType::cone, SurfaceType::ellipsoid,
-                    SurfaceType::elliptic_paraboloid, SurfaceType::hyperbolic_paraboloid, SurfaceType::one_sheet_hyperboloid,
-                    SurfaceType::two_sheet_hyperboloid, SurfaceType::elliptic_cone, SurfaceType::elliptic_cylinder,
-                    SurfaceType::hyperbolic_cylinder, SurfaceType::parabolic_cylinder, SurfaceType::plane_pair),
-    [](const auto& test) { return std::string(name_of(test.param)); });
+INSTANTIATE_TEST_SUITE_P(Types, EveryQuadric,
+                         testing::Values(SurfaceType::plane, SurfaceType::sphere, SurfaceType::cylinder,
+                                         SurfaceType::cone, SurfaceType::ellipsoid, SurfaceType::elliptic_paraboloid,
+                                         SurfaceType::hyperbolic_paraboloid, SurfaceType::one_sheet_hyperboloid,
+                                         SurfaceType::two_sheet_hyperboloid, SurfaceType::elliptic_cone,
+                                         SurfaceType::elliptic_cylinder, SurfaceType::hyperbolic_cylinder,
+                                         SurfaceType::parabolic_cylinder, SurfaceType::plane_pair),
+                         [](const auto& test) { return std::string(name_of(test.param)); });
 
 TEST(Moments, AreTheIntegrals) {
   SplitMix64 random(5);

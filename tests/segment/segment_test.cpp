@@ -29,7 +29,8 @@ void expect_sound(const TriangleMesh& mesh, const SegmentResult& result) {
   const std::vector<Index> parts = connected_parts(graph, result.labels);
   EXPECT_EQ(1 + *std::max_element(parts.begin(), parts.end()), result.regions.size());
   EXPECT_NEAR(border_length(graph, result.labels), result.border_after, 1e-9 * (1 + result.border_after));
-  for (std::size_t r = 1; r < result.regions.size(); ++r) EXPECT_GE(result.regions[r - 1].area, result.regions[r].area * (1 - 1e-12));
+  for (std::size_t r = 1; r < result.regions.size(); ++r)
+    EXPECT_GE(result.regions[r - 1].area, result.regions[r].area * (1 - 1e-12));
   double squares = 0, area = 0;
   for (const SegmentRegion& region : result.regions) {
     EXPECT_LE(region.rms, region.max);

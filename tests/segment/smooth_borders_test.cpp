@@ -190,8 +190,8 @@ std::vector<std::size_t> strip(const Problem& problem, const std::vector<Index>&
 }
 
 std::vector<TriangleMesh> all_kinds_of_meshes(std::uint64_t seed) {
-  return {icosphere(2), torus(16, 8), wavy_patch(10), pages(), two_spheres(), duplicated_triangles(), needles(),
-          collinear_among_good(), soup(30, seed), grid_patch(9, 7)};
+  return {icosphere(2),           torus(16, 8), wavy_patch(10),         pages(),        two_spheres(),
+          duplicated_triangles(), needles(),    collinear_among_good(), soup(30, seed), grid_patch(9, 7)};
 }
 
 TEST(RegionTopology, FollowsChanges) {
@@ -272,8 +272,8 @@ TEST(SmoothBorders, FindsTheBestOfAllLabellings) {
     std::vector<Index> labels(mesh.triangles.size());
     for (std::size_t t = 0; t < labels.size(); ++t) labels[t] = barycentre(mesh, t).x > 2;
     Problem problem(mesh, labels, random_distances(labels.size(), 2, seed));
-    const SmoothBordersOptions options{.lambda = 0.25 * static_cast<double>(seed % 5), .rings = seed % 2 ? 1 : 2,
-                                       .sweeps = 1};
+    const SmoothBordersOptions options{
+        .lambda = 0.25 * static_cast<double>(seed % 5), .rings = seed % 2 ? 1 : 2, .sweeps = 1};
     const std::vector<std::size_t> free = strip(problem, labels, 0, 1, options.rings);
     ASSERT_GE(free.size(), 6u);
     ASSERT_LE(free.size(), 14u);
@@ -364,8 +364,11 @@ TEST(SmoothBorders, KeepsTheTopologyOfRegions) {
     const std::vector<Index> labels = random_regions(mesh, static_cast<Index>(wanted), seed);
     const Index regions = region_count(labels);
     Problem problem(mesh, labels, random_distances(labels.size(), regions, seed));
-    cuts += problem.smooth({.lambda = 0.5 * static_cast<double>(seed % 4), .rings = 1 + static_cast<int>(seed % 3),
-                            .sweeps = 3}).cuts;
+    cuts +=
+        problem
+            .smooth(
+                {.lambda = 0.5 * static_cast<double>(seed % 4), .rings = 1 + static_cast<int>(seed % 3), .sweeps = 3})
+            .cuts;
     for (Index r = 0; r < regions; ++r)
       EXPECT_EQ(topology(mesh, problem.labels, r), topology(mesh, labels, r)) << "region " << r;
   }
@@ -395,13 +398,12 @@ TEST(SmoothBorders, GivesCrumbsBack) {
   Distances distances = equal_distances(labels.size(), 2, 1);
   for (std::size_t t = 0; t < labels.size(); ++t) {
     const Vec3 p = barycentre(mesh, t);
-    labels[t] = p.x > 5 + (p.y > 8);                    // a tooth at the top, to be cut off
+    labels[t] = p.x > 5 + (p.y > 8);                                         // a tooth at the top, to be cut off
     if (p.x < 5) distances[t][1] = norm(p - Vec3{2.5, 3, 0}) < 0.8 ? 0 : 2;  // an island at the left
   }
   Problem problem(mesh, labels, distances);
   EXPECT_EQ(problem.smooth({.lambda = 1, .rings = 6, .sweeps = 1}).cuts, 1u);
-  for (std::size_t t = 0; t < labels.size(); ++t)
-    EXPECT_EQ(problem.labels[t], barycentre(mesh, t).x > 5 ? 1u : 0u);
+  for (std::size_t t = 0; t < labels.size(); ++t) EXPECT_EQ(problem.labels[t], barycentre(mesh, t).x > 5 ? 1u : 0u);
 }
 
 TEST(SmoothBorders, ChangesNothingOutsideTheStrip) {

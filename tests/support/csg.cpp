@@ -70,8 +70,15 @@ struct Piece {
 
 Piece line(double r0, double z0, double r1, double z1) { return {r0, z0, r1, z1}; }
 Piece arc(double rc, double zc, double radius, double from, double to) {
-  return {rc + radius * std::cos(from), zc + radius * std::sin(from), rc + radius * std::cos(to),
-          zc + radius * std::sin(to), rc, zc, radius, from, to};
+  return {rc + radius * std::cos(from),
+          zc + radius * std::sin(from),
+          rc + radius * std::cos(to),
+          zc + radius * std::sin(to),
+          rc,
+          zc,
+          radius,
+          from,
+          to};
 }
 
 double total_area(const std::vector<Piece>& profile) {
@@ -322,8 +329,8 @@ std::vector<Index> matching_regions(const CsgModel& model, const std::vector<Ind
   for (std::size_t t = 0; t < labels.size(); ++t) ++counts[model.labels[t]][labels[t]];
   std::vector<Index> best;
   for (const auto& count : counts) {
-    const auto most = std::max_element(count.begin(), count.end(),
-                                       [](const auto& p, const auto& q) { return p.second < q.second; });
+    const auto most =
+        std::max_element(count.begin(), count.end(), [](const auto& p, const auto& q) { return p.second < q.second; });
     best.push_back(most == count.end() ? kNone : most->first);
   }
   return best;
@@ -344,8 +351,7 @@ double parameter_difference(const Primitive& first, const Primitive& second, dou
   const double turn = unit_length * norm(cross(a.axis, b.axis));
   const double apart = norm(a.centre - b.centre), radii = std::abs(a.radius - b.radius);
   switch (a.type) {
-    case SurfaceType::plane:
-      return std::max(turn, std::abs(dot(a.axis, a.centre) - side * dot(b.axis, b.centre)));
+    case SurfaceType::plane: return std::max(turn, std::abs(dot(a.axis, a.centre) - side * dot(b.axis, b.centre)));
     case SurfaceType::sphere: return std::max(apart, radii);
     case SurfaceType::cylinder: {
       const Vec3 d = b.centre - a.centre;
@@ -407,8 +413,12 @@ CsgModel csg_part(std::size_t triangles, double noise, std::uint64_t random_seed
 
 CsgModel turned_part(std::size_t triangles, double noise, std::uint64_t random_seed) {
   const double ball = 2.8 + std::sqrt(0.6 * 0.6 - 0.5 * 0.5);
-  const std::vector<Piece> profile{line(0, 0, 1.2, 0),      line(1.2, 0, 1.2, 0.8),   arc(1, 0.8, 0.2, 0, pi / 2),
-                                   line(1, 1, 0.8, 1),      line(0.8, 1, 0.5, 2.2),   line(0.5, 2.2, 0.5, 2.8),
+  const std::vector<Piece> profile{line(0, 0, 1.2, 0),
+                                   line(1.2, 0, 1.2, 0.8),
+                                   arc(1, 0.8, 0.2, 0, pi / 2),
+                                   line(1, 1, 0.8, 1),
+                                   line(0.8, 1, 0.5, 2.2),
+                                   line(0.5, 2.2, 0.5, 2.8),
                                    arc(0, ball, 0.6, std::asin((2.8 - ball) / 0.6), pi / 2)};
   Builder builder(total_area(profile), triangles, random_seed);
   builder.revolve(tilted(), profile, {});

@@ -22,13 +22,20 @@ struct Generator {
   std::map<SurfaceType, std::size_t> least;  // surfaces of each type
 };
 
-const Generator kGenerators[] = {
-    {"csg_part", csg_part,
-     {{SurfaceType::plane, 3}, {SurfaceType::cylinder, 2}, {SurfaceType::sphere, 1}, {SurfaceType::cone, 2},
-      {SurfaceType::torus, 1}}},
-    {"turned_part", turned_part,
-     {{SurfaceType::plane, 1}, {SurfaceType::cylinder, 1}, {SurfaceType::sphere, 1}, {SurfaceType::cone, 1},
-      {SurfaceType::torus, 1}}}};
+const Generator kGenerators[] = {{"csg_part",
+                                  csg_part,
+                                  {{SurfaceType::plane, 3},
+                                   {SurfaceType::cylinder, 2},
+                                   {SurfaceType::sphere, 1},
+                                   {SurfaceType::cone, 2},
+                                   {SurfaceType::torus, 1}}},
+                                 {"turned_part",
+                                  turned_part,
+                                  {{SurfaceType::plane, 1},
+                                   {SurfaceType::cylinder, 1},
+                                   {SurfaceType::sphere, 1},
+                                   {SurfaceType::cone, 1},
+                                   {SurfaceType::torus, 1}}}};
 
 double area(const TriangleMesh& mesh, std::size_t t) {
   const auto& [a, b, c] = mesh.triangles[t];

@@ -11,10 +11,10 @@
 
 #include "backend/backend.h"
 #include "core/parallel.h"
+#include "support/models.h"
 #include "voronoi/dual.h"
 #include "voronoi/restricted.h"
 #include "voronoi/tiling.h"
-#include "support/models.h"
 
 namespace bisector::test {
 

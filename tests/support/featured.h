@@ -21,8 +21,8 @@
 
 namespace bisector::test {
 
-// Sharp edges and borders of a generated mesh, as a graph whose corners are the vertices with other than two of them and sharp
-// turns: written here so that nothing of what is tested is used.
+// Sharp edges and borders of a generated mesh, as a graph whose corners are the vertices with other than two of them
+// and sharp turns: written here so that nothing of what is tested is used.
 inline FeatureGraph sharp_graph(const TriangleMesh& mesh) {
   FeatureGraph graph;
   const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
@@ -109,8 +109,13 @@ struct FeaturedModel {
 };
 
 inline std::vector<FeaturedModel> featured_models() {
-  return {{"box", box(4)},           {"cylinder", cylinder(48)},   {"wedge30", wedge(0.5)}, {"wedge3", wedge(0.05)},
-          {"patch", wavy_patch(12)}, {"pages", pages()},           {"slab", prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}})}};
+  return {{"box", box(4)},
+          {"cylinder", cylinder(48)},
+          {"wedge30", wedge(0.5)},
+          {"wedge3", wedge(0.05)},
+          {"patch", wavy_patch(12)},
+          {"pages", pages()},
+          {"slab", prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}})}};
 }
 
 // What is known of the seeds of a PlacedProblem.
@@ -168,7 +173,8 @@ struct Differences {
 
 // Along curves, and along two directions of the tangent plane of seeds on the surface, the gradient is the slope of the
 // energy; across it is 0.
-inline void expect_slopes(Backend& backend, const PlacedProblem& problem, const CompletedProblem& found, const Differences& how) {
+inline void expect_slopes(Backend& backend, const PlacedProblem& problem, const CompletedProblem& found,
+                          const Differences& how) {
   const auto rise = [&](std::size_t i, const Vec3& ahead, const Vec3& behind) {
     std::array<double, 2> energy;
     for (int side : {0, 1}) {
@@ -201,7 +207,8 @@ inline void expect_slopes(Backend& backend, const PlacedProblem& problem, const 
         continue;
       if (seen[kind]++ % how.every) continue;
       const Vec3 tangent = curves.tangent(place.curve, place.position);
-      const Vec3 ahead = curves.point(place.curve, place.position + h), behind = curves.point(place.curve, place.position - h);
+      const Vec3 ahead = curves.point(place.curve, place.position + h),
+                 behind = curves.point(place.curve, place.position - h);
       EXPECT_NEAR(dot(g, tangent), rise(i, ahead, behind) / (2 * h), how.tolerance * scale);
       EXPECT_NEAR(norm(g), std::abs(dot(g, tangent)), 1e-14 * scale);
     } else {

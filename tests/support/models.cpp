@@ -36,13 +36,13 @@ TriangleMesh single_triangle() { return {{{0, 0, 0}, {8, 0, 0}, {0, 8, 0}}, {{0,
 TriangleMesh icosphere(int levels) {
   const double g = (1 + std::sqrt(5.0)) / 2;
   TriangleMesh mesh;
-  for (const Vec3& v : {Vec3{-1, g, 0}, Vec3{1, g, 0}, Vec3{-1, -g, 0}, Vec3{1, -g, 0}, Vec3{0, -1, g}, Vec3{0, 1, g},
-                        Vec3{0, -1, -g}, Vec3{0, 1, -g}, Vec3{g, 0, -1}, Vec3{g, 0, 1}, Vec3{-g, 0, -1},
-                        Vec3{-g, 0, 1}})
+  for (const Vec3& v :
+       {Vec3{-1, g, 0}, Vec3{1, g, 0}, Vec3{-1, -g, 0}, Vec3{1, -g, 0}, Vec3{0, -1, g}, Vec3{0, 1, g}, Vec3{0, -1, -g},
+        Vec3{0, 1, -g}, Vec3{g, 0, -1}, Vec3{g, 0, 1}, Vec3{-g, 0, -1}, Vec3{-g, 0, 1}})
     mesh.vertices.push_back(unit(v));
-  mesh.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
-                    {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  mesh.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                    {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   for (int level = 0; level < levels; ++level) {
     std::map<std::array<Index, 2>, Index> middles;
     const auto middle = [&](Index a, Index b) {
@@ -86,8 +86,8 @@ TriangleMesh box(int n) {
         at[static_cast<std::size_t>((axis + 2) % 3)] = side ? j : i;
         const auto [found, is_new] = vertices.try_emplace(at, index_of(mesh.vertices.size()));
         if (is_new)
-          mesh.vertices.push_back({static_cast<double>(at[0]) / n, static_cast<double>(at[1]) / n,
-                                   static_cast<double>(at[2]) / n});
+          mesh.vertices.push_back(
+              {static_cast<double>(at[0]) / n, static_cast<double>(at[1]) / n, static_cast<double>(at[2]) / n});
         return found->second;
       });
   return mesh;
@@ -112,8 +112,8 @@ TriangleMesh wavy_patch(int n) {
 
 TriangleMesh pages() {
   TriangleMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {1, 0, 1}, {-0.5, 0.75, 0}, {-0.5, 0.75, 1}, {-0.5, -0.75, 0},
-                   {-0.5, -0.75, 1}};
+  mesh.vertices = {{0, 0, 0},       {0, 0, 1},       {1, 0, 0},        {1, 0, 1},
+                   {-0.5, 0.75, 0}, {-0.5, 0.75, 1}, {-0.5, -0.75, 0}, {-0.5, -0.75, 1}};
   for (Index p = 2; p < 8; p += 2) {
     mesh.triangles.push_back({0, p, p + 1});
     mesh.triangles.push_back({0, p + 1, 1});
@@ -169,7 +169,8 @@ std::string shared_model(const char* name) {
 }
 
 std::string shared_scan(const char* name) {
-  const std::filesystem::path path = std::filesystem::path(BISECTOR_SOURCE_DIR) / ".." / "shared" / "data" / "trees" / name;
+  const std::filesystem::path path =
+      std::filesystem::path(BISECTOR_SOURCE_DIR) / ".." / "shared" / "data" / "trees" / name;
   std::error_code ignored;
   return std::filesystem::exists(path, ignored) ? path.string() : std::string();
 }
@@ -247,8 +248,8 @@ std::vector<Vec3> collinear_seeds(std::size_t count) {
 }
 
 std::vector<Vec3> cocircular_seeds() {
-  return {{5, 0, 0}, {-3, 4, 0}, {0, -5, 0}, {4, 3, 0}, {-4, -3, 0}, {3, 4, 0},
-          {-5, 0, 0}, {4, -3, 0}, {0, 5, 0}, {-4, 3, 0}, {3, -4, 0}, {-3, -4, 0}};
+  return {{5, 0, 0},  {-3, 4, 0}, {0, -5, 0}, {4, 3, 0},  {-4, -3, 0}, {3, 4, 0},
+          {-5, 0, 0}, {4, -3, 0}, {0, 5, 0},  {-4, 3, 0}, {3, -4, 0},  {-3, -4, 0}};
 }
 
 std::vector<Vec3> cospherical_seeds() {
@@ -338,8 +339,14 @@ std::vector<SmallCase> small_cases() {
   add("an edge in a bisector, from below", single_triangle(), {{3, 1, 0}, {3, -1, 0}, {5, 1, 0}, {5, -1, 0}});
   add("a diagonal in a bisector", patch, {{3, 1, 0}, {1, 3, 0}, {4, 0, 0}, {0, 4, 0}, {2, 2, 2}});
   add("a face in a bisector", single_triangle(), {{1, 1, -1}, {1, 1, 1}, {4, 2, 1}, {4, 2, -1}});
-  add("all faces in bisectors", cube, {{0.5, 0.5, -0.5}, {0.5, 0.5, 0.5}, {0.5, 0.5, 1.5}, {-0.5, 0.5, 0.5},
-                                       {1.5, 0.5, 0.5}, {0.5, -0.5, 0.5}, {0.5, 1.5, 0.5}});
+  add("all faces in bisectors", cube,
+      {{0.5, 0.5, -0.5},
+       {0.5, 0.5, 0.5},
+       {0.5, 0.5, 1.5},
+       {-0.5, 0.5, 0.5},
+       {1.5, 0.5, 0.5},
+       {0.5, -0.5, 0.5},
+       {0.5, 1.5, 0.5}});
   // Special triangles.
   add("duplicated triangles", duplicated_triangles(), random_seeds(duplicated_triangles(), 6, 15));
   add("duplicated triangles, seeds at vertices", duplicated_triangles(), vertex_seeds(duplicated_triangles()));

@@ -28,18 +28,18 @@ class SplitMix64 {
 };
 
 // Meshes. Closed ones are oriented outward.
-TriangleMesh single_triangle();                                  // (0,0,0), (8,0,0), (0,8,0)
-TriangleMesh icosphere(int levels);                              // 20 * 4^levels triangles on the unit sphere
-TriangleMesh torus(int nu, int nv);                              // about z, radii 1 and 0.375; 2 nu nv triangles
-TriangleMesh box(int n);                                         // unit cube, 12 n^2 triangles; exact when n is 2^k
-TriangleMesh grid_patch(int nx, int ny);                         // [0,nx] x [0,ny] in z = 0, unit squares
-TriangleMesh wavy_patch(int n);                                  // open height field over the unit square
-TriangleMesh pages();                                            // three sheets that share one edge
-TriangleMesh two_spheres();                                      // disjoint
+TriangleMesh single_triangle();                                   // (0,0,0), (8,0,0), (0,8,0)
+TriangleMesh icosphere(int levels);                               // 20 * 4^levels triangles on the unit sphere
+TriangleMesh torus(int nu, int nv);                               // about z, radii 1 and 0.375; 2 nu nv triangles
+TriangleMesh box(int n);                                          // unit cube, 12 n^2 triangles; exact when n is 2^k
+TriangleMesh grid_patch(int nx, int ny);                          // [0,nx] x [0,ny] in z = 0, unit squares
+TriangleMesh wavy_patch(int n);                                   // open height field over the unit square
+TriangleMesh pages();                                             // three sheets that share one edge
+TriangleMesh two_spheres();                                       // disjoint
 TriangleMesh soup(std::size_t count, std::uint64_t random_seed);  // triangles without common vertices, in the unit cube
-TriangleMesh duplicated_triangles();                             // a square whose triangles occur twice and reversed
-TriangleMesh needles();                                          // a fan of triangles with aspect ratios up to 2^40
-TriangleMesh collinear_among_good();                             // 1 is exactly collinear, 3 has a repeated corner
+TriangleMesh duplicated_triangles();                              // a square whose triangles occur twice and reversed
+TriangleMesh needles();                                           // a fan of triangles with aspect ratios up to 2^40
+TriangleMesh collinear_among_good();                              // 1 is exactly collinear, 3 has a repeated corner
 
 // Path of a model in the shared data folder beside the sources, empty where there is none.
 std::string shared_model(const char* name);
@@ -52,9 +52,9 @@ std::vector<Vec3> vertex_seeds(const TriangleMesh& mesh);
 std::vector<Vec3> mirrored(const std::vector<Vec3>& seeds, int axis);            // seed, image, seed, image, ...
 std::vector<Vec3> coplanar_seeds(std::size_t count, std::uint64_t random_seed);  // z = 0.5, dyadic, in the unit square
 std::vector<Vec3> collinear_seeds(std::size_t count);                            // i / 8 times (1, 1, 1)
-std::vector<Vec3> cocircular_seeds();    // 12 integer points at distance 5 from the origin in z = 0
-std::vector<Vec3> cospherical_seeds();   // (+-1, +-2, +-2) and its rotations: distance 3 from the origin
-std::vector<Vec3> repeated(const std::vector<Vec3>& seeds, int times);           // the whole list again and again
+std::vector<Vec3> cocircular_seeds();   // 12 integer points at distance 5 from the origin in z = 0
+std::vector<Vec3> cospherical_seeds();  // (+-1, +-2, +-2) and its rotations: distance 3 from the origin
+std::vector<Vec3> repeated(const std::vector<Vec3>& seeds, int times);  // the whole list again and again
 
 // Every degenerate family as a named problem small enough for the oracle.
 struct SmallCase {

@@ -56,7 +56,7 @@ std::vector<Point> scaled(const std::vector<Vec3>& points, const Scale& scale) {
 // a s + b t + c >= 0 in the chart p = A + s (B - A) + t (C - A) of a triangle; c is perturbed and in units of 1 / one.
 struct Line {
   mpz_class a, b, c;
-  mpz_class plain;         // c without perturbation, in units of 1
+  mpz_class plain;  // c without perturbation, in units of 1
   std::int64_t label;
 };
 
@@ -113,9 +113,7 @@ struct Polygon {
 class Oracle {
  public:
   Oracle(const TriangleMesh& mesh, const std::vector<Vec3>& seeds, const OracleOptions& options)
-      : mesh_(mesh),
-        scale_(common_scale(mesh.vertices, seeds)),
-        vertices_(scaled(mesh.vertices, scale_)),
+      : mesh_(mesh), scale_(common_scale(mesh.vertices, seeds)), vertices_(scaled(mesh.vertices, scale_)),
         seeds_(scaled(seeds, scale_)) {
     // With |coordinates| < 2^m: |a|, |b|, |plain| < 2^(2m + 5), so a side test is an integer plus weights times
     // integers below 3 * 2^(4m + 11); a ratio of 2^-(4m + 14) makes the first non-zero of them decide.
@@ -252,19 +250,19 @@ OracleDiagram oracle_diagram(const TriangleMesh& mesh, const std::vector<Vec3>& 
   const Oracle oracle(mesh, seeds, options);
   OracleDiagram out;
   std::vector<Moments> sums(seeds.size());
-  oracle.each_polygon([&](Index t, Index i, const Point& origin, const Point& u, const Point& v,
-                          const Polygon& polygon) {
-    out.pairs.push_back({t, i});
-    const std::size_t n = polygon.edges.size();
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::int64_t j = polygon.edges[k].label, l = polygon.edges[(k + 1) % n].label;
-      if (j < 0 || l < 0) continue;
-      Triangle triple{i, static_cast<Index>(j), static_cast<Index>(l)};
-      std::sort(triple.begin(), triple.end());
-      out.rdt.push_back(triple);
-    }
-    add_moments(polygon, oracle.seed(i), origin, u, v, sums[i]);
-  });
+  oracle.each_polygon(
+      [&](Index t, Index i, const Point& origin, const Point& u, const Point& v, const Polygon& polygon) {
+        out.pairs.push_back({t, i});
+        const std::size_t n = polygon.edges.size();
+        for (std::size_t k = 0; k < n; ++k) {
+          const std::int64_t j = polygon.edges[k].label, l = polygon.edges[(k + 1) % n].label;
+          if (j < 0 || l < 0) continue;
+          Triangle triple{i, static_cast<Index>(j), static_cast<Index>(l)};
+          std::sort(triple.begin(), triple.end());
+          out.rdt.push_back(triple);
+        }
+        add_moments(polygon, oracle.seed(i), origin, u, v, sums[i]);
+      });
   std::sort(out.rdt.begin(), out.rdt.end());
   out.rdt.erase(std::unique(out.rdt.begin(), out.rdt.end()), out.rdt.end());
   const int shift = oracle.scale().shift;

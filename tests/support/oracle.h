@@ -15,8 +15,8 @@
 namespace bisector::test {
 
 struct OracleOptions {
-  std::vector<Index> rank;   // seed i carries the weight w_rank[i]; empty: w_i
-  unsigned gap = 1;          // multiplies the bits between consecutive weights; every value gives the same diagram
+  std::vector<Index> rank;  // seed i carries the weight w_rank[i]; empty: w_i
+  unsigned gap = 1;         // multiplies the bits between consecutive weights; every value gives the same diagram
 };
 
 // What seed `seed` owns of triangle `triangle`, non-empty once perturbed.

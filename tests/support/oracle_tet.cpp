@@ -36,7 +36,8 @@ T det3(const std::array<T, 3>& a, const std::array<T, 3>& b, const std::array<T,
   return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-// n . s + plain >= 0 in the chart p = A + s_1 u + s_2 v + s_3 w of a tetrahedron; `c` is `plain` perturbed, in units of 1 / one.
+// n . s + plain >= 0 in the chart p = A + s_1 u + s_2 v + s_3 w of a tetrahedron; `c` is `plain` perturbed, in units of
+// 1 / one.
 struct Plane {
   Point n;
   mpz_class c, plain;
@@ -111,7 +112,8 @@ void add_moments(const std::vector<Vertex>& vertices, const std::vector<Rational
     std::vector<std::size_t> cycle{corners[0]};
     std::set<std::size_t> left(corners.begin() + 1, corners.end());
     while (!left.empty()) {
-      const auto next = std::find_if(left.begin(), left.end(), [&](std::size_t v) { return neighbours(cycle.back(), v); });
+      const auto next =
+          std::find_if(left.begin(), left.end(), [&](std::size_t v) { return neighbours(cycle.back(), v); });
       if (next == left.end()) throw std::logic_error("oracle: a facet's corners form no cycle");
       cycle.push_back(*next);
       left.erase(next);
@@ -160,8 +162,8 @@ std::vector<OraclePolyhedron> oracle_polyhedra(const TetMesh& mesh, const std::v
                              ? mpq_class(mpz_class(1) << (low + static_cast<unsigned>(kLowestBit)))
                              : mpq_class(1, mpz_class(1) << (static_cast<unsigned>(-kLowestBit) - low));
 
-  // With |coordinates| < 2^m the planes' coefficients are below 2^(2m + 5), so a side test is an integer plus weights times
-  // integers below 2^(6m + 21): a ratio of 2^-(6m + 24) makes the first nonzero of them decide.
+  // With |coordinates| < 2^m the planes' coefficients are below 2^(2m + 5), so a side test is an integer plus weights
+  // times integers below 2^(6m + 21): a ratio of 2^-(6m + 24) makes the first nonzero of them decide.
   const unsigned step = (6 * static_cast<unsigned>(bits) + 24) * gap;
   const std::size_t n = x.size();
   const unsigned one_bits = step * static_cast<unsigned>(n);

@@ -8,8 +8,8 @@
 
 namespace bisector::test {
 
-// A plane's centre is its point nearest the origin, a cone's its apex, a cylinder's a point of its axis; the axis of a general
-// quadric is its third. What a type has not is 0.
+// A plane's centre is its point nearest the origin, a cone's its apex, a cylinder's a point of its axis; the axis of a
+// general quadric is its third. What a type has not is 0.
 struct PrimitiveParameters {
   SurfaceType type;
   Vec3 centre, axis{0, 0, 1};

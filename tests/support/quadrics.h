@@ -36,8 +36,8 @@ inline std::array<Vec3, 3> random_frame(SplitMix64& random) {
 }
 
 // sum of lambda_k z_k^2 + b z_2 + c, in coordinates z along the axes from the centre.
-inline Quadric placed(const std::array<Vec3, 3>& axes, const Vec3& centre, const std::array<double, 3>& lambda, double b,
-                      double c) {
+inline Quadric placed(const std::array<Vec3, 3>& axes, const Vec3& centre, const std::array<double, 3>& lambda,
+                      double b, double c) {
   Quadric q;
   q.c[0] = c;
   for (int i = 0; i < 3; ++i) q.c[static_cast<std::size_t>(i) + 1] = b * axes[2][i];
@@ -78,14 +78,17 @@ inline KnownSurface random_surface(SurfaceType type, SplitMix64& random, double 
     case SurfaceType::cylinder:
       s.quadric = quadric(ia, ia, 0, 0, -1);
       s.lengths = {a, 0, 0};
-      s.point = [=](double u, double v, int) { return Vec3{a * std::cos(u * 1.05), a * std::sin(u * 1.05), 2 * scale * v}; };
+      s.point = [=](double u, double v, int) {
+        return Vec3{a * std::cos(u * 1.05), a * std::sin(u * 1.05), 2 * scale * v};
+      };
       break;
     case SurfaceType::cone: {
       const double angle = random.range(0.2, 1.3), t = std::tan(angle);
       s.quadric = quadric(1, 1, -t * t, 0, 0);
       s.lengths = {angle, 0, 0};
       s.point = [=](double u, double v, int) {
-        return 2 * scale * v * Vec3{std::sin(angle) * std::cos(u * 1.05), std::sin(angle) * std::sin(u * 1.05), std::cos(angle)};
+        return 2 * scale * v *
+               Vec3{std::sin(angle) * std::cos(u * 1.05), std::sin(angle) * std::sin(u * 1.05), std::cos(angle)};
       };
       break;
     }
@@ -142,7 +145,9 @@ inline KnownSurface random_surface(SurfaceType type, SplitMix64& random, double 
     case SurfaceType::elliptic_cylinder:
       s.quadric = quadric(ia, ib, 0, 0, -1);
       s.lengths = {a, b, 0};
-      s.point = [=](double u, double v, int) { return Vec3{a * std::cos(u * 1.05), b * std::sin(u * 1.05), 2 * scale * v}; };
+      s.point = [=](double u, double v, int) {
+        return Vec3{a * std::cos(u * 1.05), b * std::sin(u * 1.05), 2 * scale * v};
+      };
       break;
     case SurfaceType::hyperbolic_cylinder:
       s.quadric = quadric(ia, -ib, 0, 0, -1);
@@ -174,7 +179,8 @@ inline KnownSurface random_surface(SurfaceType type, SplitMix64& random, double 
   return s;
 }
 
-// A point of the surface about as near to p as any: the best of a grid of parameters, improved by smaller and smaller steps.
+// A point of the surface about as near to p as any: the best of a grid of parameters, improved by smaller and smaller
+// steps.
 inline Vec3 nearest_by_search(const KnownSurface& s, const Vec3& p) {
   constexpr int kSteps = 36, kRefined = 4;
   struct Candidate {

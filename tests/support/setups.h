@@ -1,6 +1,7 @@
 // The backends that the parity suites run on, and what two diagrams of the same seeds have in common.
 //
-// A suite needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one ("vulkan:0") that then must be there.
+// A suite needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one ("vulkan:0") that then must be
+// there.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "compute/compute.h"
 #include "check/parity.h"
+#include "compute/compute.h"
 #include "support/diagram.h"
 
 namespace bisector::test {
@@ -81,7 +82,8 @@ inline ComputeOptions options_of(const Setup& setup) {
   if (!device_for(processor)) GTEST_SKIP() << "no Vulkan device for this"
 
 // What the reported vertices give, which the moments do not show. Vertices are rounded at the size of the coordinates.
-inline void expect_same_areas(const Surface& surface, const Diagram& reference, const Diagram& found, double tolerance) {
+inline void expect_same_areas(const Surface& surface, const Diagram& reference, const Diagram& found,
+                              double tolerance) {
   const double rounding = 1e-15 * (norm(surface.box.lo) + norm(surface.box.hi));
   const std::vector<Vec3>&a = reference.polygons.vertices, &b = found.polygons.vertices;
   ASSERT_EQ(a.size(), b.size());
@@ -103,7 +105,8 @@ inline void expect_same_areas(const Surface& surface, const Diagram& reference, 
   EXPECT_LE(worst, tolerance);
 }
 
-inline void expect_parity(const Surface& surface, const Diagram& reference, const Evaluated& found, Processor processor) {
+inline void expect_parity(const Surface& surface, const Diagram& reference, const Evaluated& found,
+                          Processor processor) {
   const Parity parity = compare(reference.moments, reference.polygons, found.moments, found.polygons, surface);
   EXPECT_TRUE(parity.same_pairs);
   EXPECT_TRUE(parity.same_labels);

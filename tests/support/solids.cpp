@@ -105,7 +105,9 @@ std::vector<Vec3> seeds_about(const TetMesh& mesh, std::size_t count, double mar
 std::vector<Vec3> seed_grid(const TetMesh& mesh, int nx, int ny, int nz) {
   const Box box = bounding_box(mesh.vertices);
   std::vector<Vec3> seeds;
-  const auto at = [](double lo, double hi, int k, int n) { return n == 1 ? (lo + hi) / 2 : lo + (hi - lo) * k / (n - 1); };
+  const auto at = [](double lo, double hi, int k, int n) {
+    return n == 1 ? (lo + hi) / 2 : lo + (hi - lo) * k / (n - 1);
+  };
   for (int z = 0; z < nz; ++z)
     for (int y = 0; y < ny; ++y)
       for (int x = 0; x < nx; ++x)

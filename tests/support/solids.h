@@ -9,16 +9,17 @@
 
 namespace bisector::test {
 
-TetMesh single_tet();                      // (0,0,0), (4,0,0), (0,4,0), (0,0,4)
-TetMesh tet_grid(int nx, int ny, int nz);  // [0,nx] x [0,ny] x [0,nz], each unit cube in six tetrahedra around its diagonal
-TetMesh tet_box(int n);                    // the unit cube, n to a side
-TetMesh five_tets();                       // the unit cube in five
-TetMesh step();                            // an L: a grid of 2 x 1 x 2 cubes without one of them
-TetMesh hollow();                          // a grid of 3 x 3 x 3 cubes without the middle one
-TetMesh two_cubes();                       // disjoint
-TetMesh slivers();                         // octahedron around a tetrahedron 2^-40 high
-TetMesh flat_among_good();                 // octahedron around one of exactly no volume
-TetMesh inverted_among_good();             // grid of 2 x 1 x 1 cubes with every other tetrahedron inverted
+TetMesh single_tet();  // (0,0,0), (4,0,0), (0,4,0), (0,0,4)
+TetMesh tet_grid(int nx, int ny,
+                 int nz);       // [0,nx] x [0,ny] x [0,nz], each unit cube in six tetrahedra around its diagonal
+TetMesh tet_box(int n);         // the unit cube, n to a side
+TetMesh five_tets();            // the unit cube in five
+TetMesh step();                 // an L: a grid of 2 x 1 x 2 cubes without one of them
+TetMesh hollow();               // a grid of 3 x 3 x 3 cubes without the middle one
+TetMesh two_cubes();            // disjoint
+TetMesh slivers();              // octahedron around a tetrahedron 2^-40 high
+TetMesh flat_among_good();      // octahedron around one of exactly no volume
+TetMesh inverted_among_good();  // grid of 2 x 1 x 1 cubes with every other tetrahedron inverted
 TetMesh shaken(TetMesh mesh, double by, std::uint64_t random_seed);  // vertices moved at random by up to `by`
 TetMesh scaled(TetMesh mesh, double by);
 
@@ -34,7 +35,8 @@ struct SolidCase {
 };
 // Problems small enough for the oracle, in general and in special position.
 std::vector<SolidCase> solid_cases();
-// Random tetrahedra of a grid with seeds at half-integer points, where nearly every decision is a tie. Any number gives another.
+// Random tetrahedra of a grid with seeds at half-integer points, where nearly every decision is a tie. Any number gives
+// another.
 SolidCase integer_solid_case(std::uint64_t random_seed);
 
 }  // namespace bisector::test

@@ -431,8 +431,9 @@ TEST(TetEdit, UndoBringsBackWhatWas) {
       if (kind == 3) {
         const Index v = edit.tet(t).corners[random.below(4)];
         if (!edit.held(v)) changes += edit.move(v, edit.point(v) + 0.05 * random_vector(random));
-      } else if (kind == 0 ? find_edge_removal(edit, t, swap)
-                 : kind == 1 ? find_face_removal(edit, t, swap) : find_contraction(edit, t, swap)) {
+      } else if (kind == 0   ? find_edge_removal(edit, t, swap)
+                 : kind == 1 ? find_face_removal(edit, t, swap)
+                             : find_contraction(edit, t, swap)) {
         changes += edit.replace(swap.old, swap.fresh);
       }
     }
@@ -461,9 +462,9 @@ TEST(TetEdit, RefusesWhatIsNoTiling) {
     return !replaced;
   };
   EXPECT_FALSE(refused(two.tets, three, all));
-  EXPECT_TRUE(refused({two.tets[0]}, three, all));                       // a part
-  EXPECT_TRUE(refused(two.tets, three, {0, 1}));                         // of something else
-  EXPECT_TRUE(refused({two.tets[0], two.tets[0]}, three, all));          // the same twice
+  EXPECT_TRUE(refused({two.tets[0]}, three, all));               // a part
+  EXPECT_TRUE(refused(two.tets, three, {0, 1}));                 // of something else
+  EXPECT_TRUE(refused({two.tets[0], two.tets[0]}, three, all));  // the same twice
   std::vector<Tetrahedron> inverted = two.tets;
   std::swap(inverted[0][0], inverted[0][1]);
   EXPECT_TRUE(refused(inverted, three, all));
@@ -494,8 +495,8 @@ TEST(TetEdit, KnowsVerticesWhereTheBoundaryIsNoDisk) {
 
 TEST(InsertPoints, KeepsTheBoundaryAndTheOrder) {
   const TetMesh before = coned(box(4), {0.5, 0.5, 0.5});
-  std::vector<Vec3> points{{2, 0.5, 0.5}, {0.3, 0.4, 0.6}, {0.5, 0.5, 0.5},
-                           {0.3, 0.4, 0.6}, {0.3, 0.6, 0}, {0.5, 0, 0.5}};
+  std::vector<Vec3> points{{2, 0.5, 0.5},   {0.3, 0.4, 0.6}, {0.5, 0.5, 0.5},
+                           {0.3, 0.4, 0.6}, {0.3, 0.6, 0},   {0.5, 0, 0.5}};
   std::vector<Index> vertices;
   TetMesh after = insert_points(before, points, vertices);
   const Index first = static_cast<Index>(before.vertices.size());
@@ -540,8 +541,8 @@ TEST(InsertPoints, AreDelaunayWhereTheBoundaryAllows) {
   for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
     const auto [a, b, c, d] = corners_of(mesh, t);
     const Vec3 u = b - a, v = c - a, w = d - a;
-    const Vec3 centre = a + (0.5 / dot(u, cross(v, w))) *
-                                (norm2(u) * cross(v, w) + norm2(v) * cross(w, u) + norm2(w) * cross(u, v));
+    const Vec3 centre =
+        a + (0.5 / dot(u, cross(v, w))) * (norm2(u) * cross(v, w) + norm2(v) * cross(w, u) + norm2(w) * cross(u, v));
     const double radius = norm(centre - a);
     if (norm(centre) + radius > 0.85) continue;
     ++inner;
@@ -577,8 +578,16 @@ TEST(ImproveTets, HelpsRandomPointsToo) {
 
 TEST(ImproveTets, KeepsTheEdgesOfABox) {
   std::vector<Index> vertices;
-  const TetMesh mesh = insert_points(coned(box(4), {0.5, 0.5, 0.5}), {{0.3, 0.3, 0.3}, {0.7, 0.3, 0.3}, {0.3, 0.7, 0.3},
-      {0.3, 0.3, 0.7}, {0.7, 0.7, 0.3}, {0.7, 0.3, 0.7}, {0.3, 0.7, 0.7}, {0.7, 0.7, 0.7}}, vertices);
+  const TetMesh mesh = insert_points(coned(box(4), {0.5, 0.5, 0.5}),
+                                     {{0.3, 0.3, 0.3},
+                                      {0.7, 0.3, 0.3},
+                                      {0.3, 0.7, 0.3},
+                                      {0.3, 0.3, 0.7},
+                                      {0.7, 0.7, 0.3},
+                                      {0.7, 0.3, 0.7},
+                                      {0.3, 0.7, 0.7},
+                                      {0.7, 0.7, 0.7}},
+                                     vertices);
   const TetImproveResult result = improve_tets(mesh);
   expect_same_solid(mesh, result);
   EXPECT_GE(result.report.after.dihedral_min, 20);
@@ -666,8 +675,7 @@ TEST(ImproveTets, KeepsRegionsMarksAndFeatures) {
   EXPECT_GT(result.report.after.radius_ratio_mean, result.report.before.radius_ratio_mean);
   ASSERT_FALSE(interface_of(mesh, own_names(mesh)).empty());
   EXPECT_EQ(interface_of(mesh, own_names(mesh)), interface_of(result.mesh, result.source));
-  for (const std::int32_t region : {7, -2})
-    EXPECT_NEAR(volume_of(result.mesh, region), volume_of(mesh, region), 1e-12);
+  for (const std::int32_t region : {7, -2}) EXPECT_NEAR(volume_of(result.mesh, region), volume_of(mesh, region), 1e-12);
 
   ASSERT_EQ(result.mesh.boundary.size(), 1u);
   EXPECT_EQ(result.mesh.boundary_labels, mesh.boundary_labels);

@@ -9,10 +9,10 @@
 #include "core/parallel.h"
 #include "features/size_field.h"
 #include "mesh/tet_adjacency.h"
+#include "support/solids.h"
 #include "tetmesh/locate.h"
 #include "tetmesh/sample_solid.h"
 #include "tetmesh/tet_sizing.h"
-#include "support/solids.h"
 
 namespace bisector::test {
 namespace {
@@ -75,12 +75,14 @@ TEST(TetSizing, RefinedSolidIsTheSameSolid) {
   ASSERT_GT(sized.mesh.tets.size(), box.tets.size());
   volumes(sized.mesh, refined_volume);
   for (int r = 0; r < 3; ++r) EXPECT_NEAR(refined_volume[r], region_volume[r], 1e-12);
-  // Conforming: tet_adjacency throws if a facet has three; and the outer facets cover the box, so no facet is unmatched inside.
+  // Conforming: tet_adjacency throws if a facet has three; and the outer facets cover the box, so no facet is unmatched
+  // inside.
   double area = 0;
   std::size_t outside = 0;
   const TriangleMesh refined = surface_of(sized.mesh);
   for (const auto& [a, b, c] : refined.triangles)
-    area += 0.5 * norm(cross(sized.mesh.vertices[b] - sized.mesh.vertices[a], sized.mesh.vertices[c] - sized.mesh.vertices[a]));
+    area += 0.5 * norm(cross(sized.mesh.vertices[b] - sized.mesh.vertices[a],
+                             sized.mesh.vertices[c] - sized.mesh.vertices[a]));
   EXPECT_NEAR(area, 6, 1e-12);
   outside = refined.triangles.size();
   // Marks cover the same triangles with their labels.

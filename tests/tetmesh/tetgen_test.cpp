@@ -280,9 +280,7 @@ class FailingTetgen : public ::testing::Test {
 
 TEST_F(FailingTetgen, EachFailureIsOneLine) {
   const TriangleMesh surface = icosphere(3);
-  const auto run = [&](const TetgenOptions& options) {
-    return [&surface, options] { tetgen_tets(surface, options); };
-  };
+  const auto run = [&](const TetgenOptions& options) { return [&surface, options] { tetgen_tets(surface, options); }; };
   expect_error(run(does("kill -SEGV $$")), "crashed");
   expect_error(run(does("echo first; echo 'what it said'; kill -ABRT $$")), "what it said");
   expect_error(run(does("kill -KILL $$")), "memory");
@@ -343,9 +341,8 @@ void expect_conforms(const ConformingTets& result, const TriangleMesh& boundary,
   ASSERT_EQ(result.mesh.vertices.size(), first + vertices.size() + result.steiner_points);
   for (std::size_t k = 0; k < vertices.size(); ++k) EXPECT_EQ(result.mesh.vertices[first + k], vertices[k]);
   for (std::size_t v = first; v < result.mesh.vertices.size(); ++v) {
-    const bool used = std::any_of(result.mesh.tets.begin(), result.mesh.tets.end(), [&](const Tetrahedron& t) {
-      return std::find(t.begin(), t.end(), v) != t.end();
-    });
+    const bool used = std::any_of(result.mesh.tets.begin(), result.mesh.tets.end(),
+                                  [&](const Tetrahedron& t) { return std::find(t.begin(), t.end(), v) != t.end(); });
     EXPECT_TRUE(used) << v;
   }
 }

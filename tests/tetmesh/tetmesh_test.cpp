@@ -1,4 +1,5 @@
-// Tetrahedral meshing end to end on generated solids: validity, topology, quality, features, sizes, and input it has to refuse.
+// Tetrahedral meshing end to end on generated solids: validity, topology, quality, features, sizes, and input it has to
+// refuse.
 #include "bisector/tetmesh.h"
 
 #include <gtest/gtest.h>
@@ -48,8 +49,8 @@ struct Case {
 void PrintTo(const Case& problem, std::ostream* out) { *out << problem.name; }
 
 std::vector<Case> cases() {
-  return {{"ball", icosphere(4), 400, 0}, {"ball_2000", icosphere(4), 2000, 0},       {"torus", torus(60, 36), 600, 0},
-          {"box", box(4), 700, 48},       {"box_of_12", box(1), 300, 12},             {"two_balls", two_spheres(), 500, 0},
+  return {{"ball", icosphere(4), 400, 0}, {"ball_2000", icosphere(4), 2000, 0}, {"torus", torus(60, 36), 600, 0},
+          {"box", box(4), 700, 48},       {"box_of_12", box(1), 300, 12},       {"two_balls", two_spheres(), 500, 0},
           {"shell", shell(), 900, 0}};
 }
 
@@ -98,7 +99,8 @@ TEST_P(Tetrahedralise, FillsTheSolidWithGoodTetrahedraAndKeepsFeatures) {
   EXPECT_GE(quality.dihedral_min, 14);
   EXPECT_GE(quality.radius_ratio_mean, 0.86);
   EXPECT_GE(measure_quality(boundary_mesh(mesh)).theta_min, 25);
-  EXPECT_NEAR(static_cast<double>(mesh.vertices.size()), static_cast<double>(vertices), 0.05 * static_cast<double>(vertices));
+  EXPECT_NEAR(static_cast<double>(mesh.vertices.size()), static_cast<double>(vertices),
+              0.05 * static_cast<double>(vertices));
   // Volumes differ by no more than what lies between the two boundaries.
   const DistanceReport distance = measure_distance(boundary_mesh(mesh), surface);
   double area = 0;
@@ -127,7 +129,8 @@ TEST_P(Tetrahedralise, FillsTheSolidWithGoodTetrahedraAndKeepsFeatures) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Solids, Tetrahedralise, testing::ValuesIn(cases()), [](const auto& c) { return c.param.name; });
+INSTANTIATE_TEST_SUITE_P(Solids, Tetrahedralise, testing::ValuesIn(cases()),
+                         [](const auto& c) { return c.param.name; });
 
 // Solids one or two cells thick: all sites of a free CVT meet the boundary.
 TEST(TetrahedraliseThinSolids, HaveTheCountAndWhatRoomThereIsInside) {
@@ -245,7 +248,8 @@ TEST(TetrahedraliseAgain, WithoutImprovementTheTetrahedraAreDelaunay) {
   ASSERT_TRUE(result.delaunay);
   for (const Tetrahedron& t : result.mesh.tets) {
     const Vec3 p = result.mesh.vertices[t[0]];
-    const Vec3 b = result.mesh.vertices[t[1]] - p, c = result.mesh.vertices[t[2]] - p, d = result.mesh.vertices[t[3]] - p;
+    const Vec3 b = result.mesh.vertices[t[1]] - p, c = result.mesh.vertices[t[2]] - p,
+               d = result.mesh.vertices[t[3]] - p;
     const double six = dot(b, cross(c, d));
     const Vec3 centre = (0.5 / six) * (norm2(b) * cross(c, d) + norm2(c) * cross(d, b) + norm2(d) * cross(b, c));
     if (six < 1e-7) continue;  // the centre of a sliver is too uncertain
@@ -265,8 +269,8 @@ TEST(TetrahedraliseAgain, StartsFromGivenSeeds) {
 }
 
 TEST(TetrahedraliseErrors, RefusesWhatBoundsNoSolid) {
-  EXPECT_THROW(tetrahedralise(wavy_patch(8), options_for(100)), Error);   // open
-  EXPECT_THROW(tetrahedralise(pages(), options_for(100)), Error);         // open and not manifold
+  EXPECT_THROW(tetrahedralise(wavy_patch(8), options_for(100)), Error);  // open
+  EXPECT_THROW(tetrahedralise(pages(), options_for(100)), Error);        // open and not manifold
   TriangleMesh crossing = icosphere(2);
   const auto n = static_cast<Index>(crossing.vertices.size());
   for (Index v = 0; v < n; ++v) crossing.vertices.push_back(crossing.vertices[v] + Vec3{0.5, 0, 0});

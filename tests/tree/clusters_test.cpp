@@ -185,7 +185,8 @@ void expect_connected(const Prepared& p, const Clusters& clusters) {
 TEST(Clusters, HangTogetherAndAreTightWhereFixed) {
   const Prepared p = forked_tree();
   ClusterOptions options;
-  const Clusters clusters = cluster_points(p.points, p.graph.neighbours, p.sections.section, p.sections.distance, options);
+  const Clusters clusters =
+      cluster_points(p.points, p.graph.neighbours, p.sections.section, p.sections.distance, options);
   EXPECT_EQ(std::count(clusters.label.begin(), clusters.label.end(), kNone), 0);
   expect_connected(p, clusters);
   std::vector<std::vector<Vec3>> members(clusters.cylinders.size());
@@ -237,7 +238,8 @@ TEST(Clusters, WhatIsNoCylinderIsSplit) {
   }();
   ClusterOptions options;
   options.delta = 0.01;
-  const Clusters clusters = cluster_points(points, graph.neighbours, std::vector<Index>(points.size(), 0), height, options);
+  const Clusters clusters =
+      cluster_points(points, graph.neighbours, std::vector<Index>(points.size(), 0), height, options);
   EXPECT_GT(clusters.cylinders.size(), 50u);
 }
 

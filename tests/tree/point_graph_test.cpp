@@ -71,8 +71,8 @@ TEST(PointGraph, ManyPointsAtOnePlaceAreNoFailure) {
 }
 
 TEST(PointGraph, ComponentsAreThoseThatPathsConnect) {
-  const std::vector<Vec3> points =
-      joined(joined(random_points(60, {}, 1, 3), random_points(40, {10, 0, 0}, 1, 4)), random_points(30, {0, 30, 0}, 1, 5));
+  const std::vector<Vec3> points = joined(joined(random_points(60, {}, 1, 3), random_points(40, {10, 0, 0}, 1, 4)),
+                                          random_points(30, {0, 30, 0}, 1, 5));
   const PointGraph graph = build_point_graph(points);
   ASSERT_EQ(graph.components, 3u);
   for (std::size_t i = 0; i < points.size(); ++i) EXPECT_EQ(graph.component[i], i < 60 ? 0u : i < 100 ? 1u : 2u);
@@ -118,7 +118,8 @@ TEST(PointGraph, BridgesAreTheShortestThatConnectAll) {
     sum += b.length;
     edges.push_back({b.from, b.to});
   }
-  EXPECT_TRUE(std::is_sorted(bridges.begin(), bridges.end(), [](const Bridge& a, const Bridge& b) { return a.length < b.length; }));
+  EXPECT_TRUE(std::is_sorted(bridges.begin(), bridges.end(),
+                             [](const Bridge& a, const Bridge& b) { return a.length < b.length; }));
   EXPECT_NEAR(sum, spanning_length(points, graph.component), 1e-9 * sum);
 
   const Csr<Index> connected = add_edges(graph.neighbours, edges);

@@ -13,7 +13,9 @@
 namespace bisector {
 namespace {
 
-BranchCylinder at(const Vec3& centre, double radius = 0.1, const Vec3& axis = {0, 0, 1}) { return {centre, axis, radius, radius, 1, 0}; }
+BranchCylinder at(const Vec3& centre, double radius = 0.1, const Vec3& axis = {0, 0, 1}) {
+  return {centre, axis, radius, radius, 1, 0};
+}
 
 // A chain of points, each its own neighbour's neighbour, two to a cluster.
 struct Chain {
@@ -86,9 +88,13 @@ TEST(ClusterLinks, WeighTurnsAndGaps) {
 
 // Three clusters that meet are a loop of links, of which paths leave one out (thesis Figure 3.3).
 TEST(Skeleton, HasNoLoop) {
-  const std::vector<BranchCylinder> cylinders{at({0, 0, 0}), at({0, 0, 1}), at({1, 0, 1}), at({0, 0, 2}), at({2, 0, 2}), at({9, 9, 9})};
-  const std::vector<ClusterLink> links{{0, 1, {0, 0, 0.5}, 0, 1},   {0, 2, {0.5, 0, 0.5}, 0, 1.5}, {1, 2, {0.5, 0, 1}, 0, 1},
-                                       {1, 3, {0, 0, 1.5}, 0, 1}, {2, 4, {1.5, 0, 1.5}, 0, 1.5}};
+  const std::vector<BranchCylinder> cylinders{at({0, 0, 0}), at({0, 0, 1}), at({1, 0, 1}),
+                                              at({0, 0, 2}), at({2, 0, 2}), at({9, 9, 9})};
+  const std::vector<ClusterLink> links{{0, 1, {0, 0, 0.5}, 0, 1},
+                                       {0, 2, {0.5, 0, 0.5}, 0, 1.5},
+                                       {1, 2, {0.5, 0, 1}, 0, 1},
+                                       {1, 3, {0, 0, 1.5}, 0, 1},
+                                       {2, 4, {1.5, 0, 1.5}, 0, 1.5}};
   const std::vector<SkeletonNode> nodes = make_skeleton(links, cylinders, {0});
   std::size_t roots = 0, centres = 0;
   for (std::size_t k = 0; k < nodes.size(); ++k) {
@@ -117,7 +123,8 @@ TEST(Skeleton, OfOneClusterIsItsAxis) {
 // A trunk of 10, a bough of 6 at 4 and a twig of 2 on the bough.
 std::vector<SkeletonNode> known_tree() {
   std::vector<SkeletonNode> nodes;
-  for (int k = 0; k <= 10; ++k) nodes.push_back({{0, 0, static_cast<double>(k)}, 0.1, k ? static_cast<Index>(k - 1) : kNone, kNone});
+  for (int k = 0; k <= 10; ++k)
+    nodes.push_back({{0, 0, static_cast<double>(k)}, 0.1, k ? static_cast<Index>(k - 1) : kNone, kNone});
   for (int k = 1; k <= 6; ++k)
     nodes.push_back({{static_cast<double>(k), 0, 4}, 0.05, k == 1 ? 4 : static_cast<Index>(nodes.size() - 1), kNone});
   for (int k = 1; k <= 2; ++k)
@@ -142,7 +149,8 @@ TEST(Branches, HoldEveryNodeOnce) {
   std::vector<SkeletonNode> nodes{{{0, 0, 0}, 1, kNone, kNone}};
   for (Index k = 1; k < 300; ++k) {
     const auto parent = static_cast<Index>(random.uniform() * k);
-    nodes.push_back({nodes[parent].position + Vec3{random.uniform(), random.uniform(), random.uniform()}, 0.1, parent, kNone});
+    nodes.push_back(
+        {nodes[parent].position + Vec3{random.uniform(), random.uniform(), random.uniform()}, 0.1, parent, kNone});
   }
   const std::vector<SkeletonBranch> branches = find_branches(nodes);
   std::vector<int> count(nodes.size(), 0);
@@ -160,9 +168,11 @@ TEST(Branches, HoldEveryNodeOnce) {
 // Of two paths of nearly the same length the straight and thick one goes on.
 TEST(Branches, GoStraightOnWherePathsAreSimilar) {
   std::vector<SkeletonNode> nodes;
-  for (int k = 0; k <= 5; ++k) nodes.push_back({{0, 0, static_cast<double>(k)}, 0.5, k ? static_cast<Index>(k - 1) : kNone, kNone});
+  for (int k = 0; k <= 5; ++k)
+    nodes.push_back({{0, 0, static_cast<double>(k)}, 0.5, k ? static_cast<Index>(k - 1) : kNone, kNone});
   for (int k = 1; k <= 5; ++k)
-    nodes.push_back({{0, 0, 5 + static_cast<double>(k)}, 0.5, k == 1 ? 5 : static_cast<Index>(nodes.size() - 1), kNone});
+    nodes.push_back(
+        {{0, 0, 5 + static_cast<double>(k)}, 0.5, k == 1 ? 5 : static_cast<Index>(nodes.size() - 1), kNone});
   const auto straight_tip = static_cast<Index>(nodes.size() - 1);
   for (int k = 1; k <= 5; ++k)
     nodes.push_back({{1.05 * k, 0, 5}, 0.2, k == 1 ? 5 : static_cast<Index>(nodes.size() - 1), kNone});
@@ -192,7 +202,8 @@ TEST(TubeFit, FindsAxisAndRadius) {
   for (const double share : {1.0, 0.5})
     for (const double noise : {0.0, 0.01}) {
       std::vector<Vec3> rough;  // off the axis, as centres of points on one side are
-      for (int k = 0; k <= 10; ++k) rough.push_back({(2 + 0.04) * std::cos(0.1 * k), 0.03 * (k % 2), (2 + 0.04) * std::sin(0.1 * k)});
+      for (int k = 0; k <= 10; ++k)
+        rough.push_back({(2 + 0.04) * std::cos(0.1 * k), 0.03 * (k % 2), (2 + 0.04) * std::sin(0.1 * k)});
       const Tube tube = fit_tube(tube_points(4000, noise, share), rough, noise);
       for (std::size_t k = 1; k + 1 < tube.axis.size(); ++k) {
         const Vec3& p = tube.axis[k];
@@ -207,21 +218,25 @@ TEST(TubeFit, FindsAxisAndRadius) {
 
 TEST(TubeFit, PointsOfAnotherBranchDoNotBendIt) {
   std::vector<Vec3> points = tube_points(3000, 0, 1);
-  for (int i = 0; i < 300; ++i) points.push_back({2 * std::cos(0.5) + 0.1 + 0.002 * i, 0.02 * std::sin(i), 2 * std::sin(0.5)});
-  const Tube tube = fit_tube(points, {{2, 0, 0}, {2 * std::cos(0.5), 0, 2 * std::sin(0.5)}, {2 * std::cos(1.0), 0, 2 * std::sin(1.0)}}, 0.002);
+  for (int i = 0; i < 300; ++i)
+    points.push_back({2 * std::cos(0.5) + 0.1 + 0.002 * i, 0.02 * std::sin(i), 2 * std::sin(0.5)});
+  const Tube tube = fit_tube(
+      points, {{2, 0, 0}, {2 * std::cos(0.5), 0, 2 * std::sin(0.5)}, {2 * std::cos(1.0), 0, 2 * std::sin(1.0)}}, 0.002);
   for (std::size_t k = 2; k + 2 < tube.axis.size(); ++k)
     EXPECT_LT(std::hypot(std::hypot(tube.axis[k].x, tube.axis[k].z) - 2, tube.axis[k].y), 0.02);
 }
 
 TEST(TubeFit, FewPointsLeaveTheLine) {
   const std::vector<Vec3> line{{0, 0, 0}, {0, 0, 1}};
-  for (const std::vector<Vec3>& points : {std::vector<Vec3>{}, std::vector<Vec3>{{0.1, 0, 0.5}}, std::vector<Vec3>(3, Vec3{0, 0.2, 0.5})}) {
+  for (const std::vector<Vec3>& points :
+       {std::vector<Vec3>{}, std::vector<Vec3>{{0.1, 0, 0.5}}, std::vector<Vec3>(3, Vec3{0, 0.2, 0.5})}) {
     const Tube tube = fit_tube(points, line, 0.01);
     EXPECT_EQ(tube.axis.front(), line.front());
     EXPECT_EQ(tube.axis.back(), line.back());
     for (const double r : tube.radii) EXPECT_GT(r, 0);
   }
-  for (const double r : fit_tube(std::vector<Vec3>(40, Vec3{0, 0.2, 0.5}), line, 0).radii) EXPECT_TRUE(std::isfinite(r));
+  for (const double r : fit_tube(std::vector<Vec3>(40, Vec3{0, 0.2, 0.5}), line, 0).radii)
+    EXPECT_TRUE(std::isfinite(r));
 }
 
 TEST(NonIncreasing, IsTheNearestInLeastSquares) {

@@ -19,9 +19,9 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "mesh/topology.h"
-#include "tree/coverage.h"
 #include "support/models.h"
 #include "support/tree_model.h"
+#include "tree/coverage.h"
 
 namespace bisector {
 namespace {
@@ -102,7 +102,8 @@ TEST(Tree, OfACylinderIsOneBranch) {
   EXPECT_NEAR(tree.branches[0].length, 2, 0.25);
   EXPECT_NEAR(tree.branches[0].base_radius, 0.1, 0.01);
   EXPECT_NEAR(tree.branches[0].tip_radius, 0.1, 0.01);
-  EXPECT_NEAR(tree.branches[0].volume, std::numbers::pi * 0.01 * tree.branches[0].length, 0.1 * tree.branches[0].volume);
+  EXPECT_NEAR(tree.branches[0].volume, std::numbers::pi * 0.01 * tree.branches[0].length,
+              0.1 * tree.branches[0].volume);
 }
 
 TEST(Tree, FindsTheBranchesOfAKnownTree) {
@@ -167,8 +168,9 @@ TEST(Tree, UnitAndOriginDoNotMatter) {
   for (Vec3& p : moved) p = 1024 * p + Vec3{0x1p19, 0x1p22, 0};
   const TreeResult other = reconstruct_tree(moved);
   expect_sound(moved, other);
-  const std::size_t same = static_cast<std::size_t>(std::inner_product(
-      tree.branch.begin(), tree.branch.end(), other.branch.begin(), 0, std::plus<>(), [](Index a, Index b) { return a == b; }));
+  const std::size_t same =
+      static_cast<std::size_t>(std::inner_product(tree.branch.begin(), tree.branch.end(), other.branch.begin(), 0,
+                                                  std::plus<>(), [](Index a, Index b) { return a == b; }));
   EXPECT_GT(same, moved.size() * 9 / 10);
   EXPECT_NEAR(static_cast<double>(other.branches.size()), static_cast<double>(tree.branches.size()), 2);
   EXPECT_NEAR(other.branches[0].length, 1024 * tree.branches[0].length, 20 * tree.branches[0].length);
@@ -248,10 +250,10 @@ TEST(Tree, OddCloudsAreNoFailure) {
   std::vector<std::vector<Vec3>> clouds(4);
   for (int i = 0; i < 500; ++i) {
     const double x = random.uniform(), y = random.uniform(), z = random.uniform();
-    clouds[0].push_back({x, y, 0});                                // a horizontal plane
-    clouds[1].push_back({x, 0, z});                                // a vertical one
-    clouds[2].push_back({x, y, z});                                // a box full
-    clouds[3].push_back({x + (i % 2 ? 1000 : 0), y, z});           // two, far apart
+    clouds[0].push_back({x, y, 0});                       // a horizontal plane
+    clouds[1].push_back({x, 0, z});                       // a vertical one
+    clouds[2].push_back({x, y, z});                       // a box full
+    clouds[3].push_back({x + (i % 2 ? 1000 : 0), y, z});  // two, far apart
   }
   std::vector<Vec3> few;
   for (int c = 0; c < 12; ++c)

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "voronoi/exact.h"
 #include "support/models.h"
+#include "voronoi/exact.h"
 
 namespace bisector::test {
 namespace {
@@ -37,8 +37,8 @@ enum class Shape { random, needle, cap };
 enum class Seeding { random, cospherical, cocircular, grid, on_the_plane, over_the_plane, clustered, aligned };
 
 constexpr Shape kShapes[] = {Shape::random, Shape::needle, Shape::cap};
-constexpr Seeding kSeedings[] = {Seeding::random,         Seeding::cospherical, Seeding::cocircular, Seeding::grid,
-                                 Seeding::on_the_plane, Seeding::over_the_plane, Seeding::clustered, Seeding::aligned};
+constexpr Seeding kSeedings[] = {Seeding::random,       Seeding::cospherical,    Seeding::cocircular, Seeding::grid,
+                                 Seeding::on_the_plane, Seeding::over_the_plane, Seeding::clustered,  Seeding::aligned};
 
 Problem make_problem(SplitMix64& random, Shape shape, Seeding seeding, double thin, double jitter) {
   Problem p;
@@ -75,8 +75,10 @@ Problem make_problem(SplitMix64& random, Shape shape, Seeding seeding, double th
         break;
       }
       case Seeding::grid:
-        p.seeds.push_back(centre + 0.25 * Vec3{static_cast<double>(i % 3) - 1, static_cast<double>(i / 3 % 3) - 1,
-                                               static_cast<double>(i / 9) - 1} + noise);
+        p.seeds.push_back(centre +
+                          0.25 * Vec3{static_cast<double>(i % 3) - 1, static_cast<double>(i / 3 % 3) - 1,
+                                      static_cast<double>(i / 9) - 1} +
+                          noise);
         break;
       case Seeding::on_the_plane: p.seeds.push_back(a + r * ab + s * ac + noise); break;
       case Seeding::over_the_plane: p.seeds.push_back(a + r * ab + s * ac + 20 * random.unit() * normal); break;

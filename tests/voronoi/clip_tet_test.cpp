@@ -30,7 +30,8 @@ constexpr Seeding kSeedings[] = {Seeding::random,     Seeding::cospherical, Seed
 // A tetrahedron of size about 1, `thin` where its shape is, and seeds that miss their special position by `jitter`.
 Problem make_problem(SplitMix64& random, Shape shape, Seeding seeding, double thin, double jitter) {
   Problem p;
-  const Vec3 a = 0.1 * random_point(random), u = random_point(random), v = random_point(random), w = random_point(random);
+  const Vec3 a = 0.1 * random_point(random), u = random_point(random), v = random_point(random),
+             w = random_point(random);
   switch (shape) {
     case Shape::random: p.corners = {a, a + u, a + v, a + w}; break;
     case Shape::needle: p.corners = {a, a + thin * u, a + thin * v, a + w}; break;
@@ -53,8 +54,10 @@ Problem make_problem(SplitMix64& random, Shape shape, Seeding seeding, double th
       }
       case Seeding::cocircular: x = centre + 0.4 * Vec3{std::cos(6.3 * r), std::sin(6.3 * r), 0} + noise; break;
       case Seeding::grid:
-        x = centre + 0.25 * Vec3{static_cast<double>(i % 3) - 1, static_cast<double>(i / 3 % 3) - 1,
-                                 static_cast<double>(i / 9) - 1} + noise;
+        x = centre +
+            0.25 * Vec3{static_cast<double>(i % 3) - 1, static_cast<double>(i / 3 % 3) - 1,
+                        static_cast<double>(i / 9) - 1} +
+            noise;
         break;
       case Seeding::in_a_facet: x = a + r * (p.corners[1] - a) + s * (p.corners[2] - a) + noise; break;
       case Seeding::aligned: x = centre + (r - 0.5) * u + noise; break;
@@ -104,8 +107,8 @@ TEST(ClipTet, SlackBoundsTheErrorOfEveryVertex) {
                                         exact_plane(seeds, labels[on[2]]));
         const Vec3 error = clipper.vertex(v) - exact;
         const double most = std::max({std::abs(error.x), std::abs(error.y), std::abs(error.z)});
-        ASSERT_LE(most, clipper.slack(v)) << "shape " << int(shape) << ", seeds " << int(seeding) << ", thin " << thin
-                                          << ", jitter " << jitter;
+        ASSERT_LE(most, clipper.slack(v))
+            << "shape " << int(shape) << ", seeds " << int(seeding) << ", thin " << thin << ", jitter " << jitter;
         worst = std::max(worst, most / clipper.slack(v));
         ++vertices;
       }
@@ -141,8 +144,8 @@ TEST(ClipTet, PiecesAddUpToTheTetrahedron) {
   }
 }
 
-// A quadrature of degree 3 on a tetrahedron: the corners and the centres of the facets, exact for the products of a linear density and
-// a square.
+// A quadrature of degree 3 on a tetrahedron: the corners and the centres of the facets, exact for the products of a
+// linear density and a square.
 Moments by_quadrature(const Vec3 (&q)[4], const double (&rho)[4], double volume) {
   Moments sum;
   const auto add = [&](const Vec3& p, double r, double weight) {

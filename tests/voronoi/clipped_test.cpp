@@ -1,5 +1,5 @@
-// The clipped Voronoi diagram against the oracle on small cases, and against itself on large ones: sources of neighbours, threads,
-// cells whole or cut up, objects fresh and used.
+// The clipped Voronoi diagram against the oracle on small cases, and against itself on large ones: sources of
+// neighbours, threads, cells whole or cut up, objects fresh and used.
 #include "voronoi/clipped.h"
 
 #include <gtest/gtest.h>
@@ -130,8 +130,9 @@ void expect_sound(const Solid& solid, const Diagram& d) {
     const std::size_t vertices = d.polyhedra.vertex_offsets[k + 1] - d.polyhedra.vertex_offsets[k];
     EXPECT_EQ(vertices, 2 * (planes - 2));
     const Labels labels = labels_of(d.polyhedra, k);
-    EXPECT_TRUE(std::is_sorted(d.polyhedra.labels.begin() + static_cast<std::ptrdiff_t>(d.polyhedra.label_offsets[k]),
-                               d.polyhedra.labels.begin() + static_cast<std::ptrdiff_t>(d.polyhedra.label_offsets[k + 1])));
+    EXPECT_TRUE(
+        std::is_sorted(d.polyhedra.labels.begin() + static_cast<std::ptrdiff_t>(d.polyhedra.label_offsets[k]),
+                       d.polyhedra.labels.begin() + static_cast<std::ptrdiff_t>(d.polyhedra.label_offsets[k + 1])));
     if (testing::Test::HasFailure()) return;
   }
   if (triangles_differ(solid)) {
@@ -404,11 +405,11 @@ TEST(ClippedMoments, AgreeWithCountingPoints) {
     for (int y = 0; y < kPoints; ++y)
       for (int z = 0; z < kPoints; ++z) {
         const Vec3 p = kCell * Vec3{x + 0.5, y + 0.5, z + 0.5};
-        const auto nearest = std::min_element(seeds.begin(), seeds.end(), [&](const Vec3& a, const Vec3& b) {
-          return norm2(p - a) < norm2(p - b);
-        });
+        const auto nearest = std::min_element(
+            seeds.begin(), seeds.end(), [&](const Vec3& a, const Vec3& b) { return norm2(p - a) < norm2(p - b); });
         const double mass = kCell * kCell * kCell * (6 + dot(p, {0.5, -0.25, 0.75}));
-        counted[static_cast<std::size_t>(nearest - seeds.begin())] += {mass, mass * (p - *nearest), mass * norm2(p - *nearest)};
+        counted[static_cast<std::size_t>(nearest - seeds.begin())] +=
+            {mass, mass * (p - *nearest), mass * norm2(p - *nearest)};
       }
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     EXPECT_NEAR(d.moments.cells[i].mass, counted[i].mass, 1e-3 * solid.mass);
@@ -424,7 +425,8 @@ TEST(Clipped, ACellOutsideOwnsNothing) {
   std::vector<Vec3> seeds = seeds_about(mesh, 400, 0, 41);
   const std::size_t inside = seeds.size();
   seeds.push_back({1.5, 1.5, 1.5});
-  for (const Vec3 d : {Vec3{0.05, 0, 0}, Vec3{-0.05, 0, 0}, Vec3{0, 0.05, 0}, Vec3{0, -0.05, 0}, Vec3{0, 0, 0.05}, Vec3{0, 0, -0.05}})
+  for (const Vec3 d :
+       {Vec3{0.05, 0, 0}, Vec3{-0.05, 0, 0}, Vec3{0, 0.05, 0}, Vec3{0, -0.05, 0}, Vec3{0, 0, 0.05}, Vec3{0, 0, -0.05}})
     seeds.push_back(Vec3{1.5, 1.5, 1.5} + d);
   seeds.push_back({9, 9, 9});
   const Diagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, InnerCells::whole);
@@ -440,9 +442,11 @@ TEST(Clipped, EmptyCellsOfEqualSeedsHaveNoMass) {
   for (std::size_t i = 50; i < 100; ++i) EXPECT_EQ(d.moments.cells[i].mass, 0);
 }
 
-// The dual of a diagram whose every cell meets the boundary of a convex solid like a ball: seeds at the corners of a lattice.
+// The dual of a diagram whose every cell meets the boundary of a convex solid like a ball: seeds at the corners of a
+// lattice.
 TEST(Clipped, TheDualOfSeedsInTheSolidIsTheirDelaunayTriangulation) {
-  // The solid reaches far beyond the seeds, so that all Voronoi vertices lie in it, and V - E + F - T = 1 for their hull.
+  // The solid reaches far beyond the seeds, so that all Voronoi vertices lie in it, and V - E + F - T = 1 for their
+  // hull.
   TetMesh mesh = tet_grid(1, 1, 1);
   for (Vec3& p : mesh.vertices) p = 1e6 * (p - Vec3{0.5, 0.5, 0.5});
   const std::vector<Vec3> seeds = seeds_about(tet_grid(1, 1, 1), 200, 0, 43);
@@ -462,11 +466,13 @@ TEST(Clipped, TheDualOfSeedsInTheSolidIsTheirDelaunayTriangulation) {
   EXPECT_EQ(vertices.size(), seeds.size());
   for (const auto& [facet, times] : facets) EXPECT_LE(times, 2);
   EXPECT_EQ(static_cast<int>(vertices.size()) - static_cast<int>(edges.size()) + static_cast<int>(facets.size()) -
-                static_cast<int>(tets.size()), 1);
+                static_cast<int>(tets.size()),
+            1);
   // No seed lies in a circumsphere by more than rounding.
   for (std::size_t k = 0; k < tets.size(); k += 17) {
     const Vec3 a = seeds[tets[k][0]], b = seeds[tets[k][1]] - a, c = seeds[tets[k][2]] - a, d = seeds[tets[k][3]] - a;
-    const Vec3 centre = (0.5 / dot(b, cross(c, d))) * (norm2(b) * cross(c, d) + norm2(c) * cross(d, b) + norm2(d) * cross(b, c));
+    const Vec3 centre =
+        (0.5 / dot(b, cross(c, d))) * (norm2(b) * cross(c, d) + norm2(c) * cross(d, b) + norm2(d) * cross(b, c));
     for (const Vec3& x : seeds) EXPECT_GE(norm2(x - a - centre), norm2(centre) * (1 - 1e-9));
   }
 }
@@ -532,10 +538,10 @@ TEST(Solid, RejectsWhatItCannotIntegrate) {
     Solid solid(mesh, std::move(density));
   };
   EXPECT_THROW(with({}), Error);
-  EXPECT_THROW(with({{0, 1, 2, 3}}), Error);                               // coplanar
-  EXPECT_THROW(with({{0, 1, 2, 8}}), Error);                               // no such vertex
-  EXPECT_THROW(with({{0, 1, 2, 4}, {0, 1, 2, 5}}), Error);                 // on one side of a facet
-  EXPECT_THROW(with({{0, 1, 2, 4}, {0, 1, 2, 5}, {0, 1, 2, 6}}), Error);   // three on a facet
+  EXPECT_THROW(with({{0, 1, 2, 3}}), Error);                              // coplanar
+  EXPECT_THROW(with({{0, 1, 2, 8}}), Error);                              // no such vertex
+  EXPECT_THROW(with({{0, 1, 2, 4}, {0, 1, 2, 5}}), Error);                // on one side of a facet
+  EXPECT_THROW(with({{0, 1, 2, 4}, {0, 1, 2, 5}, {0, 1, 2, 6}}), Error);  // three on a facet
   EXPECT_THROW(with({{0, 1, 2, 4}}, {1, 1}), Error);
   EXPECT_THROW(with({{0, 1, 2, 4}}, {1, 1, 1, 0, 1, 1, 1, 1}), Error);
   EXPECT_THROW(with({{0, 1, 2, 4}}, {1, 1, 1, 1, 1, 1, 1, std::nan("")}), Error);

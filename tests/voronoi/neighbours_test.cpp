@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "voronoi/delaunay.h"
-#include "voronoi/exact.h"
 #include "spatial/hilbert.h"
 #include "support/models.h"
+#include "voronoi/delaunay.h"
+#include "voronoi/exact.h"
 
 namespace bisector::test {
 namespace {
@@ -186,8 +186,7 @@ TEST_P(Lists, AreCertifiedAfterAnUpdate) {
   double shortest = 1;
   for (Index slot = 0; slot < seeds.x.size(); ++slot) shortest = std::min(shortest, neighbours.list(slot).radius);
   for (double reach : {1e-3, 0.01, 0.03, 0.1}) {
-    for (Vec3& x : seeds.x)
-      x += reach * shortest * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    for (Vec3& x : seeds.x) x += reach * shortest * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
     if (!neighbours.update()) neighbours.build(seeds, NeighbourSource::nearest);
     const Index step = std::max<Index>(1, static_cast<Index>(seeds.x.size() / 200));
     for (Index slot = 0; slot < seeds.x.size(); slot += step) {

@@ -41,8 +41,7 @@ TEST_P(Oracle, PolygonsTileEveryTriangleExactly) {
     EXPECT_TRUE(p.share >= 0) << p.share.get_d();
     covered[p.triangle] += p.share;
   }
-  for (Index t = 0; t < mesh.triangles.size(); ++t)
-    EXPECT_TRUE(covered[t] == (is_collinear(mesh, t) ? 0 : 1)) << t;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) EXPECT_TRUE(covered[t] == (is_collinear(mesh, t) ? 0 : 1)) << t;
 }
 
 // Each edge between cells occurs once on either side, with the same ends; sides are covered from corner to corner.

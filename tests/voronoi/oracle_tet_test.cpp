@@ -1,4 +1,5 @@
-// The oracle of clipped diagrams against its own definition: what holds of any tiling, and cells small enough to work out by hand.
+// The oracle of clipped diagrams against its own definition: what holds of any tiling, and cells small enough to work
+// out by hand.
 #include "support/oracle_tet.h"
 
 #include <gtest/gtest.h>
@@ -9,9 +10,9 @@
 #include <set>
 #include <tuple>
 
-#include "voronoi/solid.h"
 #include "support/models.h"
 #include "support/solids.h"
+#include "voronoi/solid.h"
 
 namespace bisector::test {
 namespace {
@@ -39,9 +40,12 @@ TEST_P(TetOracle, PolyhedraTileEveryTetrahedronExactly) {
     std::array<std::array<mpq_class, 3>, 3> e;
     for (std::size_t r = 0; r < 3; ++r)
       for (int k = 0; k < 3; ++k)
-        e[r][static_cast<std::size_t>(k)] = mpq_class(mesh.vertices[mesh.tets[t][r + 1]][k]) - mpq_class(mesh.vertices[mesh.tets[t][0]][k]);
-    const mpq_class volume = (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
-                              e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
+        e[r][static_cast<std::size_t>(k)] =
+            mpq_class(mesh.vertices[mesh.tets[t][r + 1]][k]) - mpq_class(mesh.vertices[mesh.tets[t][0]][k]);
+    const mpq_class volume =
+        (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+         e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
+        6;
     EXPECT_TRUE(covered[t] == volume) << t;
   }
 }

@@ -110,8 +110,7 @@ TEST_P(Integers, AgreeWithTheOracle) {
     expect_oracle(integer_case(k));
 }
 
-INSTANTIATE_TEST_SUITE_P(Restricted, Integers,
-                         testing::Range(std::uint64_t{0}, kIntegerCases, kIntegerBlock));
+INSTANTIATE_TEST_SUITE_P(Restricted, Integers, testing::Range(std::uint64_t{0}, kIntegerCases, kIntegerBlock));
 
 // A large grid problem, where the neighbour lists do not hold every seed.
 TEST(Restricted, LargerGridAgreesWithTheOracle) {
@@ -384,9 +383,13 @@ struct QuadratureCase {
 };
 
 TEST(RestrictedMoments, AgreeWithQuadrature) {
-  for (const auto& [name, mesh] : std::vector<QuadratureCase>{
-           {"sphere", icosphere(3)}, {"torus", torus(24, 16)}, {"patch", wavy_patch(12)}, {"box", box(2)},
-           {"pages", pages()}, {"needles", needles()}, {"collinear", collinear_among_good()}}) {
+  for (const auto& [name, mesh] : std::vector<QuadratureCase>{{"sphere", icosphere(3)},
+                                                              {"torus", torus(24, 16)},
+                                                              {"patch", wavy_patch(12)},
+                                                              {"box", box(2)},
+                                                              {"pages", pages()},
+                                                              {"needles", needles()},
+                                                              {"collinear", collinear_among_good()}}) {
     SCOPED_TRACE(name);
     for (std::size_t count : {1u, 7u, 60u, 900u}) {
       const std::vector<Vec3> seeds = random_seeds(mesh, count, 51);
