@@ -1,10 +1,8 @@
-// Clipping one facet to one restricted Voronoi cell, the twin of Clipper in src/bisector/voronoi/clip.cpp: labels first,
+// Clipping one facet to one restricted Voronoi cell, the twin of Clipper in src/voronoi/clip.cpp: labels first,
 // coordinates from labels by one formula, and with each corner a bound of its error, the slack. What the bounds do not decide
 // is not decided here: the pair gets a status and goes to exact arithmetic.
 //
-// To include: `facet_words`, `facet_meta`, `facet_base`, `residual`, `ids` and seed(), and the constant kMostCorners.
-
-#include "statuses.glsl"
+// To include: `facet_words`, `facet_meta`, `element_base`, `residual`, `ids` and seed(), and the constant kMostCorners.
 
 #if BISECTOR_DOUBLE
 const real kSquareError = 1e-12LF;   // relative, of |d|^2 with all that is compared with it
@@ -52,8 +50,8 @@ real reach;            // upper bound of its squared distance
 bool polygon_changed;  // by the last cut
 
 void begin_facet(uint facet, uint slot) {
-  at_facet = (facet - facet_base) * kFacetWords;
-  bits = facet_meta[kMetaWords * (facet - facet_base) + 4];
+  at_facet = (facet - element_base) * kFacetWords;
+  bits = facet_meta[kFacetMetaWords * (facet - element_base) + kFacetBitsAt];
   own_slot = slot;
   own = seed(slot);
   normal = facet_vector(at_facet + kNormalAt);
@@ -301,7 +299,7 @@ uint cut(uint other, real3 d, real squared) {
   [[dont_unroll]] for (uint k = 0; k < n; ++k) {
     int side = side_of(k, d, squared);
     if (side == 0) side = tie_side(corner_label[k == 0 ? n - 1 : k - 1], corner_label[k], other);
-    if (side == 0) return kUnsure;
+    if (side == 0) return kStatusUnsure;
     const bool inside = side > 0;
     if (k == 0) {
       first_inside = inside;
@@ -319,8 +317,8 @@ uint cut(uint other, real3 d, real squared) {
   }
   if (first_inside != before_inside) ++changes;
   // A line leaves a convex polygon in one run; more would mean that a bound does not hold.
-  if (changes != 2) return kUnsure;
-  if (kept + 2 > kMostCorners) return kCrowded;
+  if (changes != 2) return kStatusUnsure;
+  if (kept + 2 > kMostCorners) return kStatusCrowded;
 
   // The corners that stay are `kept` from in_first on, cyclically; two new ones follow the last of them.
   const uint entering = corner_label[in_first == 0 ? n - 1 : in_first - 1];
@@ -342,8 +340,8 @@ uint cut(uint other, real3 d, real squared) {
   corner_label[place] = other;
   corner_label[place + 1] = entering;
   const Line line = seed_line(d, squared);
-  if (!meet(line_of(leaving), leaving, line, other, place)) return kUnsure;
-  if (!meet(line, other, line_of(entering), entering, place + 1)) return kUnsure;
+  if (!meet(line_of(leaving), leaving, line, other, place)) return kStatusUnsure;
+  if (!meet(line, other, line_of(entering), entering, place + 1)) return kStatusUnsure;
   return 0;
 }
 
@@ -364,15 +362,15 @@ uint clip(uint count, real radius) {
     near -= 16.0 * absolute_error * sqrt(squared);
 #endif
     precise real twice = real(4.0) * reach;
-    if (twice < near) return kClipped;
+    if (twice < near) return kStatusClipped;
     polygon_changed = false;
     const uint status = cut(other, d, squared);
     if (status != 0) return status;
-    if (corner_count == 0) return kEmpty;
+    if (corner_count == 0) return kStatusEmpty;
     if (polygon_changed) bound_polygon();
   }
   precise real twice = real(4.0) * reach;
-  return radius >= kInfinity || twice < radius ? kClipped : kShortList;
+  return radius >= kInfinity || twice < radius ? kStatusClipped : kStatusShortList;
 }
 
 #if !BISECTOR_DOUBLE
@@ -408,11 +406,7 @@ uint first_corner() {
   return first;
 }
 
-struct Moments {
-  real mass;
-  real3 first;
-  real second;
-};
+#include "moments.glsl"
 
 real density_at(uint k) {
   const uint after = corner_label[k], before = corner_label[k == 0 ? corner_count - 1 : k - 1];
@@ -427,7 +421,7 @@ real density_at(uint k) {
 
 const real kThird = real(1.0LF / 3.0LF), kTwelfth = real(1.0LF / 12.0LF), kThirtieth = real(1.0LF / 30.0LF);
 
-// Twins of triangle_moments() in src/bisector/voronoi/moments.h.
+// Twins of triangle_moments() in src/voronoi/moments.h.
 Moments uniform_moments(real3 sum, real squares, real area) {
   Moments m;
   precise real third = kThird * area;

@@ -1,10 +1,12 @@
 // What every kernel shares: the shape of a workgroup and the names of special values.
 #extension GL_EXT_control_flow_attributes : require
+#include "layout/pairs.h"
+#include "layout/sizes.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = kGroupSize) in;
 
-const uint kNone = 0xffffffffu;
-const uint kEdgeLabel = 0x80000000u;  // | k: the facet's edge k; else a label is a slot
+const uint kNone = LAYOUT_NONE;
+const uint kEdgeLabel = LAYOUT_BORDER_LABEL;  // | k: the facet's edge k; else a label is a slot
 
 // Workgroups are laid out in x and y.
 uint invocation() {

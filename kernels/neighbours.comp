@@ -20,17 +20,9 @@ layout(std430, binding = 4) writeonly buffer Lists { uint lists[]; };
 layout(std430, binding = 5) writeonly buffer Info { uvec4 list_info[]; };  // first entry, count, bits of the squared radius
 layout(std430, binding = 6) buffer Counters { uint counters[]; };
 layout(std430, binding = 7) readonly buffer Targets { uint targets[]; };
-layout(push_constant) uniform Push {
-  vec3 grid_lower;
-  float grid_inverse;
-  uint bucket_mask;
-  uint seed_count;
-  float residual;
-  uint two;
-  uint first_target;
-  uint target_room;
-};
-#include "counters.glsl"
+#define PUSH_NEIGHBOURS
+#include "layout/push.h"
+#include "layout/counters.h"
 #include "grid.glsl"
 LOAD_POINT(seed, seed_words)
 
@@ -70,7 +62,7 @@ void sift_up(uint at, real square, uint other) {
 
 void main() {
   const uint index = invocation();
-  if (kTargets ? first_target + index >= min(counters[kTargetCount], target_room) : index >= seed_count) return;
+  if (kTargets ? first_target + index >= min(counters[kWideTargets], target_capacity) : index >= seed_count) return;
   const uint slot = kTargets ? targets[first_target + index] : index;
   const Point x = seed(slot);
   const ivec3 home = cell_at(x);
@@ -131,5 +123,5 @@ void main() {
   const bool complete = loops_complete(two);
   list_info[slot] = uvec4(first | (kTargets ? kWideList : 0u), complete ? listed : 0,
                           floatBitsToUint(complete ? max(float(limit), 0.0) : 0.0), 0);
-  if (met) atomicAdd(counters[kMet], 1u);
+  if (met) atomicAdd(counters[kCoincident], 1u);
 }

@@ -14,18 +14,10 @@ layout(std430, binding = 2) readonly buffer Slots { uint bucket_slots[]; };
 layout(std430, binding = 3) readonly buffer Points { real point_words[]; };
 layout(std430, binding = 4) buffer Owners { uint owners[]; };  // in: a guess or kNone; out: a slot, or kNone if uncertain
 layout(std430, binding = 5) buffer Counters { uint counters[]; };
-layout(std430, binding = 6) writeonly buffer Lost { uint lost[]; };
-layout(push_constant) uniform Push {
-  vec3 grid_lower;
-  float grid_inverse;
-  uint bucket_mask;
-  uint seed_count;
-  float residual;
-  uint two;
-  uint point_count;
-  uint report_lost;
-};
-#include "counters.glsl"
+layout(std430, binding = 6) writeonly buffer Uncertain { uint uncertain[]; };
+#define PUSH_OWNERS
+#include "layout/push.h"
+#include "layout/counters.h"
 #include "grid.glsl"
 LOAD_POINT(seed, seed_words)
 LOAD_POINT(point, point_words)
@@ -78,5 +70,5 @@ void main() {
   precise real error = real(32.0) * kUnit * second + real(16.0) * real(residual) * sqrt(second);
   const bool certain = loops_complete(two) && closed && best != kNone && (second == kInfinity || nearest + error < second);
   owners[i] = certain ? best : kNone;
-  if (!certain && report_lost != 0) lost[atomicAdd(counters[kLostSites], 1u)] = i;
+  if (!certain && report_uncertain != 0) uncertain[atomicAdd(counters[kUncertainOwners], 1u)] = i;
 }

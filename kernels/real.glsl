@@ -1,14 +1,16 @@
 // Arithmetic in the precision of the build. Every operation is `precise`, so that none is fused or reordered: in double the
-// results are those of src/bisector/core/types.h bit for bit, and in single the error bounds hold.
+// results are those of src/core/geometry.h bit for bit, and in single the error bounds hold.
 //
 // A Point is a position as the host gives it: three doubles, or in single three pairs (high, low) of floats, which hold
 // 48 of its 53 bits; what they leave out is bounded by `residual`, which the callers have among their push constants.
+
+#include "layout/elements.h"
 
 #if BISECTOR_DOUBLE
 #define real double
 #define real3 dvec3
 const real kUnit = 1.1102230246251565e-16LF;  // 2^-53, rounding to nearest: checked when the device is opened
-const uint kPointWords = 3;
+const uint kPointWords = kDoublePointWords;
 struct Point {
   real3 high;
 };
@@ -16,7 +18,7 @@ struct Point {
 #define real float
 #define real3 vec3
 const real kUnit = 1.1920929e-7;              // 2^-23: the direction of rounding is not promised
-const uint kPointWords = 6;
+const uint kPointWords = kSinglePointWords;
 struct Point {
   real3 high, low;
 };

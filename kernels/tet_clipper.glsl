@@ -1,9 +1,8 @@
-// Clipping one tetrahedron to one Voronoi cell, the twin of TetClipper in src/bisector/voronoi/clip_tet.cpp: labels first,
+// Clipping one tetrahedron to one Voronoi cell, the twin of TetClipper in src/voronoi/clip_tet.cpp: labels first,
 // coordinates from labels by one formula, and with each vertex a bound of its error, the slack. What the bounds do not decide is
 // not decided here: the pair gets a status and goes to exact arithmetic.
 //
 // To include: `tet_words`, `tet_meta`, `residual`, `ids`, seed(), and the constants kMostPlanes and kMostVertices.
-#include "statuses.glsl"
 
 #if BISECTOR_DOUBLE
 const real kSquareError = 1e-12LF;   // relative, of |d|^2 with all that is compared with it
@@ -20,7 +19,7 @@ const real kSteep = 1e-8;
 
 // The tetrahedron, as seen from the seed.
 uint at_tet;           // first word
-uint bits;             // the corners in order, then the anchor of each facet, two bits each
+uint bits;             // of its whole numbers
 real3 local[4];
 real largest;          // absolute coordinate of local
 real tet_squared;      // upper bound of the squared distance of any point of the tetrahedron
@@ -47,7 +46,7 @@ uvec2 row_of[kMostPlanes];   // of each plane a set of others
 uint next_of[kMostPlanes];
 
 uint order_of(uint place) { return (bits >> (2 * place)) & 3u; }
-uint anchor_of(uint facet) { return (bits >> (8 + 2 * facet)) & 3u; }
+uint anchor_of(uint facet) { return (bits >> (kTetAnchorShift + 2 * facet)) & 3u; }
 uint rank_of(uint corner) {
   uint rank = 0;
   for (uint place = 1; place < 4; ++place)
@@ -75,7 +74,7 @@ void set_seed_plane(uint plane, uint label, real3 d, real squared) {
 
 void begin_tet(uint tet, uint slot) {
   at_tet = tet * kTetWords;
-  bits = tet_meta[tet * kTetMetaWords + kBitsAt];
+  bits = tet_meta[tet * kTetMetaWords + kTetBitsAt];
   own_slot = slot;
   own = seed(slot);
   largest = real(0.0);
@@ -308,7 +307,7 @@ uint cut(uint other, real3 d, real squared) {
   uint removed = 0;
   [[dont_unroll]] for (uint v = 0; v < vertex_count; ++v) {
     const int side = side_of(v, d, squared, other);
-    if (side == 0) return kUnsure;
+    if (side == 0) return kStatusUnsure;
     if (side > 0) continue;
     outside[v >> 5] |= 1u << (v & 31u);
     ++removed;
@@ -319,7 +318,7 @@ uint cut(uint other, real3 d, real squared) {
     return 0;
   }
   if (plane_count == kMostPlanes) compact_planes();
-  if (plane_count == kMostPlanes) return kCrowded;
+  if (plane_count == kMostPlanes) return kStatusCrowded;
   was_cut = polyhedron_changed = true;
 
   // Directed edges of what is cut off: of (a, b, c) the vertex has a b, b c and c a, and the vertices across them have the reverse.
@@ -354,7 +353,7 @@ uint cut(uint other, real3 d, real squared) {
       [[dont_unroll]] for (uint set = row_of[a][half_word]; set != 0; set &= set - 1) {
         const uint b = 32 * half_word + uint(findLSB(set));
         if (in_set(row_of[b], a)) continue;
-        if (in_set(seen, a)) return kUnsure;
+        if (in_set(seen, a)) return kStatusUnsure;
         seen |= bit_of(a);
         next_of[a] = b;
         start = a;
@@ -362,21 +361,21 @@ uint cut(uint other, real3 d, real squared) {
       }
     }
   }
-  if (fresh < 3 || kept + fresh > kMostVertices) return fresh < 3 ? kUnsure : kCrowded;
+  if (fresh < 3 || kept + fresh > kMostVertices) return fresh < 3 ? kStatusUnsure : kStatusCrowded;
   uint a = start;
   [[dont_unroll]] for (uint k = 0; k < fresh; ++k) {
-    if (!in_set(seen, a)) return kUnsure;
+    if (!in_set(seen, a)) return kStatusUnsure;
     const uint b = next_of[a];
     const uint v = kept + k;
     vertex_on[v] = packed(a, b, by);
     vertex_count = v + 1;
     a = b;
-    if (a == start && k + 1 < fresh) return kUnsure;
+    if (a == start && k + 1 < fresh) return kStatusUnsure;
   }
-  if (a != start) return kUnsure;
+  if (a != start) return kStatusUnsure;
   vertex_count = kept + fresh;
   [[dont_unroll]] for (uint v = kept; v < vertex_count; ++v)
-    if (!place_vertex(v)) return kUnsure;
+    if (!place_vertex(v)) return kStatusUnsure;
   return 0;
 }
 
@@ -397,24 +396,20 @@ uint clip(uint count, real radius) {
     near -= 16.0 * absolute_error * sqrt(squared);
 #endif
     precise real twice = real(4.0) * reach;
-    if (twice < near) return kClipped;
+    if (twice < near) return kStatusClipped;
     polyhedron_changed = false;
     const uint status = cut(other, d, squared);
     if (status != 0) return status;
-    if (vertex_count == 0) return kEmpty;
+    if (vertex_count == 0) return kStatusEmpty;
     if (polyhedron_changed) bound_polyhedron();
   }
   precise real twice = real(4.0) * reach;
-  return radius >= kInfinity || twice < radius ? kClipped : kShortList;
+  return radius >= kInfinity || twice < radius ? kStatusClipped : kStatusShortList;
 }
 
-struct Moments {
-  real mass;
-  real3 first;
-  real second;
-};
+#include "moments.glsl"
 
-// Twin of moved() in src/bisector/voronoi/moments.h.
+// Twin of moved() in src/voronoi/moments.h.
 Moments moved(Moments m, real3 origin) {
   Moments r;
   precise real3 first = m.mass * origin + m.first;
@@ -429,7 +424,7 @@ Moments whole_moments() {
   Moments m;
   m.mass = tet_words[at_tet + kWholeAt];
   m.first = tet_vector(at_tet + kWholeAt + 1);
-  m.second = tet_words[at_tet + kWholeAt + 4];
+  m.second = tet_words[at_tet + kWholeAt + kSecondMomentAt];
   return moved(m, local[order_of(0)]);
 }
 
@@ -447,7 +442,7 @@ real density_at(uint v) {
 const real kSixth = real(1.0LF / 6.0LF), kTwentyFourth = real(1.0LF / 24.0LF), kOneHundredTwentieth = real(1.0LF / 120.0LF),
            kThreeHundredSixtieth = real(1.0LF / 360.0LF);
 
-// Twins of tet_terms() in src/bisector/voronoi/moments.h: added to what `sum` holds.
+// Twins of tet_terms() in src/voronoi/moments.h: added to what `sum` holds.
 void add_uniform(inout Moments sum, real3 a, real3 b, real3 c, real six_volume) {
   precise real3 total = a + b + c;
   precise real mass = sum.mass + six_volume;

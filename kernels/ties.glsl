@@ -18,7 +18,7 @@ bool is_rectangle(uint c, uint o, uint p, uint q) {
 // The side of a vertex where the bisectors of seeds a and b meet (and those of others, or facets), with respect to that of c, if the
 // four seeds are the corners of such a rectangle, else 0. Grids of seeds are full of them. The bisector's row of the corner opposite
 // the cell's own seed is the sum of the other two, so the determinant is 0, and each of the four weights has the cofactor +1 or
-// -1 times the corner's denominator, -1 for c and the seed opposite it (src/bisector/voronoi/exact.h): the lowest index decides.
+// -1 times the corner's denominator, -1 for c and the seed opposite it (src/voronoi/exact.h): the lowest index decides.
 int tie_of(uint slot, uint a, uint b, uint c) {
   uint opposite;
   if (is_rectangle(c, slot, a, b)) opposite = slot;

@@ -1,4 +1,4 @@
-// How fallible Vulkan calls are made: each passes a checkpoint where tests inject failures (host/faults.h), and what it throws
+// How fallible Vulkan calls are made: each passes a checkpoint where tests inject failures (host/device/faults.h), and what it throws
 // leaves as a DeviceError.
 #pragma once
 

@@ -58,7 +58,7 @@ struct Commands::Impl {
   Timestamps timestamps;
   Hazards hazards;
   std::vector<Readback> readbacks;
-  Phase phase = Phase::transfer;
+  Phase phase = &DeviceSeconds::transfer;
   bool recording = false;
 
   void use(const Buffer& buffer, vk::PipelineStageFlags stages, vk::AccessFlags reads, vk::AccessFlags writes) {
@@ -106,7 +106,7 @@ struct Commands::Impl {
         throw DeviceError(device.about.description.name + ": no answer for 10 minutes; use --device cpu");
       }
     } catch (const DeviceError&) {
-      settle();
+      wait_until_idle();
       throw;
     }
     timestamps.collect();
@@ -120,7 +120,7 @@ struct Commands::Impl {
   }
 
   // After a failure the device may still be at work with what is about to be destroyed.
-  void settle() const noexcept {
+  void wait_until_idle() const noexcept {
     try {
       device.device.waitIdle();
     } catch (const vk::SystemError&) {
@@ -229,6 +229,6 @@ void Commands::dispatch_indirect(const Kernel& kernel, std::initializer_list<Bin
 
 void Commands::run() { impl_->submit(); }
 
-std::array<double, kPhases> Commands::take_seconds() { return impl_->timestamps.take(); }
+DeviceSeconds Commands::take_seconds() { return impl_->timestamps.take(); }
 
 }  // namespace bisector::host

@@ -1,7 +1,6 @@
 // A recorded run of kernels and transfers.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -9,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "bisector/device.h"
+#include "kernels/layout/sizes.h"
 #include "host/device/buffer.h"
 #include "host/device/device.h"
 
@@ -32,11 +33,8 @@ inline Binding reads(const Buffer& buffer) { return {&buffer, Access::read}; }
 inline Binding writes(const Buffer& buffer) { return {&buffer, Access::write}; }
 inline Binding updates(const Buffer& buffer) { return {&buffer, Access::update}; }
 
-// What device time is counted for.
-enum class Phase { transfer, grid, neighbours, owners, clip, sort, sum };
-inline constexpr std::size_t kPhases = 7;
-
-inline constexpr std::uint32_t kGroupSize = 64;  // local_size_x of every kernel
+// What device time is counted for: one of the fields of DeviceSeconds.
+using Phase = double DeviceSeconds::*;
 
 // Each command sees what the commands before it wrote: barriers are put where a buffer written before is touched again, and
 // only for that buffer. Commands are recorded until run(), which submits them and waits.
@@ -74,7 +72,7 @@ class Commands {
   void run();
 
   // Seconds on the device by phase, over all runs since the last call, which it clears. All 0 without timestamps.
-  std::array<double, kPhases> take_seconds();
+  DeviceSeconds take_seconds();
 
  private:
   void dispatch(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes, std::size_t items);

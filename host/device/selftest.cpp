@@ -7,14 +7,11 @@
 #include <limits>
 #include <vector>
 
+#include "kernels/layout/push.h"
 #include "host/device/commands.h"
 
 namespace bisector::host {
 namespace {
-
-struct Push {
-  std::uint32_t count;
-};
 
 // Fixed bits that look random: splitmix64.
 std::uint64_t next_bits(std::uint64_t& state) {
@@ -64,7 +61,7 @@ std::vector<Result> run(Device& device, const char* kernel, const std::vector<Pa
   output.reserve(results.size() * sizeof(Result));
   Commands commands(device);
   commands.upload(input, 0, pairs.data(), pairs.size() * sizeof(Pair));
-  commands.dispatch({kernel, {}}, {reads(input), writes(output)}, Push{static_cast<std::uint32_t>(pairs.size())},
+  commands.dispatch({kernel, {}}, {reads(input), writes(output)}, CountPush{static_cast<std::uint32_t>(pairs.size())},
                     pairs.size());
   commands.download(output, 0, results.data(), results.size() * sizeof(Result));
   commands.run();

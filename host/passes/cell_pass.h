@@ -3,7 +3,6 @@
 
 #include <vector>
 
-#include "host/passes/counters.h"
 #include "host/passes/pair_pass.h"
 #include "host/passes/seed_stage.h"
 

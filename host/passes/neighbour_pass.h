@@ -14,7 +14,7 @@ struct ListSizes {
   double cell;
   std::uint32_t wide_most, wide_examined;
   double wide_cell;
-  double wide_share;                       // of the seeds, that there is room for
+  double wide_share;                       // of the seeds, whose wide lists there is memory for
 };
 // A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and takes
 // about 80, or 20 once it is optimised.
@@ -25,7 +25,7 @@ class NeighbourPass {
  public:
   NeighbourPass(Device& device, bool is_double, const ListSizes& sizes);
 
-  // Plans grids for seeds that lie about `spacing` apart and makes room; not while commands are recorded. Records the first
+  // Plans grids for seeds that lie about `spacing` apart and reserves memory; not while commands are recorded. Records the first
   // grid.
   void begin(Commands& commands, const DeviceSeeds& seeds, double spacing, Scan& scan);
   // Records the search for the first lists.
@@ -51,7 +51,7 @@ class NeighbourPass {
   SeedGrid grid_, wide_grid_;
   Buffer info_, lists_, wide_lists_, targets_, is_target_;
   std::uint32_t most_ = 0;         // entries of a first list
-  std::size_t target_room_ = 0;
+  std::size_t target_capacity_ = 0;
   bool wide_grid_built_ = false;
 };
 

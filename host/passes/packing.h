@@ -1,4 +1,4 @@
-// How positions and moments lie in device buffers: twins of kernels/real.glsl and points.glsl.
+// How positions and moments lie in device buffers: twins of kernels/real.glsl, points.glsl and layout/elements.h.
 #pragma once
 
 #include <cstddef>
@@ -8,12 +8,13 @@
 
 #include "core/geometry.h"
 #include "voronoi/moments.h"
+#include "kernels/layout/elements.h"
 #include "host/device/buffer.h"
 #include "host/device/commands.h"
 
 namespace bisector::host {
 
-// Words of one real, in bytes of a buffer.
+// Reals one after the other, as a buffer holds them.
 class RealWords {
  public:
   explicit RealWords(bool is_double) : double_(is_double) {}
@@ -25,7 +26,10 @@ class RealWords {
   // A position or direction with 48 bits or more: as it is in double, a high and a low part in single.
   void point(const Vec3& p);
   void moments(const Moments& m);
+  // Throws std::logic_error unless the next real is the one at this place: packing then does not follow kernels/layout/.
+  void expect_at(std::size_t place) const;
 
+  std::size_t count() const { return bytes_.size() / size(); }
   std::size_t size() const { return double_ ? sizeof(double) : sizeof(float); }
   const std::vector<std::byte>& bytes() const { return bytes_; }
 
@@ -54,6 +58,9 @@ inline void upload(Commands& commands, Buffer& buffer, const RealWords& words) {
 inline Kernel kernel(const char* name, bool is_double, std::vector<std::uint32_t> constants = {}) {
   return {std::string(name) + (is_double ? "_double" : "_single"), std::move(constants)};
 }
+
+// What loops_complete() of kernels/common.glsl needs: the compiler of the kernels may not know it.
+inline constexpr uint kTwo = 2;
 
 // Lengths times `scale`, a power of two, of moments over an area or a volume.
 Moments scaled(const Moments& m, double scale, bool is_solid = false);

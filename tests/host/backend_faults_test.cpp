@@ -399,10 +399,10 @@ TEST_P(Room, Grows) {
   const Diagram reference = cpu_diagram(surface, seeds);
   const Diagram roomy = diagram_of(*device_backend(surface, with_precision(GetParam())), seeds);
   expect_parity(surface, reference, roomy, GetParam());
-  const auto check = [&](const char* what, const host::Rooms& rooms) {
+  const auto check = [&](const char* what, const host::Capacities& capacities) {
     SCOPED_TRACE(what);
     VulkanOptions options = with_precision(GetParam());
-    options.rooms = rooms;
+    options.capacities = capacities;
     const auto backend = device_backend(surface, options);
     for (const char* round : {"cold", "warm"}) {
       SCOPED_TRACE(round);
@@ -412,7 +412,7 @@ TEST_P(Room, Grows) {
       EXPECT_EQ(found.moments.certification.cpu, roomy.moments.certification.cpu);
     }
   };
-  const host::Rooms plenty;
+  const host::Capacities plenty;
   check("table", {plenty.batch_pairs, 64, plenty.proposals, 0});
   check("proposals", {plenty.batch_pairs, plenty.table, 64, 0});
   check("pairs", {plenty.batch_pairs, plenty.table, plenty.proposals, 64});
@@ -430,7 +430,7 @@ TEST_P(Room, FacetsComeInChunks) {
   std::unique_ptr<Device> device = Device::open(device_request().value());
   host::limit_storage_range(*device, kRange);
   VulkanOptions options = with_precision(GetParam());
-  options.rooms = {10'000, 1 << 15, 1 << 16, 0};
+  options.capacities = {10'000, 1 << 15, 1 << 16, 0};
   const auto backend = host::make_vulkan_backend(surface, std::move(device), options);
   const Diagram reference = cpu_diagram(surface, seeds);
   for (int round = 0; round < 2; ++round)
@@ -448,7 +448,7 @@ TEST_P(Room, EndsAtWhatTheDeviceBinds) {
       std::unique_ptr<Device> device = Device::open(device_request().value());
       host::limit_storage_range(*device, range);
       VulkanOptions options = with_precision(GetParam());
-      options.rooms = {10'000, 64, 64, 64};
+      options.capacities = {10'000, 64, 64, 64};
       const auto backend = host::make_vulkan_backend(surface, std::move(device), options);
       CellMoments moments;
       backend->evaluate(seeds, moments);

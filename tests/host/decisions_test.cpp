@@ -28,6 +28,7 @@
 #include "host/passes/device_surface.h"
 #include "host/device/modules.h"
 #include "host/passes/packing.h"
+#include "kernels/layout/push.h"
 #include "support/models.h"
 
 namespace bisector::host {
@@ -326,7 +327,7 @@ std::vector<double> widened(const std::vector<std::byte>& bytes, bool is_double)
   return reals;
 }
 
-// All as host/vulkan_backend.cpp does it.
+// All as host/passes/vulkan_backend.cpp does it.
 Answers ask(Device& device, const Surface& surface, const Batch& batch, bool is_double) {
   Commands commands(device);
   const double scale = device_scale(surface);
@@ -540,10 +541,6 @@ TEST_F(Decisions, AreRightWhereTheyAreCertain) {
 }
 
 // --- Arithmetic ---
-
-struct CountPush {
-  std::uint32_t count;
-};
 
 std::vector<double> compute(Device& device, const RealWords& numbers, std::size_t count, bool is_double) {
   Commands commands(device);

@@ -13,6 +13,7 @@
 
 #include "host/device/commands.h"
 #include "host/device/modules.h"
+#include "kernels/layout/push.h"
 
 namespace bisector::host {
 
@@ -55,10 +56,6 @@ class HostTest : public testing::Test {
     }
     GTEST_SKIP() << "no Vulkan device can be used" << (list.problem.empty() ? "" : ": ") << list.problem;
   }
-};
-
-struct CountPush {
-  std::uint32_t count;
 };
 
 struct StepPush {

@@ -133,16 +133,16 @@ TEST_P(SolidFaults, LeaveAsDeviceErrorOrFallBack) {
 
 TEST_P(SolidFaults, RoomGrows) {
   SKIP_WITHOUT_DEVICE(processor_of(GetParam()));
-  const host::Rooms plenty;
-  const std::vector<host::Rooms> each{{plenty.batch_pairs, 64, plenty.proposals, 0},
+  const host::Capacities plenty;
+  const std::vector<host::Capacities> each{{plenty.batch_pairs, 64, plenty.proposals, 0},
                                       {plenty.batch_pairs, plenty.table, 64, 0},
                                       {plenty.batch_pairs, plenty.table, plenty.proposals, 64}},
       all{{20, 16, 16, 16}};
   for (const InnerCells inner : {InnerCells::whole, InnerCells::clipped}) {
     const Results roomy = evaluated(*device_backend(solid_, with_precision(GetParam()), inner), seeds_);
-    for (const host::Rooms& rooms : inner == InnerCells::whole ? each : all) {
+    for (const host::Capacities& capacities : inner == InnerCells::whole ? each : all) {
       VulkanOptions options = with_precision(GetParam());
-      options.rooms = rooms;
+      options.capacities = capacities;
       const auto backend = device_backend(solid_, options, inner);
       for (int round = 0; round < 2; ++round) {
         const Results found = evaluated(*backend, seeds_);
@@ -163,7 +163,7 @@ TEST_P(SolidFaults, RoomEndsAtWhatTheDeviceBinds) {
       std::unique_ptr<Device> device = Device::open(device_for(processor_of(GetParam())).value());
       host::limit_storage_range(*device, range);
       VulkanOptions options = with_precision(GetParam());
-      options.rooms = {1000, 64, 64, 64};
+      options.capacities = {1000, 64, 64, 64};
       CellMoments moments;
       host::make_vulkan_solid_backend(solid_, std::move(device), options)->evaluate(seeds_, moments);
     });
