@@ -16,6 +16,9 @@
 
 namespace bisector::host {
 
+// Never throws for lack of a loader, a driver or a device.
+DeviceList list_devices();
+
 struct DeviceLimits {
   std::size_t storage_range = 0;      // bytes of one storage buffer binding
   std::size_t storage_alignment = 0;  // of a binding's offset

@@ -1,14 +1,12 @@
 // What is left of the device layer in a build without Vulkan.
 #include "host/device/device.h"
 
-namespace bisector {
+namespace bisector::host {
 namespace {
 constexpr const char* kWithout = "built without Vulkan";
 }
 
 DeviceList list_devices() { return {.devices = {}, .problem = kWithout}; }
-
-namespace host {
 
 struct Device::Impl {};
 
@@ -18,5 +16,4 @@ std::unique_ptr<Device> Device::open(const DeviceRequest& request) {
 Device::~Device() = default;
 const DeviceDescription& Device::description() const { throw DeviceError(kWithout); }
 
-}  // namespace host
-}  // namespace bisector
+}  // namespace bisector::host
