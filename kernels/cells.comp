@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// What leaves the device: the moments of each cell, and a median of the masses nearby, for steps that do not vanish with
-// a cell.
+// What leaves the device: the moments of each cell, and a median of the masses nearby, for steps that do not vanish
+// with a cell.
 #include "common.glsl"
 #include "real.glsl"
 #include "points.glsl"

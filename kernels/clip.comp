@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Clips pairs of a facet and a cell, integrates, and proposes the cells that the polygon borders on. A pair that cannot be
-// certified is listed for the next rung instead.
+// Clips pairs of a facet and a cell, integrates, and proposes the cells that the polygon borders on. A pair that cannot
+// be certified is listed for the next rung instead.
 #include "common.glsl"
 #include "real.glsl"
 #include "points.glsl"
@@ -94,7 +94,8 @@ void main() {
   }
   status_of[pair] = status;
   if (kRung != kRungDouble && status == kStatusUnsure) atomicAdd(counters[kUnsurePairs], 1u);
-  if (kRung == kRungDouble && status != kStatusClipped && status != kStatusEmpty) atomicAdd(counters[kUnsureInDouble], 1u);
+  if (kRung == kRungDouble && status != kStatusClipped && status != kStatusEmpty)
+    atomicAdd(counters[kUnsureInDouble], 1u);
   if (status == kStatusClipped) {
     store_moments(pair, integrate(kUniform));
 #if !BISECTOR_DOUBLE

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Clips pairs of a tetrahedron and a cell, integrates, and proposes the pairs that the polyhedron makes known. A pair that cannot be
-// certified is listed for the next rung instead.
+// Clips pairs of a tetrahedron and a cell, integrates, and proposes the pairs that the polyhedron makes known. A pair
+// that cannot be certified is listed for the next rung instead.
 #include "common.glsl"
 #include "real.glsl"
 #include "points.glsl"
@@ -14,7 +14,7 @@ layout(constant_id = 4) const bool kListed = false;  // the pairs are those of a
 layout(constant_id = 5) const bool kLabels = false;  // writes labels, and nothing else
 layout(constant_id = 6) const bool kNarrow = false;  // moments are kept in single precision
 layout(constant_id = 7) const bool kDoubleNext = false;  // uncertain pairs go to the rung of double precision
-layout(constant_id = 8) const bool kInnerWhole = false;  // cells that do not meet the boundary are clipped from the enclosure
+layout(constant_id = 8) const bool kInnerWhole = false;  // cells off the boundary are clipped from the enclosure
 
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
@@ -54,15 +54,16 @@ void propose(uint tet, uint slot) {
   else atomicOr(counters[kOverflow], kOverflowProposals);
 }
 
-// Everywhere, or with all inner cells clipped: the other cells of the tetrahedron. Else the cell goes on to the tetrahedra across
-// facets that it meets, and a neighbour that does not meet the boundary is known to lie inside.
+// Everywhere, or with all inner cells clipped: the other cells of the tetrahedron. Else the cell goes on to the
+// tetrahedra across facets that it meets, and a neighbour that does not meet the boundary is known to lie inside.
 void propose_all(uint tet) {
   [[dont_unroll]] for (uint k = 0; k < bounding_count; ++k) {
     const uint label = plane_label[bounding[k]];
     if ((label & kFacetLabel) == 0) {
       if (!kInnerWhole) {
         propose(tet, label);
-      } else if ((atomicOr(cell_errors[kCellErrorWords * cell_count + label], kMarkMet) & (kMarkBoundary | kMarkMet)) == 0) {
+      } else if ((atomicOr(cell_errors[kCellErrorWords * cell_count + label], kMarkMet) &
+                  (kMarkBoundary | kMarkMet)) == 0) {
         propose(enclosure, label);
       }
     } else if (kInnerWhole) {
@@ -141,7 +142,8 @@ void main() {
   }
   status_of[pair] = status;
   if (kRung != kRungDouble && status == kStatusUnsure) atomicAdd(counters[kUnsurePairs], 1u);
-  if (kRung == kRungDouble && status != kStatusClipped && status != kStatusEmpty) atomicAdd(counters[kUnsureInDouble], 1u);
+  if (kRung == kRungDouble && status != kStatusClipped && status != kStatusEmpty)
+    atomicAdd(counters[kUnsureInDouble], 1u);
   if (status == kStatusClipped || status == kStatusWhole) {
     store_moments(pair, moments);
 #if !BISECTOR_DOUBLE

@@ -13,8 +13,8 @@ uint invocation() {
   return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
 }
 
-// Whether all loops so far ran to their ends. Mesa's llvmpipe ends every loop of an invocation after its first pass once they
-// have run 65535 times in all. `two` must be 2, and unknown to the compiler.
+// Whether all loops so far ran to their ends. Mesa's llvmpipe ends every loop of an invocation after its first pass
+// once they have run 65535 times in all. `two` must be 2, and unknown to the compiler.
 bool loops_complete(uint two) {
   uint passes = 0;
   [[dont_unroll]] for (uint k = 0; k < two; ++k) passes += two - k;

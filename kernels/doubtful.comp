@@ -6,9 +6,9 @@
 layout(constant_id = 0) const bool kDoubleNext = false;
 layout(constant_id = 1) const bool kSolid = false;  // masses are volumes, not areas
 
-// Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a polygon
-// for as far off as its farthest corner, by less still. The bounds of polyhedra, whose vertices have more to be off by, are found
-// to be five hundred times too large and more.
+// Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a
+// polygon for as far off as its farthest corner, by less still. The bounds of polyhedra, whose vertices have more to be
+// off by, are found to be five hundred times too large and more.
 const float kMassError = kSolid ? 3e-3 : 4e-4, kEnergyError = kSolid ? 9e-3 : 1.2e-3;
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
@@ -29,7 +29,8 @@ void main() {
   precise float least = 0.25 * cells[kCellWords * slot + kCellMedianAt];
   precise float mass = max(cells[kCellWords * slot], least);
   const float extent = mass / mean_density;
-  precise float energy = max(cells[kCellWords * slot + kSecondMomentAt], mass * (kSolid ? pow(extent, 2.0 / 3.0) : extent));
+  precise float energy =
+      max(cells[kCellWords * slot + kSecondMomentAt], mass * (kSolid ? pow(extent, 2.0 / 3.0) : extent));
   precise float most_mass = kMassError * share * mass;
   precise float most_energy = kEnergyError * share * energy;
   if (!(uintBitsToFloat(cell_errors[kCellErrorWords * slot]) > most_mass) &&

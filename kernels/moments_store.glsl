@@ -1,5 +1,5 @@
-// Moments of pairs in buffers of words, in the precision of the whole diagram: that of the build, or single where the double
-// kernels help out (kNarrow).
+// Moments of pairs in buffers of words, in the precision of the whole diagram: that of the build, or single where the
+// double kernels help out (kNarrow).
 
 #if BISECTOR_DOUBLE
 void store_real(uint at, real value, bool of_first) {

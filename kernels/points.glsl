@@ -1,5 +1,5 @@
-// Points as they lie in buffers. Beside each seed's index (`ids`) are the low words of its coordinates as doubles: with them
-// equality is told in single precision too.
+// Points as they lie in buffers. Beside each seed's index (`ids`) are the low words of its coordinates as doubles: with
+// them equality is told in single precision too.
 
 bool same_coordinate(Point a, uvec3 low_a, Point b, uvec3 low_b, int k) {
 #if BISECTOR_DOUBLE

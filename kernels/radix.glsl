@@ -1,4 +1,5 @@
-// One pass of a stable radix sort over kRadixBits bits of the first word. Each invocation owns a run of consecutive items.
+// One pass of a stable radix sort over kRadixBits bits of the first word. Each invocation owns a run of consecutive
+// items.
 #define PUSH_RADIX
 #include "layout/push.h"
 #include "layout/sizes.h"

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Incident pairs in the order of triangles. Those of one triangle come in any order, which the stable sort by cells that
-// follows takes away, for they have different cells. `places` starts as the triangles' beginnings.
+// Incident pairs in the order of triangles. Those of one triangle come in any order, which the stable sort by cells
+// that follows takes away, for they have different cells. `places` starts as the triangles' beginnings.
 #include "common.glsl"
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };

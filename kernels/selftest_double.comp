@@ -1,5 +1,5 @@
-// What double precision is used for, on pairs, for the host to compare bit by bit: arithmetic, the error terms that contraction
-// or wrong rounding spoil, and conversions.
+// What double precision is used for, on pairs, for the host to compare bit by bit: arithmetic, the error terms that
+// contraction or wrong rounding spoil, and conversions.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 

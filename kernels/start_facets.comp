@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Opens a batch of facets: one whose corners lie in one cell lies in it, for cells are convex; for others the owners of their
-// corners are proposed.
+// Opens a batch of facets: one whose corners lie in one cell lies in it, for cells are convex; for others the owners of
+// their corners are proposed.
 #include "common.glsl"
 #include "real.glsl"
 #include "points.glsl"

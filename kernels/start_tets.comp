@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Opens a batch of tetrahedra: notes which lie in one cell, for cells are convex, and proposes the owners of the corners.
+// Opens a batch of tetrahedra: notes which lie in one cell, for cells are convex, and proposes the owners of the
+// corners.
 #include "common.glsl"
 
 layout(constant_id = 0) const bool kPropose = true;

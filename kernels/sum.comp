@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The rule of all sums: a cell's terms in ascending triangle index, by blocks of kSumBlock, then the blocks' sums likewise. One
-// invocation sums one block of one level.
+// The rule of all sums: a cell's terms in ascending triangle index, by blocks of kSumBlock, then the blocks' sums
+// likewise. One invocation sums one block of one level.
 #include "common.glsl"
 #include "real.glsl"
 
@@ -29,7 +29,8 @@ Moments term(uint k) {
   if (kPairsLevel) {
     const uint pair = items[k].y;
     m.mass = mass_second[kMassSecondWords * pair];
-    m.first = real3(first_moments[kFirstWords * pair], first_moments[kFirstWords * pair + 1], first_moments[kFirstWords * pair + 2]);
+    m.first = real3(first_moments[kFirstWords * pair], first_moments[kFirstWords * pair + 1],
+                    first_moments[kFirstWords * pair + 2]);
     m.second = mass_second[kMassSecondWords * pair + 1];
   } else {
     m.mass = terms[kMomentWords * k];

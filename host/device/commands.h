@@ -15,9 +15,9 @@
 
 namespace bisector::host {
 
-// Names one of the embedded SPIR-V modules (kernels/NAME.comp gives "NAME", or "NAME_single" and "NAME_double" where it is
-// built for both precisions) and gives its specialisation constants 0, 1, ... The number of bindings and of bytes of push
-// constants are read off the first dispatch.
+// Names one of the embedded SPIR-V modules (kernels/NAME.comp gives "NAME", or "NAME_single" and "NAME_double" where it
+// is built for both precisions) and gives its specialisation constants 0, 1, ... The number of bindings and of bytes of
+// push constants are read off the first dispatch.
 struct Kernel {
   std::string name;
   std::vector<std::uint32_t> constants;
@@ -36,8 +36,8 @@ inline Binding updates(const Buffer& buffer) { return {&buffer, Access::update};
 // What device time is counted for: one of the fields of DeviceSeconds.
 using Phase = double DeviceSeconds::*;
 
-// Each command sees what the commands before it wrote: barriers are put where a buffer written before is touched again, and
-// only for that buffer. Commands are recorded until run(), which submits them and waits.
+// Each command sees what the commands before it wrote: barriers are put where a buffer written before is touched again,
+// and only for that buffer. Commands are recorded until run(), which submits them and waits.
 class Commands {
  public:
   explicit Commands(Device& device);
@@ -52,8 +52,8 @@ class Commands {
   // offset and bytes are multiples of 4.
   void fill(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::uint32_t word);
 
-  // Runs the kernel with at least `items` invocations, in workgroups of kGroupSize laid out in x and y so that both stay within
-  // the device's limits; none if items is 0. Bindings are numbered in order, set 0, each the whole buffer.
+  // Runs the kernel with at least `items` invocations, in workgroups of kGroupSize laid out in x and y so that both
+  // stay within the device's limits; none if items is 0. Bindings are numbered in order, set 0, each the whole buffer.
   template <class Push>
   void dispatch(const Kernel& kernel, std::initializer_list<Binding> bindings, const Push& push, std::size_t items) {
     static_assert(sizeof(Push) <= 128 && sizeof(Push) % 4 == 0);

@@ -1,8 +1,9 @@
-// A Vulkan 1.2 device, opened through a loader that is found at run time. No Vulkan types are visible outside host/device/.
+// A Vulkan 1.2 device, opened through a loader that is found at run time. No Vulkan types are visible outside
+// host/device/.
 //
-// Environment variables: BISECTOR_CACHE names a file or folder to keep compiled pipelines in (nothing is kept without it);
-// BISECTOR_VULKAN_VALIDATION=1 or 2 enables the validation layers; BISECTOR_VULKAN_LOADER names another loader than
-// libvulkan.so.1.
+// Environment variables: BISECTOR_CACHE names a file or folder to keep compiled pipelines in (nothing is kept without
+// it); BISECTOR_VULKAN_VALIDATION=1 or 2 enables the validation layers; BISECTOR_VULKAN_LOADER names another loader
+// than libvulkan.so.1.
 #pragma once
 
 #include <cstddef>

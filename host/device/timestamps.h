@@ -14,7 +14,8 @@ class Timestamps {
  public:
   explicit Timestamps(Device::Impl& device) : device_(device) {}
 
-  // What follows in the recording counts for the phase; the first call of a recording starts the clock. Throws DeviceError.
+  // What follows in the recording counts for the phase; the first call of a recording starts the clock. Throws
+  // DeviceError.
   void mark(const vk::raii::CommandBuffer& commands, Phase phase);
   void finish(const vk::raii::CommandBuffer& commands);
   // Adds up what the device has run. Throws DeviceError.

@@ -13,12 +13,13 @@ class CellPass {
   // `is_solid`: masses are volumes.
   CellPass(Device& device, bool is_double, bool is_solid);
 
-  // Once per domain: of each element its place in the order in which a cell's terms are summed, and how many places there are.
+  // Once per domain: of each element its place in the order in which a cell's terms are summed, and how many places
+  // there are.
   void set_elements(Commands& commands, const std::vector<Index>& places, std::size_t count);
   // Brings the pairs into the order in which they are summed.
   void sort(Commands& commands, std::size_t cells, Scan& scan, const PairStore& store);
-  // Fills in cells, mass and energy, of step_mass what the lists tell (negative where they do not), and as triangles the places
-  // of each cell's elements.
+  // Fills in cells, mass and energy, of step_mass what the lists tell (negative where they do not), and as triangles
+  // the places of each cell's elements.
   void sum(SeedStage& stage, const PairStore& store, CellMoments& result);
   // Mass, first and second moment of each cell, and the median mass nearby.
   const Buffer& cells() const { return cells_; }

@@ -16,9 +16,9 @@ namespace bisector::host {
 double mass_tolerance_of(bool is_double);
 double energy_noise_of(bool is_double);
 
-// In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs, and more of them for
-// as long as the masses do not add up to `mass`. `refine` does so with a share of the errors that are allowed and returns
-// how many pairs there were; `sum` adds the masses up anew.
+// In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs, and more of them
+// for as long as the masses do not add up to `mass`. `refine` does so with a share of the errors that are allowed and
+// returns how many pairs there were; `sum` adds the masses up anew.
 void refine_masses(double mass, const CellMoments& moments, const std::function<std::size_t(float share)>& refine,
                    const std::function<void()>& sum);
 

@@ -11,8 +11,8 @@
 
 namespace bisector::host {
 
-// The power of two by which lengths are multiplied on the device: the diagonal is then near 2^16, so that second moments of all
-// of a solid and of cells 2^-36 of its size are within the range of single precision.
+// The power of two by which lengths are multiplied on the device: the diagonal is then near 2^16, so that second
+// moments of all of a solid and of cells 2^-36 of its size are within the range of single precision.
 double device_scale(const Solid& solid);
 
 // Tetrahedra in their order, then the enclosure, as the clipping reads them on either side.

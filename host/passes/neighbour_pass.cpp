@@ -15,8 +15,10 @@ namespace {
 
 constexpr std::uint32_t kLeastEntries = 12;           // of a list, for most cells to be certified by theirs
 constexpr std::size_t kLeastTargets = 4096;           // wide lists that there is memory for, however few the seeds are
-constexpr float kUnlimited = 2e37f;                   // a squared radius beyond kInfinity of kernels/real.glsl: all seeds are listed
-constexpr double kRadiusMargin = 1e-6;                // relative: a squared radius is rounded to single precision, and may not grow
+// A squared radius beyond kInfinity of kernels/real.glsl: all seeds are listed.
+constexpr float kUnlimited = 2e37f;
+// Relative, by which squared radii are made smaller, for rounding them to single precision may make none larger.
+constexpr double kRadiusMargin = 1e-6;
 constexpr std::size_t kWord = sizeof(std::uint32_t);
 
 }  // namespace

@@ -16,8 +16,8 @@ struct ListSizes {
   double wide_cell;
   double wide_share;                       // of the seeds, whose wide lists there is memory for
 };
-// A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and takes
-// about 80, or 20 once it is optimised.
+// A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and
+// takes about 80, or 20 once it is optimised.
 inline constexpr ListSizes kSurfaceLists{32, 512, 1.8, 224, 1024, 4.5, 0.25},
     kSolidLists{96, 1024, 2.9, 256, 1536, 3.3, 1};
 
@@ -25,8 +25,8 @@ class NeighbourPass {
  public:
   NeighbourPass(Device& device, bool is_double, const ListSizes& sizes);
 
-  // Plans grids for seeds that lie about `spacing` apart and reserves memory; not while commands are recorded. Records the first
-  // grid.
+  // Plans grids for seeds that lie about `spacing` apart and reserves memory; not while commands are recorded. Records
+  // the first grid.
   void begin(Commands& commands, const DeviceSeeds& seeds, double spacing, Scan& scan);
   // Records the search for the first lists.
   void list_nearest(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters);

@@ -19,7 +19,8 @@ class OwnerPass {
   void forget() { from_scratch_ = true; }
   // Records the search. With `report`, points without a certain owner are listed; else they are left with none.
   void record(Commands& commands, const DeviceSeeds& seeds, const SeedGrid& grid, const Buffer& counters, bool report);
-  // Once that has run: finds the owners of the `uncertain` points that were listed in exact arithmetic, and records their upload.
+  // Once that has run: finds the owners of the `uncertain` points that were listed in exact arithmetic, and records
+  // their upload.
   void complete(Commands& commands, std::size_t uncertain, ExactRung& exact);
 
   const Buffer& owners() const { return owners_; }

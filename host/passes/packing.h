@@ -26,7 +26,8 @@ class RealWords {
   // A position or direction with 48 bits or more: as it is in double, a high and a low part in single.
   void point(const Vec3& p);
   void moments(const Moments& m);
-  // Throws std::logic_error unless the next real is the one at this place: packing then does not follow kernels/layout/.
+  // Throws std::logic_error unless the next real is the one at this place: packing then does not follow
+  // kernels/layout/.
   void expect_at(std::size_t place) const;
 
   std::size_t count() const { return bytes_.size() / size(); }
@@ -38,12 +39,12 @@ class RealWords {
   std::vector<std::byte> bytes_;
 };
 
-// With it, equal pairs of floats mean equal doubles: the low half of the bits of x, a coordinate of the seed in `slot`, which
-// scaling by a power of two leaves as it is. A number that a float cannot hold counts as equal to no other.
+// With it, equal pairs of floats mean equal doubles: the low half of the bits of x, a coordinate of the seed in `slot`,
+// which scaling by a power of two leaves as it is. A number that a float cannot hold counts as equal to no other.
 std::uint32_t low_word(double x, double scale, std::size_t slot);
 
-// What a coordinate of the difference of two positions may lack in single precision, coordinates being at most `largest`: two
-// positions of 48 bits and the rounding of their difference.
+// What a coordinate of the difference of two positions may lack in single precision, coordinates being at most
+// `largest`: two positions of 48 bits and the rounding of their difference.
 inline float residual_of(double largest) { return static_cast<float>(0x1p-44 * largest); }
 
 // Makes room in the buffer for the data and records their transfer.

@@ -14,7 +14,8 @@ namespace {
 constexpr std::size_t kWord = sizeof(std::uint32_t);
 constexpr int kRoundsPerRun = 6;           // of proposals and clipping, before the host looks again
 constexpr uint kAsCounted = kNone;
-// Pairs that there is memory for, in those that are expected: when it is asked for, and below which it is asked for anew.
+// Pairs that there is memory for, in those that are expected: when it is asked for, and below which it is asked for
+// anew.
 constexpr double kCapacityMargin = 1.3, kLeastMargin = 1.1;
 constexpr std::size_t kSpareCapacity = 4096;
 

@@ -1,6 +1,6 @@
-// Incident pairs of elements (facets of a surface, tetrahedra of a solid) and cells, with their moments: clipping by batches of
-// elements, from a few certain pairs outwards, and the rungs for what is not certain: wider lists, double precision, exact
-// arithmetic.
+// Incident pairs of elements (facets of a surface, tetrahedra of a solid) and cells, with their moments: clipping by
+// batches of elements, from a few certain pairs outwards, and the rungs for what is not certain: wider lists, double
+// precision, exact arithmetic.
 #pragma once
 
 #include <array>
@@ -18,7 +18,8 @@
 
 namespace bisector::host {
 
-// Pairs in the order in which they were met, which is not the same from run to run; their set is, and what is stored of each.
+// Pairs in the order in which they were met, which is not the same from run to run; their set is, and what is stored of
+// each.
 struct PairStore {
   explicit PairStore(Device& device) : pairs(device), status(device), mass_second(device), first(device) {}
 
@@ -100,8 +101,9 @@ class PairPass {
 
   // Finds all pairs. Counts in `certification` what climbed which rung.
   void run(const PairJob& job, Certification& certification);
-  // In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs. `cells` are those of
-  // CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there were.
+  // In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs. `cells` are
+  // those of CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there
+  // were.
   std::size_t refine(const PairJob& job, const Buffer& cells, float share, Certification& certification);
   // Records the clipping of `count` pairs from `first` on, of one batch, for their labels.
   void label(const PairJob& job, std::size_t chunk, std::size_t first, std::size_t count, const Buffer& labels);

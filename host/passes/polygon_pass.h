@@ -1,5 +1,5 @@
-// Polygons of a diagram that the device has found: labels from the device, coordinates by the CPU's formula from these, so
-// that they are the CPU's bit for bit in either precision.
+// Polygons of a diagram that the device has found: labels from the device, coordinates by the CPU's formula from these,
+// so that they are the CPU's bit for bit in either precision.
 #pragma once
 
 #include "voronoi/restricted.h"

@@ -1,5 +1,5 @@
-// What an evaluation on a device starts with, whatever its domain: the seeds on the device in a spatial order, and lists of their
-// neighbours.
+// What an evaluation on a device starts with, whatever its domain: the seeds on the device in a spatial order, and
+// lists of their neighbours.
 #pragma once
 
 #include <memory>
@@ -35,8 +35,8 @@ class SeedStage {
   void record();
   // Whether slots mean other seeds than in the last evaluation.
   bool sorted_anew() const { return !followed_; }
-  // To be called once what was recorded has run. If seeds that kept their slots have come to coincide, sorts all anew and returns
-  // false: then all has to be recorded again.
+  // To be called once what was recorded has run. If seeds that kept their slots have come to coincide, sorts all anew
+  // and returns false: then all has to be recorded again.
   bool keeps_slots(const std::vector<Vec3>& seeds, const Counters& counters);
   // Runs what is recorded and reads the counters.
   Counters run_counted();

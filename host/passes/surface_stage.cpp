@@ -3,7 +3,8 @@
 namespace bisector::host {
 namespace {
 
-constexpr double kReplan = 1.5;  // factor by which the number of seeds changes before batches and samples are planned anew
+// By what factor the number of seeds changes before batches and samples are planned anew.
+constexpr double kReplan = 1.5;
 
 }  // namespace
 

@@ -16,8 +16,8 @@ static_assert(kFacetLabel == LAYOUT_BORDER_LABEL);
 
 uint word(std::size_t n) { return static_cast<uint>(n); }
 
-// Cells that a tetrahedron meets, of `density` per volume: those balls of a cell's volume that do, by Steiner's formula, edges being
-// as sharp as a regular one's.
+// Cells that a tetrahedron meets, of `density` per volume: those balls of a cell's volume that do, by Steiner's
+// formula, edges being as sharp as a regular one's.
 double expected_cells(const TetFrame& tet, double volume, double density) {
   double area = 0, length = 0;
   for (int k = 0; k < 4; ++k) {

@@ -1,5 +1,5 @@
-// The backend that computes restricted Voronoi diagrams in compute shaders. Pairs and labels are those of CpuBackend; in double
-// precision the moments are too, bit for bit.
+// The backend that computes restricted Voronoi diagrams in compute shaders. Pairs and labels are those of CpuBackend;
+// in double precision the moments are too, bit for bit.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,8 @@ struct VulkanOptions {
   Capacities capacities = {};
 };
 
-// The surface must outlive the backend; the device may serve several, one at a time. Throws DeviceError; precision `double_` on a device without double does.
+// The surface must outlive the backend; the device may serve several, one at a time. Throws DeviceError; precision
+// `double_` on a device without double does.
 std::unique_ptr<Backend> make_vulkan_backend(const Surface& surface, std::shared_ptr<Device> device,
                                              const VulkanOptions& options);
 

@@ -1,5 +1,5 @@
-// Facets and tetrahedra as they lie in buffers. A point is three doubles, or in single precision three high and three low floats; a
-// vector is three words in either. Places are in words of one real within an element.
+// Facets and tetrahedra as they lie in buffers. A point is three doubles, or in single precision three high and three
+// low floats; a vector is three words in either. Places are in words of one real within an element.
 #ifndef BISECTOR_KERNELS_LAYOUT_ELEMENTS_H
 #define BISECTOR_KERNELS_LAYOUT_ELEMENTS_H
 
@@ -10,8 +10,8 @@ LAYOUT_BEGIN
 LAYOUT_CONSTANT uint kSinglePointWords = 6;
 LAYOUT_CONSTANT uint kDoublePointWords = 3;
 
-// A facet: three corners (points), normal (point), in single precision the outward unit normals of the edges within the facet's
-// plane (points), densities at the corners, gradient of the density (vector).
+// A facet: three corners (points), normal (point), in single precision the outward unit normals of the edges within the
+// facet's plane (points), densities at the corners, gradient of the density (vector).
 LAYOUT_CONSTANT uint kSingleFacetNormalAt = 18;
 LAYOUT_CONSTANT uint kSingleFacetEdgesAt = 24;
 LAYOUT_CONSTANT uint kSingleFacetDensityAt = 42;
@@ -22,15 +22,16 @@ LAYOUT_CONSTANT uint kDoubleFacetDensityAt = 12;
 LAYOUT_CONSTANT uint kDoubleFacetGradientAt = 15;
 LAYOUT_CONSTANT uint kDoubleFacetWords = 18;
 
-// Whole numbers of a facet: sites of the corners, triangle, bits: of two bits each the anchor, the edges' origins, their ranks.
+// Whole numbers of a facet: sites of the corners, triangle, bits: of two bits each the anchor, the edges' origins,
+// their ranks.
 LAYOUT_CONSTANT uint kFacetMetaWords = 5;
 LAYOUT_CONSTANT uint kFacetTriangleAt = 3;
 LAYOUT_CONSTANT uint kFacetBitsAt = 4;
 LAYOUT_CONSTANT uint kOriginShift = 2;
 LAYOUT_CONSTANT uint kRankShift = 8;
 
-// A tetrahedron: four corners (points), outward unit normals of the facets (points), densities at the corners, gradient of the
-// density (vector), moments about the anchor.
+// A tetrahedron: four corners (points), outward unit normals of the facets (points), densities at the corners, gradient
+// of the density (vector), moments about the anchor.
 LAYOUT_CONSTANT uint kSingleTetNormalsAt = 24;
 LAYOUT_CONSTANT uint kSingleTetDensityAt = 48;
 LAYOUT_CONSTANT uint kDoubleTetNormalsAt = 12;
@@ -39,8 +40,9 @@ LAYOUT_CONSTANT uint kTetGradientAfterDensity = 4;
 LAYOUT_CONSTANT uint kTetMomentsAfterDensity = 7;
 LAYOUT_CONSTANT uint kTetWordsAfterDensity = 12;
 
-// Whole numbers of a tetrahedron: sites of the corners (none if it has no volume or is the enclosure), tetrahedra across the facets,
-// bits: of two bits each the corners in order and the facets' anchors; the cell that owns all corners, or none.
+// Whole numbers of a tetrahedron: sites of the corners (none if it has no volume or is the enclosure), tetrahedra
+// across the facets, bits: of two bits each the corners in order and the facets' anchors; the cell that owns all
+// corners, or none.
 LAYOUT_CONSTANT uint kTetMetaWords = 10;
 LAYOUT_CONSTANT uint kTetAcrossAt = 4;
 LAYOUT_CONSTANT uint kTetBitsAt = 8;

@@ -41,8 +41,8 @@ LAYOUT_CONSTANT uint kFirstWords = 3;
 LAYOUT_CONSTANT uint kCellWords = 6;
 LAYOUT_CONSTANT uint kCellMedianAt = 5;
 
-// Of each cell, in single precision: the bits of the largest error of mass that its pairs may have, then of energy. Behind those
-// of all cells lies one word of marks for each.
+// Of each cell, in single precision: the bits of the largest error of mass that its pairs may have, then of energy.
+// Behind those of all cells lies one word of marks for each.
 LAYOUT_CONSTANT uint kCellErrorWords = 2;
 LAYOUT_CONSTANT uint kEnergyErrorAt = 1;
 LAYOUT_CONSTANT uint kMarkWords = 1;
@@ -51,8 +51,8 @@ LAYOUT_CONSTANT uint kMarkMet = 2;            // some inner cell has it for a ne
 
 // Labels of a polygon: their number (or none where it is uncertain), then the labels.
 LAYOUT_CONSTANT uint kPolygonHeader = 1;
-// Labels of a polyhedron: the numbers of planes (or none where it is uncertain) and of vertices, then the planes' labels in order
-// of their keys, then for each vertex the places of its three planes among them, a byte each.
+// Labels of a polyhedron: the numbers of planes (or none where it is uncertain) and of vertices, then the planes'
+// labels in order of their keys, then for each vertex the places of its three planes among them, a byte each.
 LAYOUT_CONSTANT uint kPolyhedronHeader = 2;
 
 // Pairs that the CPU is asked about: pair, element, slot.

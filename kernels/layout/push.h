@@ -1,5 +1,5 @@
-// The push constants of all kernels. A kernel has one block of them and chooses it by defining the block's PUSH_... before it
-// includes this header.
+// The push constants of all kernels. A kernel has one block of them and chooses it by defining the block's PUSH_...
+// before it includes this header.
 #ifndef BISECTOR_KERNELS_LAYOUT_PUSH_H
 #define BISECTOR_KERNELS_LAYOUT_PUSH_H
 
@@ -113,7 +113,8 @@ PUSH_CONSTANTS(AdmitPush) {
 // Of clip.comp and clip_tet.comp.
 #if LAYOUT_CPLUSPLUS || defined(PUSH_CLIP)
 PUSH_CONSTANTS(ClipPush) {
-  uint element_base;        // the first facet of the buffers; of a solid: the enclosure, the element after the last tetrahedron
+  // The first facet of the buffers; of a solid the enclosure, which is the element after the last tetrahedron.
+  uint element_base;
   float residual;           // what a difference of two positions may lack in single precision; 0 in double
   uint two;                 // 2: see loops_complete() of common.glsl
   uint first_pair;          // of the range; for listed pairs: the list's first entry
@@ -154,16 +155,16 @@ LAYOUT_END
 #ifdef __cplusplus
 namespace bisector::host {
 
-// In GLSL blocks are laid out by std430: scalars of four bytes follow each other, and a vec3 starts at a multiple of 16 bytes and
-// takes 12.
+// In GLSL blocks are laid out by std430: scalars of four bytes follow each other, and a vec3 starts at a multiple of 16
+// bytes and takes 12.
 static_assert(sizeof(float) == sizeof(uint) && sizeof(vec3) == 3 * sizeof(float) && alignof(vec3) == alignof(float));
 static_assert(sizeof(CountPush) == 4 && sizeof(CellsPush) == 4);
 static_assert(sizeof(GridPush) == 24 && offsetof(GridPush, grid_lower) == 0 && offsetof(GridPush, grid_inverse) == 12 &&
               offsetof(GridPush, bucket_mask) == 16 && offsetof(GridPush, seed_count) == 20);
 static_assert(sizeof(NeighboursPush) == 40 && offsetof(NeighboursPush, grid_lower) == 0 &&
               offsetof(NeighboursPush, residual) == 24 && offsetof(NeighboursPush, target_capacity) == 36);
-static_assert(sizeof(OwnersPush) == 40 && offsetof(OwnersPush, grid_lower) == 0 && offsetof(OwnersPush, residual) == 24 &&
-              offsetof(OwnersPush, report_uncertain) == 36);
+static_assert(sizeof(OwnersPush) == 40 && offsetof(OwnersPush, grid_lower) == 0 &&
+              offsetof(OwnersPush, residual) == 24 && offsetof(OwnersPush, report_uncertain) == 36);
 static_assert(sizeof(WideTargetsPush) == 8 && offsetof(WideTargetsPush, target_capacity) == 4);
 static_assert(sizeof(StartFacetsPush) == 20 && offsetof(StartFacetsPush, pair_capacity) == 16);
 static_assert(sizeof(StartSamplesPush) == 16 && offsetof(StartSamplesPush, proposal_capacity) == 12);
@@ -172,7 +173,8 @@ static_assert(sizeof(StartBoundaryPush) == 12 && offsetof(StartBoundaryPush, pro
 static_assert(sizeof(AdvancePush) == 16 && offsetof(AdvancePush, most_items) == 12);
 static_assert(sizeof(AdmitPush) == 8 && offsetof(AdmitPush, pair_capacity) == 4);
 static_assert(sizeof(ClipPush) == 32 && offsetof(ClipPush, residual) == 4 && offsetof(ClipPush, cell_count) == 28);
-static_assert(sizeof(DoubtfulPush) == 20 && offsetof(DoubtfulPush, mean_density) == 12 && offsetof(DoubtfulPush, share) == 16);
+static_assert(sizeof(DoubtfulPush) == 20 && offsetof(DoubtfulPush, mean_density) == 12 &&
+              offsetof(DoubtfulPush, share) == 16);
 static_assert(sizeof(GatherPairsPush) == 8 && offsetof(GatherPairsPush, count) == 4);
 static_assert(sizeof(RadixPush) == 12 && offsetof(RadixPush, shift) == 8);
 

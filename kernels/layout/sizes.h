@@ -11,7 +11,8 @@ LAYOUT_CONSTANT uint kGroupSize = 64;      // invocations of a workgroup, of eve
 LAYOUT_CONSTANT uint kScanLane = 16;       // values that one invocation of scan_blocks.comp sums
 LAYOUT_CONSTANT uint kScanBlock = 1024;    // and one workgroup: kGroupSize * kScanLane
 
-LAYOUT_CONSTANT uint kSumBlock = 32;       // terms that sum.comp adds in a row: the CPU's rule of sums (voronoi/fixed_tree_sum.h)
+// Terms that sum.comp adds in a row, by the CPU's rule of sums (voronoi/fixed_tree_sum.h).
+LAYOUT_CONSTANT uint kSumBlock = 32;
 
 LAYOUT_CONSTANT uint kRadixRun = 64;       // consecutive items that one invocation sorts
 LAYOUT_CONSTANT uint kRadixBits = 4;       // of the key, in one pass

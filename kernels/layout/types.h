@@ -1,5 +1,5 @@
-// The headers of this folder are read by the C++ of host/ and by the GLSL of kernels/, so that both agree on every struct, constant
-// and place in a buffer. This one gives the two languages the same words.
+// The headers of this folder are read by the C++ of host/ and by the GLSL of kernels/, so that both agree on every
+// struct, constant and place in a buffer. This one gives the two languages the same words.
 #ifndef BISECTOR_KERNELS_LAYOUT_TYPES_H
 #define BISECTOR_KERNELS_LAYOUT_TYPES_H
 
