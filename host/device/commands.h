@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "bisector/device.h"
-#include "kernels/layout/sizes.h"
 #include "host/device/buffer.h"
 #include "host/device/device.h"
+#include "kernels/layout/sizes.h"
 
 namespace bisector::host {
 
@@ -75,7 +75,8 @@ class Commands {
   DeviceSeconds take_seconds();
 
  private:
-  void dispatch(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes, std::size_t items);
+  void dispatch(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes,
+                std::size_t items);
   void dispatch_indirect(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes,
                          const Buffer& arguments, std::size_t offset);
   struct Impl;

@@ -10,7 +10,8 @@ constexpr std::uint32_t kBuffers = kSets * 8;  // of all sets of a pool
 
 }  // namespace
 
-vk::DescriptorSet Descriptors::bind(vk::DescriptorSetLayout layout, const std::vector<vk::DescriptorBufferInfo>& buffers) {
+vk::DescriptorSet Descriptors::bind(vk::DescriptorSetLayout layout,
+                                    const std::vector<vk::DescriptorBufferInfo>& buffers) {
   choose_pool(buffers.size());
   const vk::DescriptorSetAllocateInfo info(*pools_[used_pools_ - 1], layout);
   const vk::Device device = *device_.device;

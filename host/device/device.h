@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "bisector/error.h"
 #include "bisector/device.h"
+#include "bisector/error.h"
 
 namespace bisector::host {
 

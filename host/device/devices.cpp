@@ -43,9 +43,8 @@ std::vector<const Candidate*> matching(const std::vector<Candidate>& candidates,
     if (!wanted_digits.empty() && uuid_digits(description.uuid) != wanted_digits) continue;
     found.push_back(&candidate);
   }
-  std::ranges::stable_sort(found, [](const Candidate* a, const Candidate* b) {
-    return better(a->description, b->description);
-  });
+  std::ranges::stable_sort(
+      found, [](const Candidate* a, const Candidate* b) { return better(a->description, b->description); });
   return found;
 }
 

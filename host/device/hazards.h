@@ -30,8 +30,8 @@ class Hazards {
   struct State {
     vk::PipelineStageFlags write_stages;  // none if it was not written
     vk::AccessFlags write_access;
-    vk::PipelineStageFlags read_stages;   // since the write
-    vk::AccessFlags visible;              // reads that were made to see the write
+    vk::PipelineStageFlags read_stages;  // since the write
+    vk::AccessFlags visible;             // reads that were made to see the write
   };
 
   std::vector<Use> uses_;

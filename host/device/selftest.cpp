@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
-#include "kernels/layout/push.h"
 #include "host/device/commands.h"
+#include "kernels/layout/push.h"
 
 namespace bisector::host {
 namespace {
@@ -46,11 +46,26 @@ std::vector<std::array<double, 2>> telling_pairs() {
   constexpr double kSmallest = std::numeric_limits<double>::denorm_min();
   constexpr double kNormal = std::numeric_limits<double>::min();
   constexpr double kUlp = std::numeric_limits<double>::epsilon();
-  return {{kNormal, -1.5 * kNormal}, {kNormal, 0.5},        {kSmallest, kSmallest},  {kSmallest, 1},
-          {1, kUlp / 2},             {1 + kUlp, kUlp / 2},  {1, -kUlp / 4},          {1 + kUlp, 1 - kUlp / 2},
-          {1 + kUlp, 1 + kUlp},      {0x1p53, 1},           {0x1p53, 3},             {0x1p100, -0x1p-100},
-          {1, -1},                   {-0.0, 0.0},           {-0.0, -0.0},            {1.0 / 3, 3},
-          {0.1, 10},                 {1e-160, 1e-160},      {-1e-155, 3e-155},       {1 + 0x1p-27, 1 + 0x1p-26}};
+  return {{kNormal, -1.5 * kNormal},
+          {kNormal, 0.5},
+          {kSmallest, kSmallest},
+          {kSmallest, 1},
+          {1, kUlp / 2},
+          {1 + kUlp, kUlp / 2},
+          {1, -kUlp / 4},
+          {1 + kUlp, 1 - kUlp / 2},
+          {1 + kUlp, 1 + kUlp},
+          {0x1p53, 1},
+          {0x1p53, 3},
+          {0x1p100, -0x1p-100},
+          {1, -1},
+          {-0.0, 0.0},
+          {-0.0, -0.0},
+          {1.0 / 3, 3},
+          {0.1, 10},
+          {1e-160, 1e-160},
+          {-1e-155, 3e-155},
+          {1 + 0x1p-27, 1 + 0x1p-26}};
 }
 
 template <class Result, class Pair>

@@ -19,9 +19,10 @@ uint word(std::size_t n) { return static_cast<uint>(n); }
 }  // namespace
 
 CellPass::CellPass(Device& device, bool is_double, bool is_solid)
-    : device_(device), double_(is_double), solid_(is_solid), place_of_(device), by_place_(device), begins_(device),
-      items_{Buffer(device), Buffer(device)}, digit_counts_(device), block_begins_{Buffer(device), Buffer(device)},
-      sums_{Buffer(device), Buffer(device)}, sorted_places_(device), cells_(device) {}
+    : device_(device), double_(is_double), solid_(is_solid), place_of_(device), by_place_(device),
+      begins_(device), items_{Buffer(device), Buffer(device)},
+      digit_counts_(device), block_begins_{Buffer(device), Buffer(device)}, sums_{Buffer(device), Buffer(device)},
+      sorted_places_(device), cells_(device) {}
 
 void CellPass::set_elements(Commands& commands, const std::vector<Index>& places, std::size_t count) {
   places_ = count;
@@ -60,8 +61,8 @@ void CellPass::sort(Commands& commands, std::size_t cells, Scan& scan, const Pai
     const RadixPush push{word(items), word(runs), word(shift)};
     commands.dispatch({"radix_count", {}}, {reads(items_[sorted_]), writes(digit_counts_)}, push, runs);
     scan.record(commands, digit_counts_, kRadixDigits * runs);
-    commands.dispatch({"radix_scatter", {}}, {reads(items_[sorted_]), reads(digit_counts_), writes(items_[1 - sorted_])}, push,
-                      runs);
+    commands.dispatch({"radix_scatter", {}},
+                      {reads(items_[sorted_]), reads(digit_counts_), writes(items_[1 - sorted_])}, push, runs);
     sorted_ = 1 - sorted_;
   }
 }
@@ -116,20 +117,22 @@ void CellPass::sum(SeedStage& stage, const PairStore& store, CellMoments& result
   commands.download(stage.counters, 0, counted.data(), sizeof counted);
   commands.run();
   if (counted[kDuplicatePairs])
-    throw DeviceError(device_.description().name + ": pairs were met twice, so its atomic operations are not to be trusted; "
-                      "use --device cpu");
+    throw DeviceError(device_.description().name +
+                      ": pairs were met twice, so its atomic operations are not to be trusted");
 
   read_cells(seeds, words, result);
   const std::size_t n = result.cells.size();
   result.triangles.offsets.assign(n + 1, 0);
   for (std::size_t i = 0; i < n; ++i) {
     const Index slot = seeds.sorted.slot[i];
-    result.triangles.offsets[i + 1] = result.triangles.offsets[i] + (slot == kNone ? 0 : begins[slot + 1] - begins[slot]);
+    result.triangles.offsets[i + 1] =
+        result.triangles.offsets[i] + (slot == kNone ? 0 : begins[slot + 1] - begins[slot]);
   }
   result.triangles.values.resize(items);
   parallel_each(cells, [&](std::size_t slot) {
-    std::copy(sorted_places.begin() + begins[slot], sorted_places.begin() + begins[slot + 1],
-              result.triangles.values.begin() + static_cast<std::ptrdiff_t>(result.triangles.offsets[seeds.sorted.id[slot]]));
+    std::copy(
+        sorted_places.begin() + begins[slot], sorted_places.begin() + begins[slot + 1],
+        result.triangles.values.begin() + static_cast<std::ptrdiff_t>(result.triangles.offsets[seeds.sorted.id[slot]]));
   });
 }
 

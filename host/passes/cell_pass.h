@@ -31,7 +31,7 @@ class CellPass {
   bool double_, solid_;
   std::size_t places_ = 0;
   Buffer place_of_, by_place_, begins_, items_[2], digit_counts_, block_begins_[2], sums_[2], sorted_places_, cells_;
-  unsigned sorted_ = 0;               // which of items_
+  unsigned sorted_ = 0;                         // which of items_
   std::vector<std::uint32_t> begins_of_cells_;  // of each cell's items, and the end of the last
 };
 

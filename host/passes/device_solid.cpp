@@ -43,10 +43,11 @@ DeviceSolid::DeviceSolid(Device& device, Commands& commands, const Solid& given,
     : solid(given), frames(tet_frames(given)), words(device), double_words(device), meta(device), tet_of_facet(device),
       has_doubles(with_doubles) {
   frames.push_back(TetFrame(solid.enclosure, {0, 1, 2, 3}, nullptr, 0));
-  const std::size_t bytes = is_double || with_doubles ? tet_layout(true).words * sizeof(double) : tet_layout(false).words * sizeof(float);
+  const std::size_t bytes =
+      is_double || with_doubles ? tet_layout(true).words * sizeof(double) : tet_layout(false).words * sizeof(float);
   if (frames.size() > device.limits().storage_range / bytes)
-    throw DeviceError(fmt::format("{}: {} tetrahedra are more than its buffers hold; use --device cpu",
-                                  device.description().name, tets()));
+    throw DeviceError(
+        fmt::format("{}: {} tetrahedra are more than its buffers hold", device.description().name, tets()));
   std::vector<Index> place(solid.mesh.vertices.size(), kNone);
   std::vector<TetMeta> metas;
   RealWords packed(is_double), wide(true);

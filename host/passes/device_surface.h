@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "voronoi/surface.h"
 #include "host/device/buffer.h"
 #include "host/device/commands.h"
+#include "voronoi/surface.h"
 
 namespace bisector::host {
 
@@ -31,9 +31,9 @@ struct FacetBatch {
 // Points on facets much larger than a cell.
 struct FacetSamples {
   std::vector<Vec3> points;
-  std::vector<Index> facets;      // of each point, ascending
+  std::vector<Index> facets;  // of each point, ascending
   std::vector<FacetBatch> batches;
-  double expected_pairs = 0;      // for seeds that follow the area
+  double expected_pairs = 0;  // for seeds that follow the area
 };
 
 // Batches that are expected to have about `batch_pairs` pairs with `seeds` cells, none of them crossing a border of

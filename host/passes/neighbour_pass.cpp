@@ -13,8 +13,8 @@
 namespace bisector::host {
 namespace {
 
-constexpr std::uint32_t kLeastEntries = 12;           // of a list, for most cells to be certified by theirs
-constexpr std::size_t kLeastTargets = 4096;           // wide lists that there is memory for, however few the seeds are
+constexpr std::uint32_t kLeastEntries = 12;  // of a list, for most cells to be certified by theirs
+constexpr std::size_t kLeastTargets = 4096;  // wide lists that there is memory for, however few the seeds are
 // A squared radius beyond kInfinity of kernels/real.glsl: all seeds are listed.
 constexpr float kUnlimited = 2e37f;
 // Relative, by which squared radii are made smaller, for rounding them to single precision may make none larger.
@@ -24,8 +24,8 @@ constexpr std::size_t kWord = sizeof(std::uint32_t);
 }  // namespace
 
 NeighbourPass::NeighbourPass(Device& device, bool is_double, const ListSizes& sizes)
-    : device_(device), double_(is_double), sizes_(sizes), grid_(device), wide_grid_(device), info_(device), lists_(device),
-      wide_lists_(device), targets_(device), is_target_(device) {}
+    : device_(device), double_(is_double), sizes_(sizes), grid_(device), wide_grid_(device), info_(device),
+      lists_(device), wide_lists_(device), targets_(device), is_target_(device) {}
 
 void NeighbourPass::begin(Commands& commands, const DeviceSeeds& seeds, double spacing, Scan& scan) {
   const std::size_t n = seeds.count();
@@ -35,11 +35,12 @@ void NeighbourPass::begin(Commands& commands, const DeviceSeeds& seeds, double s
   const std::size_t range = device_.limits().storage_range / kWord;
   most_ = static_cast<std::uint32_t>(std::min<std::size_t>(sizes_.most, range / n));
   if (most_ < kLeastEntries)
-    throw DeviceError(fmt::format("{}: {} seeds are more than its buffers hold ({} bytes each); use --device cpu",
+    throw DeviceError(fmt::format("{}: {} seeds are more than its buffers hold ({} bytes each)",
                                   device_.description().name, n, device_.limits().storage_range));
   lists_.reserve(n * most_ * kWord);
   info_.reserve(n * sizeof(ListInfo));
-  const std::size_t wanted = std::max(kLeastTargets, static_cast<std::size_t>(sizes_.wide_share * static_cast<double>(n)));
+  const std::size_t wanted =
+      std::max(kLeastTargets, static_cast<std::size_t>(sizes_.wide_share * static_cast<double>(n)));
   target_capacity_ = std::min(wanted, range / sizes_.wide_most);
   wide_lists_.reserve(target_capacity_ * sizes_.wide_most * kWord);
   targets_.reserve(target_capacity_ * kWord);
@@ -57,8 +58,14 @@ void NeighbourPass::list_nearest(Commands& commands, const DeviceSeeds& seeds, c
 void NeighbourPass::search(Commands& commands, const DeviceSeeds& seeds, const SeedGrid& grid, const Buffer& counters,
                            bool targets, std::size_t first_target, std::size_t items) {
   const GridPush& at = grid.push();
-  const NeighboursPush push{at.grid_lower, at.grid_inverse, at.bucket_mask, at.seed_count, seeds.residual, kTwo,
-                            static_cast<uint>(first_target), static_cast<uint>(target_capacity_)};
+  const NeighboursPush push{at.grid_lower,
+                            at.grid_inverse,
+                            at.bucket_mask,
+                            at.seed_count,
+                            seeds.residual,
+                            kTwo,
+                            static_cast<uint>(first_target),
+                            static_cast<uint>(target_capacity_)};
   const uint most = targets ? sizes_.wide_most : most_, examined = targets ? sizes_.wide_examined : sizes_.examined;
   commands.dispatch(kernel("neighbours", double_, {most, targets, examined}),
                     {reads(seeds.words), reads(seeds.ids), reads(grid.ends()), reads(grid.slots()),
@@ -76,7 +83,8 @@ void NeighbourPass::upload_lists(Commands& commands, const DeviceSeeds& seeds, c
     const double radius = list.radius * seeds.scale;
     const bool unlimited = list.radius == std::numeric_limits<double>::infinity();
     const float squared = unlimited ? kUnlimited : static_cast<float>(radius * radius * (1 - kRadiusMargin));
-    info.push_back({static_cast<uint>(values.size()), static_cast<uint>(list.end - list.begin), std::bit_cast<uint>(squared), 0});
+    info.push_back(
+        {static_cast<uint>(values.size()), static_cast<uint>(list.end - list.begin), std::bit_cast<uint>(squared), 0});
     values.insert(values.end(), list.begin, list.end);
   }
   commands.phase(&DeviceSeconds::transfer);

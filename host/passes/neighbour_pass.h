@@ -10,11 +10,11 @@ namespace bisector::host {
 
 // How long lists are, and the edges of the grids' cells that they are found with, in typical spacings.
 struct ListSizes {
-  std::uint32_t most, examined;            // entries of a first list, and seeds that are looked at for it
+  std::uint32_t most, examined;  // entries of a first list, and seeds that are looked at for it
   double cell;
   std::uint32_t wide_most, wide_examined;
   double wide_cell;
-  double wide_share;                       // of the seeds, whose wide lists there is memory for
+  double wide_share;  // of the seeds, whose wide lists there is memory for
 };
 // A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and
 // takes about 80, or 20 once it is optimised.
@@ -50,7 +50,7 @@ class NeighbourPass {
   ListSizes sizes_;
   SeedGrid grid_, wide_grid_;
   Buffer info_, lists_, wide_lists_, targets_, is_target_;
-  std::uint32_t most_ = 0;         // entries of a first list
+  std::uint32_t most_ = 0;  // entries of a first list
   std::size_t target_capacity_ = 0;
   bool wide_grid_built_ = false;
 };

@@ -10,7 +10,8 @@ std::unique_ptr<Backend> make_vulkan_backend(const Surface&, std::shared_ptr<Dev
   throw std::logic_error("a build without Vulkan has opened a device");
 }
 
-std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid&, std::shared_ptr<Device>, const VulkanOptions&, InnerCells) {
+std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid&, std::shared_ptr<Device>, const VulkanOptions&,
+                                                        InnerCells) {
   throw std::logic_error("a build without Vulkan has opened a device");
 }
 

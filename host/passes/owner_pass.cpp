@@ -30,8 +30,8 @@ void OwnerPass::record(Commands& commands, const DeviceSeeds& seeds, const SeedG
   if (from_scratch_) commands.fill(owners_, 0, count * sizeof(Index), kNone);
   from_scratch_ = false;
   const GridPush& at = grid.push();
-  const OwnersPush push{at.grid_lower, at.grid_inverse, at.bucket_mask, at.seed_count, seeds.residual, kTwo,
-                        static_cast<uint>(count), report};
+  const OwnersPush push{at.grid_lower, at.grid_inverse,          at.bucket_mask, at.seed_count, seeds.residual,
+                        kTwo,          static_cast<uint>(count), report};
   commands.dispatch(kernel("owners", double_),
                     {reads(seeds.words), reads(grid.ends()), reads(grid.slots()), reads(positions_), updates(owners_),
                      updates(counters), writes(uncertain_)},
@@ -49,7 +49,8 @@ void OwnerPass::complete(Commands& commands, std::size_t uncertain, ExactRung& e
   std::vector<PointOwner> found;
   for (std::size_t k = 0; k < uncertain; ++k) found.push_back({listed[k], slots[k]});
   upload(commands, found_, found);
-  commands.dispatch({"set_owners", {}}, {reads(found_), updates(owners_)}, CountPush{static_cast<uint>(uncertain)}, uncertain);
+  commands.dispatch({"set_owners", {}}, {reads(found_), updates(owners_)}, CountPush{static_cast<uint>(uncertain)},
+                    uncertain);
 }
 
 }  // namespace bisector::host

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "core/geometry.h"
-#include "voronoi/moments.h"
-#include "kernels/layout/elements.h"
 #include "host/device/buffer.h"
 #include "host/device/commands.h"
+#include "kernels/layout/elements.h"
+#include "voronoi/moments.h"
 
 namespace bisector::host {
 
@@ -53,7 +53,9 @@ template <class T>
 void upload(Commands& commands, Buffer& buffer, const std::vector<T>& values) {
   upload(commands, buffer, values.data(), values.size() * sizeof(T));
 }
-inline void upload(Commands& commands, Buffer& buffer, const RealWords& words) { upload(commands, buffer, words.bytes()); }
+inline void upload(Commands& commands, Buffer& buffer, const RealWords& words) {
+  upload(commands, buffer, words.bytes());
+}
 
 // The kernel of that name in the given precision.
 inline Kernel kernel(const char* name, bool is_double, std::vector<std::uint32_t> constants = {}) {

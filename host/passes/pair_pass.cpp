@@ -12,7 +12,7 @@ namespace bisector::host {
 namespace {
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
-constexpr int kRoundsPerRun = 6;           // of proposals and clipping, before the host looks again
+constexpr int kRoundsPerRun = 6;  // of proposals and clipping, before the host looks again
 constexpr uint kAsCounted = kNone;
 // Pairs that there is memory for, in those that are expected: when it is asked for, and below which it is asked for
 // anew.
@@ -32,8 +32,9 @@ void clear_proposals(const PairJob& job) {
 }  // namespace
 
 PairPass::PairPass(Device& device, bool is_double, const Capacities& capacities)
-    : device_(device), double_(is_double), buffers_(device, capacities), gathered_(device), answers_(device), values_(device),
-      first_capacity_(capacities.pairs), most_at_once_(static_cast<std::size_t>(2 * capacities.batch_pairs) + 64) {}
+    : device_(device), double_(is_double), buffers_(device, capacities), gathered_(device), answers_(device),
+      values_(device), first_capacity_(capacities.pairs),
+      most_at_once_(static_cast<std::size_t>(2 * capacities.batch_pairs) + 64) {}
 
 // As many as one binding spans the first moments of.
 std::size_t PairPass::most_pairs() const {
@@ -51,9 +52,9 @@ void PairPass::reserve(const PairJob& job) {
   }
   if (store.capacity > most) {
     if (expected > static_cast<double>(most))
-      throw DeviceError(fmt::format("{}: about {:.0f} pairs of cells and {} are more than its buffers hold; use "
-                                    "--device cpu, or fewer vertices",
-                                    device_.description().name, expected, job.domain.elements()));
+      throw DeviceError(
+          fmt::format("{}: about {:.0f} pairs of cells and {} are more than its buffers hold; use fewer vertices",
+                      device_.description().name, expected, job.domain.elements()));
     store.capacity = most;
   }
   store.pairs.reserve(store.capacity * sizeof(PairName));
@@ -101,9 +102,9 @@ bool PairPass::run_batch(const PairJob& job, std::size_t batch, Certification& c
       if (overflow & kOverflowPairs) {
         const std::size_t most = most_pairs();
         if (job.store.capacity >= most)
-          throw DeviceError(fmt::format("{}: more than {} pairs of cells and {}, which its buffers do not hold; use "
-                                        "--device cpu, or fewer vertices",
-                                        device_.description().name, most, job.domain.elements()));
+          throw DeviceError(
+              fmt::format("{}: more than {} pairs of cells and {}, which its buffers do not hold; use fewer vertices",
+                          device_.description().name, most, job.domain.elements()));
         job.store.capacity = std::min(job.store.capacity * 2, most);
       }
       return false;
@@ -146,8 +147,8 @@ std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, float shar
   for (const PairStore::Range& range : job.store.ranges)
     // No more at once than the lists of flagged pairs hold.
     for (std::size_t first = range.begin; first < range.end; first += buffers_.table_size) {
-      const DoubtfulPush push{word(first), word(std::min(buffers_.table_size, range.end - first)), word(buffers_.table_size),
-                              static_cast<float>(job.domain.mean_density()), share};
+      const DoubtfulPush push{word(first), word(std::min(buffers_.table_size, range.end - first)),
+                              word(buffers_.table_size), static_cast<float>(job.domain.mean_density()), share};
       job.commands.phase(&DeviceSeconds::clip);
       clear_proposals(job);
       job.commands.dispatch({"doubtful", {job.domain.double_next(), job.domain.is_solid()}},
@@ -178,8 +179,8 @@ void PairPass::start(const PairJob& job, std::size_t batch) {
 }
 
 void PairPass::advance(const PairJob& job, bool of_pairs, std::size_t most) {
-  const AdvancePush push{of_pairs, word(of_pairs ? job.store.capacity : buffers_.proposal_capacity), device_.limits().groups,
-                         word(most)};
+  const AdvancePush push{of_pairs, word(of_pairs ? job.store.capacity : buffers_.proposal_capacity),
+                         device_.limits().groups, word(most)};
   job.commands.dispatch({"advance", {}}, {updates(job.counters)}, push, 1);
 }
 
@@ -188,10 +189,10 @@ void PairPass::spread(const PairJob& job, std::size_t chunk) {
   const AdmitPush admit{word(buffers_.table_size - 1), word(job.store.capacity)};
   for (int round = 0; round < kRoundsPerRun; ++round) {
     advance(job, false, most_at_once_);
-    job.commands.dispatch_indirect({"admit", {}},
-                                   {reads(buffers_.proposals), updates(buffers_.table), updates(job.store.pairs),
-                                    updates(job.counters)},
-                                   admit, job.counters, kProposalGroups * kWord);
+    job.commands.dispatch_indirect(
+        {"admit", {}},
+        {reads(buffers_.proposals), updates(buffers_.table), updates(job.store.pairs), updates(job.counters)}, admit,
+        job.counters, kProposalGroups * kWord);
     advance(job, true, most_at_once_);
     ClipPush push{};
     push.pair_count = kAsCounted;
@@ -223,7 +224,8 @@ void PairPass::clip_flagged(const PairJob& job, std::size_t chunk, uint rung, ui
        });
 }
 
-void PairPass::label(const PairJob& job, std::size_t chunk, std::size_t first, std::size_t count, const Buffer& labels) {
+void PairPass::label(const PairJob& job, std::size_t chunk, std::size_t first, std::size_t count,
+                     const Buffer& labels) {
   ClipPush push{};
   push.first_pair = word(first);
   push.pair_count = word(count);
@@ -249,7 +251,8 @@ void PairPass::clip_exactly(const PairJob& job, const Counters& counters) {
   Commands& commands = job.commands;
   gathered_.reserve(count * sizeof(GatheredPair));
   const GatherPairsPush gather{word(kFlaggedForCpu * buffers_.table_size), word(count)};
-  commands.dispatch({"gather_pairs", {}}, {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_)}, gather, count);
+  commands.dispatch({"gather_pairs", {}}, {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_)}, gather,
+                    count);
   std::vector<GatheredPair> gathered(count);
   commands.download(gathered_, 0, gathered.data(), count * sizeof(GatheredPair));
   commands.run();

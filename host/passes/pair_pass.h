@@ -8,13 +8,13 @@
 #include <initializer_list>
 #include <vector>
 
-#include "voronoi/restricted.h"
+#include "host/passes/capacities.h"
+#include "host/passes/neighbour_pass.h"
+#include "host/passes/seeds.h"
 #include "kernels/layout/counters.h"
 #include "kernels/layout/pairs.h"
 #include "kernels/layout/push.h"
-#include "host/passes/neighbour_pass.h"
-#include "host/passes/capacities.h"
-#include "host/passes/seeds.h"
+#include "voronoi/restricted.h"
 
 namespace bisector::host {
 
@@ -26,18 +26,18 @@ struct PairStore {
   struct Range {
     std::size_t chunk, begin, end;
   };
-  Buffer pairs;                // PairName
-  Buffer status;               // kStatus... of kernels/layout/pairs.h
-  Buffer mass_second, first;   // moments
+  Buffer pairs;               // PairName
+  Buffer status;              // kStatus... of kernels/layout/pairs.h
+  Buffer mass_second, first;  // moments
   std::size_t capacity = 0, count = 0;
-  std::vector<Range> ranges;   // of the batches
+  std::vector<Range> ranges;  // of the batches
 };
 
 // What exact arithmetic on the CPU found for a pair.
 struct ExactPair {
   bool empty = true;
-  Moments moments;                   // in lengths of the device
-  std::vector<PairName> proposals;   // the pairs that it makes known
+  Moments moments;                  // in lengths of the device
+  std::vector<PairName> proposals;  // the pairs that it makes known
 };
 
 class PairDomain;
@@ -59,11 +59,11 @@ struct PairBuffers {
       : proposals(device), table(device), flagged(device), cell_errors(device), no_labels(device),
         proposal_capacity(capacities.proposals), table_size(capacities.table) {}
 
-  Buffer proposals;          // PairName
-  Buffer table;              // the set of the pairs of a batch
-  Buffer flagged;            // lists of pairs, each as long as the table
-  Buffer cell_errors;        // bounds of the errors of cells, then marks of cells
-  Buffer no_labels;          // bound where none are asked for
+  Buffer proposals;    // PairName
+  Buffer table;        // the set of the pairs of a batch
+  Buffer flagged;      // lists of pairs, each as long as the table
+  Buffer cell_errors;  // bounds of the errors of cells, then marks of cells
+  Buffer no_labels;    // bound where none are asked for
   std::size_t proposal_capacity, table_size;
 };
 
@@ -80,18 +80,18 @@ class PairDomain {
  public:
   virtual ~PairDomain() = default;
 
-  virtual const char* elements() const = 0;     // for messages: "triangles"
-  virtual bool is_solid() const = 0;            // masses are volumes
+  virtual const char* elements() const = 0;  // for messages: "triangles"
+  virtual bool is_solid() const = 0;         // masses are volumes
   virtual double mean_density() const = 0;
-  virtual bool double_next() const = 0;         // whether single precision may hand pairs to the double kernels
+  virtual bool double_next() const = 0;  // whether single precision may hand pairs to the double kernels
   virtual double expected_pairs() const = 0;
   virtual std::size_t batches() const = 0;
   virtual std::size_t chunk_of(std::size_t batch) const = 0;  // the part of the elements that one binding spans
   // Records the first pairs and proposals of a batch.
   virtual void start(const PairJob& job, const PairBuffers& buffers, std::size_t batch) = 0;
   // Dispatches the kernel for pairs of a chunk. `push` says which.
-  virtual void clip(const PairJob& job, const PairBuffers& buffers, std::size_t chunk, const ClipKind& kind, ClipPush push,
-                    const Buffer& labels, const ClipDispatch& dispatch) = 0;
+  virtual void clip(const PairJob& job, const PairBuffers& buffers, std::size_t chunk, const ClipKind& kind,
+                    ClipPush push, const Buffer& labels, const ClipDispatch& dispatch) = 0;
   virtual std::vector<ExactPair> clip_exactly(const PairJob& job, const std::vector<PairName>& pairs) = 0;
 };
 
@@ -128,9 +128,9 @@ class PairPass {
   bool double_;
   PairBuffers buffers_;
   Buffer gathered_, answers_, values_;
-  uint unsure_in_double_ = 0;      // pairs that double precision left uncertain, as far as they are counted
-  std::size_t first_capacity_;     // of pairs; 0: by what is expected
-  std::size_t most_at_once_;       // pairs or proposals of one dispatch
+  uint unsure_in_double_ = 0;   // pairs that double precision left uncertain, as far as they are counted
+  std::size_t first_capacity_;  // of pairs; 0: by what is expected
+  std::size_t most_at_once_;    // pairs or proposals of one dispatch
 };
 
 }  // namespace bisector::host

@@ -11,12 +11,12 @@ namespace {
 
 constexpr std::size_t kWindow = std::size_t{1} << 16;  // pairs that are labelled at once
 constexpr std::size_t kStride = kPolygonHeader + FacetPairs::kMostCorners;
-constexpr std::size_t kChunk = 1024;                   // polygons that one task completes
+constexpr std::size_t kChunk = 1024;  // polygons that one task completes
 
 // Where the labels of a pair are; none if the pair is to be clipped exactly or is whole.
 struct Found {
   Index facet, slot;
-  Index count = 0;                 // of labels
+  Index count = 0;  // of labels
   std::size_t first_label = 0;
 };
 

@@ -2,8 +2,8 @@
 // so that they are the CPU's bit for bit in either precision.
 #pragma once
 
-#include "voronoi/restricted.h"
 #include "host/passes/facet_pairs.h"
+#include "voronoi/restricted.h"
 
 namespace bisector::host {
 

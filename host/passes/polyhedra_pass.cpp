@@ -10,13 +10,13 @@ namespace {
 
 constexpr std::size_t kWindow = std::size_t{1} << 14;  // pairs that are labelled at once
 constexpr std::size_t kStride = kPolyhedronHeader + TetPairs::kMostPlanes + TetPairs::kMostVertices;
-constexpr std::size_t kChunk = 256;                    // polyhedra that one task completes
+constexpr std::size_t kChunk = 256;  // polyhedra that one task completes
 
 // What the device says of a pair.
 struct Found {
   Index tet, slot;
-  bool exactly = false;          // it is to be clipped anew
-  std::vector<Index> labels;     // none: the whole tetrahedron
+  bool exactly = false;       // it is to be clipped anew
+  std::vector<Index> labels;  // none: the whole tetrahedron
   std::vector<std::array<Index, 3>> triples;
 };
 
@@ -81,17 +81,20 @@ void PolyhedraPass::run(PairPass& pairs, const PairJob& job, TetPairs& domain, E
   });
   const Index enclosure = domain.solid().enclosure();
   std::vector<ClippedPolyhedra> parts((found.size() + kChunk - 1) / kChunk);
-  exact.for_each<TetClipper>(parts.size(), [&](std::size_t c, TetClipper& clipper) {
-    for (std::size_t k = c * kChunk; k < std::min(found.size(), (c + 1) * kChunk); ++k) {
-      const Found& entry = found[k];
-      const TetFrame& frame = domain.solid().frames[entry.tet];
-      clipper.begin(entry.slot);
-      if (entry.exactly) clipper.clip(frame);
-      else if (entry.labels.empty()) clipper.take(frame);
-      else clipper.take(frame, entry.labels, entry.triples);
-      append_polyhedron(clipper, seeds, entry.tet == enclosure ? kNone : entry.tet, entry.slot, parts[c]);
-    }
-  }, 1);
+  exact.for_each<TetClipper>(
+      parts.size(),
+      [&](std::size_t c, TetClipper& clipper) {
+        for (std::size_t k = c * kChunk; k < std::min(found.size(), (c + 1) * kChunk); ++k) {
+          const Found& entry = found[k];
+          const TetFrame& frame = domain.solid().frames[entry.tet];
+          clipper.begin(entry.slot);
+          if (entry.exactly) clipper.clip(frame);
+          else if (entry.labels.empty()) clipper.take(frame);
+          else clipper.take(frame, entry.labels, entry.triples);
+          append_polyhedron(clipper, seeds, entry.tet == enclosure ? kNone : entry.tet, entry.slot, parts[c]);
+        }
+      },
+      1);
   polyhedra = {};
   for (const ClippedPolyhedra& part : parts) append(part, polyhedra);
 }

@@ -2,8 +2,8 @@
 // these, so that they are the CPU's bit for bit in either precision.
 #pragma once
 
-#include "voronoi/clipped.h"
 #include "host/passes/tet_pairs.h"
+#include "voronoi/clipped.h"
 
 namespace bisector::host {
 

@@ -3,10 +3,10 @@
 
 #include <cstdint>
 
-#include "voronoi/neighbours.h"
-#include "kernels/layout/push.h"
 #include "host/device/commands.h"
 #include "host/passes/scan.h"
+#include "kernels/layout/push.h"
+#include "voronoi/neighbours.h"
 
 namespace bisector::host {
 

@@ -5,8 +5,8 @@
 
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "voronoi/step_mass.h"
 #include "host/passes/packing.h"
+#include "voronoi/step_mass.h"
 
 namespace bisector::host {
 namespace {
@@ -25,10 +25,9 @@ Precisions choose_precisions(const Device& device, Precision asked, bool double_
 
 SeedStage::SeedStage(std::shared_ptr<Device> opened, const Precisions& precisions, NeighbourSource source, double scale,
                      const Box& box, bool in_solid)
-    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung), in_solid_(in_solid),
-      source_(source), box_(box),
-      commands(*device_), scan(*device_), counters(*device_), seeds(*device_),
-      neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists) {
+    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung),
+      in_solid_(in_solid), source_(source), box_(box), commands(*device_), scan(*device_), counters(*device_),
+      seeds(*device_), neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists) {
   counters.reserve(kCounters * sizeof(std::uint32_t));
   seeds.scale = scale;
 }
@@ -112,7 +111,8 @@ BackendDescription SeedStage::description() const {
 
 void SeedStage::set_step_masses(CellMoments& moments) {
   if (delaunay()) return bisector::set_step_masses(seeds.sorted, rings_, moments);
-  complete_step_masses(seeds.sorted, [&]() -> const Neighbours& { return exact.neighbours(); }, moments);
+  complete_step_masses(
+      seeds.sorted, [&]() -> const Neighbours& { return exact.neighbours(); }, moments);
 }
 
 }  // namespace bisector::host

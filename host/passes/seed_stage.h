@@ -5,12 +5,12 @@
 #include <memory>
 
 #include "backend/backend.h"
-#include "kernels/layout/counters.h"
-#include "kernels/layout/pairs.h"
 #include "host/passes/exact_rung.h"
 #include "host/passes/neighbour_pass.h"
 #include "host/passes/scan.h"
 #include "host/passes/seeds.h"
+#include "kernels/layout/counters.h"
+#include "kernels/layout/pairs.h"
 
 namespace bisector::host {
 

@@ -17,7 +17,8 @@ SurfaceStage::SurfaceStage(SeedStage& seeds, const Surface& surface, const Capac
   buffers_.surface = &surface_;
   const double scale = seeds.seeds.scale;
   buffers_.facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, seeds.is_double());
-  if (seeds.has_double_rung()) buffers_.double_facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, true);
+  if (seeds.has_double_rung())
+    buffers_.double_facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, true);
   std::vector<Vec3> points;
   for (const Index v : surface_.sites) points.push_back(surface_.mesh.vertices[v]);
   sites_.set_points(seeds.commands, points, scale);

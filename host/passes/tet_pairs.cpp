@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mesh/tet_adjacency.h"
 #include "host/passes/packing.h"
 #include "kernels/layout/pairs.h"
+#include "mesh/tet_adjacency.h"
 
 namespace bisector::host {
 namespace {
@@ -68,14 +68,15 @@ void TetPairs::set_shell(const PairStore& pairs, const CellMoments& moments, std
 void TetPairs::start(const PairJob& job, const PairBuffers& buffers, std::size_t index) {
   const Batch& batch = batches_[index];
   const StartTetsPush push{word(batch.first), word(batch.count), word(buffers.proposal_capacity)};
-  job.commands.dispatch({"start_tets", {!inner_whole_}},
-                        {updates(solid_.meta), reads(corners_.owners()), updates(buffers.proposals), updates(job.counters)},
-                        push, batch.count);
+  job.commands.dispatch(
+      {"start_tets", {!inner_whole_}},
+      {updates(solid_.meta), reads(corners_.owners()), updates(buffers.proposals), updates(job.counters)}, push,
+      batch.count);
   if (!inner_whole_) return;
   const StartBoundaryPush shell{word(shell_->count), word(job.seeds.count()), word(buffers.proposal_capacity)};
   job.commands.dispatch({"start_boundary", {}},
-                        {reads(shell_->pairs), reads(shell_->status), reads(solid_.tet_of_facet), updates(buffers.cell_errors),
-                         updates(buffers.proposals), updates(job.counters)},
+                        {reads(shell_->pairs), reads(shell_->status), reads(solid_.tet_of_facet),
+                         updates(buffers.cell_errors), updates(buffers.proposals), updates(job.counters)},
                         shell, shell_->count);
 }
 
@@ -90,9 +91,9 @@ void TetPairs::clip(const PairJob& job, const PairBuffers& buffers, std::size_t,
                    !doubled && double_next(), inner_whole_}),
            {reads(doubled ? job.seeds.doubles : job.seeds.words), reads(job.seeds.ids),
             reads(doubled ? solid_.double_words : solid_.words), reads(solid_.meta), reads(job.neighbours.info()),
-            updates(buffers.cell_errors), reads(job.neighbours.lists()), reads(job.neighbours.wide_lists()), reads(store.pairs),
-            updates(store.status), updates(store.mass_second), updates(store.first), updates(buffers.proposals),
-            updates(job.counters), updates(buffers.flagged), writes(labels)},
+            updates(buffers.cell_errors), reads(job.neighbours.lists()), reads(job.neighbours.wide_lists()),
+            reads(store.pairs), updates(store.status), updates(store.mass_second), updates(store.first),
+            updates(buffers.proposals), updates(job.counters), updates(buffers.flagged), writes(labels)},
            push);
 }
 

@@ -24,7 +24,8 @@ class VulkanBackend : public DeviceBackend<Backend, CpuBackend> {
 
 VulkanBackend::VulkanBackend(const Surface& surface, std::shared_ptr<Device> device, const VulkanOptions& options,
                              const Precisions& precisions)
-    : DeviceBackend(surface, std::move(device), precisions, options.neighbours, device_scale(surface), surface.box, false),
+    : DeviceBackend(surface, std::move(device), precisions, options.neighbours, device_scale(surface), surface.box,
+                    false),
       pairs_(stage_, surface, options.capacities), cells_(stage_.device(), stage_.is_double(), false) {
   std::vector<Index> triangles;
   for (const FacetSummary& summary : surface.summaries) triangles.push_back(summary.triangle);
@@ -51,7 +52,8 @@ void VulkanBackend::find_moments(CellMoments& moments) {
   const auto sum = [&] { cells_.sum(stage_, pairs_.store(), moments); };
   sum();
   if (!stage_.is_double())
-    refine_masses(mass(), moments, [&](float share) { return pairs_.refine(cells_.cells(), share, certification); }, sum);
+    refine_masses(
+        mass(), moments, [&](float share) { return pairs_.refine(cells_.cells(), share, certification); }, sum);
   certification.pairs = moments.triangles.values.size();
   moments.certification = certification;
 }

@@ -13,7 +13,7 @@ namespace bisector::host {
 struct VulkanOptions {
   Precision precision = Precision::automatic;
   NeighbourSource neighbours = NeighbourSource::nearest;
-  bool double_rung = true;       // whether single precision may hand pairs to the double kernels; off in tests
+  bool double_rung = true;  // whether single precision may hand pairs to the double kernels; off in tests
   Capacities capacities = {};
 };
 

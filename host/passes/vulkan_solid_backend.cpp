@@ -45,12 +45,14 @@ class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
 
 VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Device> device, const VulkanOptions& options,
                                        const Precisions& precisions, InnerCells inner)
-    : DeviceBackend(solid, std::move(device), precisions, options.neighbours, device_scale(solid), box_of(solid), true, inner),
+    : DeviceBackend(solid, std::move(device), precisions, options.neighbours, device_scale(solid), box_of(solid), true,
+                    inner),
       shell_(stage_, solid.boundary, options.capacities), shell_cells_(stage_.device(), stage_.is_double(), false),
-      device_solid_(stage_.device(), stage_.commands, solid, stage_.seeds.scale, stage_.is_double(), precisions.double_rung),
+      device_solid_(stage_.device(), stage_.commands, solid, stage_.seeds.scale, stage_.is_double(),
+                    precisions.double_rung),
       corners_(stage_.device(), stage_.is_double()),
-      tets_(stage_.is_double(), device_solid_, corners_, stage_.exact, inner == InnerCells::whole && solid.density.empty(),
-            options.capacities.batch_pairs),
+      tets_(stage_.is_double(), device_solid_, corners_, stage_.exact,
+            inner == InnerCells::whole && solid.density.empty(), options.capacities.batch_pairs),
       pairs_(stage_.device(), stage_.is_double(), options.capacities), store_(stage_.device()),
       cells_(stage_.device(), stage_.is_double(), true), polyhedra_(stage_.device()) {
   std::vector<Index> triangles, places;

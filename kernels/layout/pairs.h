@@ -12,21 +12,21 @@
 LAYOUT_BEGIN
 
 // Status.
-LAYOUT_CONSTANT uint kStatusClipped = 1;      // moments and labels are final
-LAYOUT_CONSTANT uint kStatusEmpty = 2;        // element and cell do not meet
-LAYOUT_CONSTANT uint kStatusShortList = 3;    // the list ended before the cell was closed
-LAYOUT_CONSTANT uint kStatusCrowded = 4;      // more corners, planes or vertices than there is memory for
-LAYOUT_CONSTANT uint kStatusUnsure = 5;       // a decision lies within its error bound
-LAYOUT_CONSTANT uint kStatusWhole = 6;        // the cell holds all of the element
+LAYOUT_CONSTANT uint kStatusClipped = 1;    // moments and labels are final
+LAYOUT_CONSTANT uint kStatusEmpty = 2;      // element and cell do not meet
+LAYOUT_CONSTANT uint kStatusShortList = 3;  // the list ended before the cell was closed
+LAYOUT_CONSTANT uint kStatusCrowded = 4;    // more corners, planes or vertices than there is memory for
+LAYOUT_CONSTANT uint kStatusUnsure = 5;     // a decision lies within its error bound
+LAYOUT_CONSTANT uint kStatusWhole = 6;      // the cell holds all of the element
 
 // Rungs of certification on the device. What the last leaves uncertain goes to exact arithmetic on the CPU.
-LAYOUT_CONSTANT uint kRungFirst = 0;          // the lists of neighbours found first
-LAYOUT_CONSTANT uint kRungWide = 1;           // wider lists
-LAYOUT_CONSTANT uint kRungDouble = 2;         // double precision after single
+LAYOUT_CONSTANT uint kRungFirst = 0;   // the lists of neighbours found first
+LAYOUT_CONSTANT uint kRungWide = 1;    // wider lists
+LAYOUT_CONSTANT uint kRungDouble = 2;  // double precision after single
 
 // Flagged pairs lie in three lists of equal capacity in one buffer.
-LAYOUT_CONSTANT uint kFlaggedShort = 0;       // for kRungWide
-LAYOUT_CONSTANT uint kFlaggedUncertain = 1;   // for kRungDouble
+LAYOUT_CONSTANT uint kFlaggedShort = 0;      // for kRungWide
+LAYOUT_CONSTANT uint kFlaggedUncertain = 1;  // for kRungDouble
 LAYOUT_CONSTANT uint kFlaggedForCpu = 2;
 LAYOUT_CONSTANT uint kFlaggedLists = 3;
 
@@ -46,8 +46,8 @@ LAYOUT_CONSTANT uint kCellMedianAt = 5;
 LAYOUT_CONSTANT uint kCellErrorWords = 2;
 LAYOUT_CONSTANT uint kEnergyErrorAt = 1;
 LAYOUT_CONSTANT uint kMarkWords = 1;
-LAYOUT_CONSTANT uint kMarkBoundary = 1;       // the cell meets the solid's boundary
-LAYOUT_CONSTANT uint kMarkMet = 2;            // some inner cell has it for a neighbour
+LAYOUT_CONSTANT uint kMarkBoundary = 1;  // the cell meets the solid's boundary
+LAYOUT_CONSTANT uint kMarkMet = 2;       // some inner cell has it for a neighbour
 
 // Labels of a polygon: their number (or none where it is uncertain), then the labels.
 LAYOUT_CONSTANT uint kPolygonHeader = 1;
@@ -95,15 +95,15 @@ struct SeedId {
   std::array<uint, 3> low;
 };
 
-static_assert(sizeof(PairName) == 8);                               // uvec2
+static_assert(sizeof(PairName) == 8);  // uvec2
 static_assert(sizeof(GatheredPair) == kGatheredWords * sizeof(uint));
 static_assert(offsetof(GatheredPair, name) == 1 * sizeof(uint));
 static_assert(sizeof(PairAnswer) == kAnswerWords * sizeof(uint));
-static_assert(sizeof(PointOwner) == 8);                             // uvec2
-static_assert(sizeof(SortItem) == 8);                               // uvec2
-static_assert(sizeof(ListInfo) == 16);                              // uvec4
+static_assert(sizeof(PointOwner) == 8);  // uvec2
+static_assert(sizeof(SortItem) == 8);    // uvec2
+static_assert(sizeof(ListInfo) == 16);   // uvec4
 static_assert(offsetof(ListInfo, squared_radius) == 2 * sizeof(uint));
-static_assert(sizeof(SeedId) == 16);                                // uvec4
+static_assert(sizeof(SeedId) == 16);  // uvec4
 
 }  // namespace bisector::host
 #endif

@@ -9,36 +9,32 @@ LAYOUT_BEGIN
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_COUNT)
 PUSH_CONSTANTS(CountPush) {
-  uint count;               // of the items that the kernel goes through
+  uint count;  // of the items that the kernel goes through
 };
 #endif
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_CELLS)
-PUSH_CONSTANTS(CellsPush) {
-  uint cell_count;
-};
+PUSH_CONSTANTS(CellsPush) { uint cell_count; };
 #endif
 
 // A grid of the seeds, by which all kernels that look for seeds find them (grid.glsl).
-#define GRID_PUSH_CONSTANTS                                            \
-  vec3 grid_lower;          /* corner of the grid */                    \
-  float grid_inverse;       /* 1 / the edge of a grid cell */           \
-  uint bucket_mask;         /* the number of buckets, less 1 */         \
+#define GRID_PUSH_CONSTANTS                               \
+  vec3 grid_lower;    /* corner of the grid */            \
+  float grid_inverse; /* 1 / the edge of a grid cell */   \
+  uint bucket_mask;   /* the number of buckets, less 1 */ \
   uint seed_count;
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_GRID)
-PUSH_CONSTANTS(GridPush) {
-  GRID_PUSH_CONSTANTS
-};
+PUSH_CONSTANTS(GridPush){GRID_PUSH_CONSTANTS};
 #endif
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_NEIGHBOURS)
 PUSH_CONSTANTS(NeighboursPush) {
   GRID_PUSH_CONSTANTS
-  float residual;           // what a difference of two positions may lack in single precision; 0 in double
-  uint two;                 // 2: see loops_complete() of common.glsl
-  uint first_target;        // of the cells that need a wider list, the first that has none yet
-  uint target_capacity;     // wide lists that there is memory for
+  float residual;        // what a difference of two positions may lack in single precision; 0 in double
+  uint two;              // 2: see loops_complete() of common.glsl
+  uint first_target;     // of the cells that need a wider list, the first that has none yet
+  uint target_capacity;  // wide lists that there is memory for
 };
 #endif
 
@@ -48,7 +44,7 @@ PUSH_CONSTANTS(OwnersPush) {
   float residual;
   uint two;
   uint point_count;
-  uint report_uncertain;    // whether points without a certain owner are listed
+  uint report_uncertain;  // whether points without a certain owner are listed
 };
 #endif
 
@@ -61,8 +57,8 @@ PUSH_CONSTANTS(WideTargetsPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_START_FACETS)
 PUSH_CONSTANTS(StartFacetsPush) {
-  uint element_base;        // the first facet of the buffers
-  uint first_facet;         // of the batch
+  uint element_base;  // the first facet of the buffers
+  uint first_facet;   // of the batch
   uint facet_count;
   uint proposal_capacity;
   uint pair_capacity;
@@ -71,8 +67,8 @@ PUSH_CONSTANTS(StartFacetsPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_START_SAMPLES)
 PUSH_CONSTANTS(StartSamplesPush) {
-  uint element_base;        // the first facet of the buffers
-  uint first_sample;        // of the batch
+  uint element_base;  // the first facet of the buffers
+  uint first_sample;  // of the batch
   uint sample_count;
   uint proposal_capacity;
 };
@@ -80,7 +76,7 @@ PUSH_CONSTANTS(StartSamplesPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_START_TETS)
 PUSH_CONSTANTS(StartTetsPush) {
-  uint first_tet;           // of the batch
+  uint first_tet;  // of the batch
   uint tet_count;
   uint proposal_capacity;
 };
@@ -88,7 +84,7 @@ PUSH_CONSTANTS(StartTetsPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_START_BOUNDARY)
 PUSH_CONSTANTS(StartBoundaryPush) {
-  uint pair_count;          // of the boundary's facets
+  uint pair_count;  // of the boundary's facets
   uint cell_count;
   uint proposal_capacity;
 };
@@ -96,16 +92,16 @@ PUSH_CONSTANTS(StartBoundaryPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_ADVANCE)
 PUSH_CONSTANTS(AdvancePush) {
-  uint of_pairs;            // else of proposals
-  uint capacity;            // of their buffer
-  uint most_groups;         // in one dimension of a dispatch
-  uint most_items;          // of one dispatch
+  uint of_pairs;     // else of proposals
+  uint capacity;     // of their buffer
+  uint most_groups;  // in one dimension of a dispatch
+  uint most_items;   // of one dispatch
 };
 #endif
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_ADMIT)
 PUSH_CONSTANTS(AdmitPush) {
-  uint table_mask;          // the size of the table, a power of two, less 1
+  uint table_mask;  // the size of the table, a power of two, less 1
   uint pair_capacity;
 };
 #endif
@@ -115,12 +111,12 @@ PUSH_CONSTANTS(AdmitPush) {
 PUSH_CONSTANTS(ClipPush) {
   // The first facet of the buffers; of a solid the enclosure, which is the element after the last tetrahedron.
   uint element_base;
-  float residual;           // what a difference of two positions may lack in single precision; 0 in double
-  uint two;                 // 2: see loops_complete() of common.glsl
-  uint first_pair;          // of the range; for listed pairs: the list's first entry
-  uint pair_count;          // none (0xffffffff): as many as the counters say
+  float residual;   // what a difference of two positions may lack in single precision; 0 in double
+  uint two;         // 2: see loops_complete() of common.glsl
+  uint first_pair;  // of the range; for listed pairs: the list's first entry
+  uint pair_count;  // none (0xffffffff): as many as the counters say
   uint proposal_capacity;
-  uint flagged_capacity;    // of one list of flagged pairs
+  uint flagged_capacity;  // of one list of flagged pairs
   uint cell_count;
 };
 #endif
@@ -129,15 +125,15 @@ PUSH_CONSTANTS(ClipPush) {
 PUSH_CONSTANTS(DoubtfulPush) {
   uint first_pair;
   uint pair_count;
-  uint flagged_capacity;    // of one list of flagged pairs
+  uint flagged_capacity;  // of one list of flagged pairs
   float mean_density;
-  float share;              // of the errors that are allowed
+  float share;  // of the errors that are allowed
 };
 #endif
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_GATHER_PAIRS)
 PUSH_CONSTANTS(GatherPairsPush) {
-  uint first;               // entry of the buffer of flagged pairs
+  uint first;  // entry of the buffer of flagged pairs
   uint count;
 };
 #endif
@@ -146,7 +142,7 @@ PUSH_CONSTANTS(GatherPairsPush) {
 PUSH_CONSTANTS(RadixPush) {
   uint item_count;
   uint run_count;
-  uint shift;               // of the digit within the key
+  uint shift;  // of the digit within the key
 };
 #endif
 

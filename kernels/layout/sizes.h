@@ -6,17 +6,17 @@
 
 LAYOUT_BEGIN
 
-LAYOUT_CONSTANT uint kGroupSize = 64;      // invocations of a workgroup, of every kernel
+LAYOUT_CONSTANT uint kGroupSize = 64;  // invocations of a workgroup, of every kernel
 
-LAYOUT_CONSTANT uint kScanLane = 16;       // values that one invocation of scan_blocks.comp sums
-LAYOUT_CONSTANT uint kScanBlock = 1024;    // and one workgroup: kGroupSize * kScanLane
+LAYOUT_CONSTANT uint kScanLane = 16;     // values that one invocation of scan_blocks.comp sums
+LAYOUT_CONSTANT uint kScanBlock = 1024;  // and one workgroup: kGroupSize * kScanLane
 
 // Terms that sum.comp adds in a row, by the CPU's rule of sums (voronoi/fixed_tree_sum.h).
 LAYOUT_CONSTANT uint kSumBlock = 32;
 
-LAYOUT_CONSTANT uint kRadixRun = 64;       // consecutive items that one invocation sorts
-LAYOUT_CONSTANT uint kRadixBits = 4;       // of the key, in one pass
-LAYOUT_CONSTANT uint kRadixDigits = 16;    // 2^kRadixBits
+LAYOUT_CONSTANT uint kRadixRun = 64;     // consecutive items that one invocation sorts
+LAYOUT_CONSTANT uint kRadixBits = 4;     // of the key, in one pass
+LAYOUT_CONSTANT uint kRadixDigits = 16;  // 2^kRadixBits
 
 LAYOUT_END
 

@@ -4,9 +4,9 @@
 
 #include <utility>
 
-#include "bisector/error.h"
 #include "backend/cpu_backend.h"
 #include "backend/fallback_backend.h"
+#include "bisector/error.h"
 #include "host/device/ranking.h"
 #include "host/passes/vulkan_backend.h"
 #include "host/passes/vulkan_solid_backend.h"
@@ -31,7 +31,8 @@ std::unique_ptr<SolidBackend> device_backend(const Solid& solid, std::shared_ptr
   return host::make_vulkan_solid_backend(solid, std::move(device), options);
 }
 
-std::unique_ptr<Backend> with_fallback(std::unique_ptr<Backend> device, NeighbourSource source, const Context& context) {
+std::unique_ptr<Backend> with_fallback(std::unique_ptr<Backend> device, NeighbourSource source,
+                                       const Context& context) {
   return std::make_unique<FallbackBackend>(std::move(device), source, context);
 }
 std::unique_ptr<SolidBackend> with_fallback(std::unique_ptr<SolidBackend> device, NeighbourSource source,

@@ -5,9 +5,9 @@
 #include <optional>
 #include <string>
 
+#include "backend/backend.h"
 #include "bisector/context.h"
 #include "bisector/device.h"
-#include "backend/backend.h"
 
 namespace bisector {
 
@@ -38,14 +38,16 @@ class Compute {
 
   ComputeOptions options_;
   Context context_;
-  std::optional<DeviceRequest> device_;    // to open; none: the CPU
-  std::string failure_;                    // why the CPU computes although there is a GPU
-  std::string warned_;                     // the last failure that was warned of
+  std::optional<DeviceRequest> device_;  // to open; none: the CPU
+  std::string failure_;                  // why the CPU computes although there is a GPU
+  std::string warned_;                   // the last failure that was warned of
   std::shared_ptr<host::Device> opened_;
 };
 
 // The only backend of a run.
-std::unique_ptr<Backend> make_backend(const Surface& surface, const ComputeOptions& options, const Context& context = {});
-std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const ComputeOptions& options, const Context& context = {});
+std::unique_ptr<Backend> make_backend(const Surface& surface, const ComputeOptions& options,
+                                      const Context& context = {});
+std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const ComputeOptions& options,
+                                           const Context& context = {});
 
 }  // namespace bisector

@@ -186,8 +186,8 @@ TEST_F(CommandsTest, KernelsAreBuiltForBothPrecisions) {
 
 // Time was counted for these phases and no others.
 void expect_used(const DeviceSeconds& seconds, const std::vector<Phase>& used) {
-  for (const Phase phase : {&DeviceSeconds::transfer, &DeviceSeconds::grid, &DeviceSeconds::neighbours, &DeviceSeconds::owners,
-                            &DeviceSeconds::clip, &DeviceSeconds::sort, &DeviceSeconds::sum}) {
+  for (const Phase phase : {&DeviceSeconds::transfer, &DeviceSeconds::grid, &DeviceSeconds::neighbours,
+                            &DeviceSeconds::owners, &DeviceSeconds::clip, &DeviceSeconds::sort, &DeviceSeconds::sum}) {
     EXPECT_EQ(seconds.*phase > 0, std::ranges::find(used, phase) != used.end());
     EXPECT_LT(seconds.*phase, 60);
   }
@@ -211,7 +211,8 @@ TEST_F(CommandsTest, KernelsAreUsedConsistently) {
   EXPECT_THROW(commands.dispatch({"no_such", {}}, {updates(values)}, CountPush{1}, 1), std::logic_error);
   commands.dispatch({"test_add", {}}, {updates(values)}, CountPush{1}, 1);
   EXPECT_THROW(commands.dispatch({"test_add", {}}, {updates(values)}, StepPush{1, 1}, 1), std::logic_error);
-  EXPECT_THROW(commands.dispatch({"test_add", {}}, {reads(values), updates(values)}, CountPush{1}, 1), std::logic_error);
+  EXPECT_THROW(commands.dispatch({"test_add", {}}, {reads(values), updates(values)}, CountPush{1}, 1),
+               std::logic_error);
 }
 
 TEST_F(CommandsTest, TimeIsCountedByPhase) {
