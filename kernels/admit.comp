@@ -8,11 +8,9 @@ layout(std430, binding = 0) readonly buffer Proposals { uvec2 proposals[]; };
 layout(std430, binding = 1) buffer Table { uint table[]; };  // 0: free; else a place among the proposals, plus 1
 layout(std430, binding = 2) writeonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 3) buffer Counters { uint counters[]; };
-layout(push_constant) uniform Push {
-  uint table_mask;
-  uint pair_room;
-};
-#include "counters.glsl"
+#define PUSH_ADMIT
+#include "layout/push.h"
+#include "layout/counters.h"
 
 const uint kProbes = 256;
 
@@ -29,7 +27,7 @@ void main() {
     const uint occupant = atomicCompSwap(table[at], 0u, place + 1);
     if (occupant == 0) {
       const uint pair = atomicAdd(counters[kPairs], 1u);
-      if (pair < pair_room) pairs[pair] = proposal;
+      if (pair < pair_capacity) pairs[pair] = proposal;
       else atomicOr(counters[kOverflow], kOverflowPairs);
       return;
     }

@@ -4,13 +4,9 @@
 #include "common.glsl"
 
 layout(std430, binding = 0) buffer Counters { uint counters[]; };
-layout(push_constant) uniform Push {
-  uint of_pairs;    // else of proposals
-  uint room;
-  uint most_groups;  // in one dimension
-  uint most_items;
-};
-#include "counters.glsl"
+#define PUSH_ADVANCE
+#include "layout/push.h"
+#include "layout/counters.h"
 
 void main() {
   if (invocation() != 0) return;
@@ -19,7 +15,7 @@ void main() {
   counters[begin] = counters[begin + 1];
   // After an overflow the batch is thrown away.
   const uint items = min(max(counters[count], counters[begin]) - counters[begin], most_items);
-  counters[begin + 1] = counters[kOverflow] != 0 ? counters[begin] : min(counters[begin] + items, room);
+  counters[begin + 1] = counters[kOverflow] != 0 ? counters[begin] : min(counters[begin] + items, capacity);
   const uint groups = (counters[begin + 1] - counters[begin] + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
   const uint x = min(groups, most_groups);
   counters[arguments] = x;

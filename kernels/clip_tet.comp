@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Clips pairs of a tetrahedron and a cell, integrates, and proposes the pairs that the polyhedron makes known. A pair that cannot be
-// certified is listed for the next rung instead.
+// Clips pairs of a tetrahedron and a cell, integrates, and proposes the pairs that the polyhedron makes known. A pair
+// that cannot be certified is listed for the next rung instead.
 #include "common.glsl"
 #include "real.glsl"
 #include "points.glsl"
@@ -9,20 +9,19 @@
 layout(constant_id = 0) const uint kMostPlanes = 32;     // 64 at most
 layout(constant_id = 1) const uint kMostVertices = 60;   // 2 kMostPlanes - 4, the most that many planes have
 layout(constant_id = 2) const bool kUniform = true;
-layout(constant_id = 3) const uint kRung = 0;        // 0: first lists; 1: wider lists; 2: double after single
+layout(constant_id = 3) const uint kRung = kRungFirst;
 layout(constant_id = 4) const bool kListed = false;  // the pairs are those of a list, not a range
 layout(constant_id = 5) const bool kLabels = false;  // writes labels, and nothing else
 layout(constant_id = 6) const bool kNarrow = false;  // moments are kept in single precision
 layout(constant_id = 7) const bool kDoubleNext = false;  // uncertain pairs go to the rung of double precision
-layout(constant_id = 8) const bool kInnerWhole = false;  // cells that do not meet the boundary are clipped from the enclosure
+layout(constant_id = 8) const bool kInnerWhole = false;  // cells off the boundary are clipped from the enclosure
 
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
 layout(std430, binding = 2) readonly buffer Tets { real tet_words[]; };
 layout(std430, binding = 3) readonly buffer TetMeta { uint tet_meta[]; };
 layout(std430, binding = 4) readonly buffer Info { uvec4 list_info[]; };
-// In single, per cell: the bits of the largest errors of mass and of energy that its pairs may have. Then, per cell, marks.
-layout(std430, binding = 5) buffer Doubts { uint doubts[]; };
+layout(std430, binding = 5) buffer CellErrors { uint cell_errors[]; };
 layout(std430, binding = 6) readonly buffer Lists { uint lists[]; };
 layout(std430, binding = 7) readonly buffer WideLists { uint wide_lists[]; };
 layout(std430, binding = 8) readonly buffer Pairs { uvec2 pairs[]; };       // tetrahedron, slot
@@ -31,20 +30,12 @@ layout(std430, binding = 10) writeonly buffer MassSecond { uint mass_second[]; }
 layout(std430, binding = 11) writeonly buffer First { uint first_moments[]; };
 layout(std430, binding = 12) writeonly buffer Proposals { uvec2 proposals[]; };
 layout(std430, binding = 13) buffer Counters { uint counters[]; };
-layout(std430, binding = 14) buffer Flagged { uint flagged[]; };            // three regions: short lists, uncertain, for the CPU
-// Per pair: the numbers of planes (or kNone) and of vertices, labels in order of their keys, then for each vertex positions among them.
+layout(std430, binding = 14) buffer Flagged { uint flagged[]; };
 layout(std430, binding = 15) writeonly buffer Labels { uint labels[]; };
-layout(push_constant) uniform Push {
-  uint enclosure;       // the element after the last tetrahedron
-  float residual;
-  uint two;
-  uint first_pair;      // of the range; kListed: the region's first entry
-  uint pair_count;      // kNone: as many as the counters say
-  uint proposal_room;
-  uint flagged_room;    // entries of one region
-  uint cell_count;
-};
-#include "counters.glsl"
+#define PUSH_CLIP
+#include "layout/push.h"
+#define enclosure element_base
+#include "layout/counters.h"
 #include "tet.glsl"
 LOAD_POINT(seed, seed_words)
 
@@ -59,30 +50,31 @@ uint neighbour(uint k) { return list_wide ? wide_lists[list_first + k] : lists[l
 
 void propose(uint tet, uint slot) {
   const uint at = atomicAdd(counters[kProposals], 1u);
-  if (at < proposal_room) proposals[at] = uvec2(tet, slot);
+  if (at < proposal_capacity) proposals[at] = uvec2(tet, slot);
   else atomicOr(counters[kOverflow], kOverflowProposals);
 }
 
-// Everywhere, or with all inner cells clipped: the other cells of the tetrahedron. Else the cell goes on to the tetrahedra across
-// facets that it meets, and a neighbour that does not meet the boundary is known to lie inside.
+// Everywhere, or with all inner cells clipped: the other cells of the tetrahedron. Else the cell goes on to the
+// tetrahedra across facets that it meets, and a neighbour that does not meet the boundary is known to lie inside.
 void propose_all(uint tet) {
   [[dont_unroll]] for (uint k = 0; k < bounding_count; ++k) {
     const uint label = plane_label[bounding[k]];
     if ((label & kFacetLabel) == 0) {
       if (!kInnerWhole) {
         propose(tet, label);
-      } else if ((atomicOr(doubts[2 * cell_count + label], kIsMet) & (kIsBoundary | kIsMet)) == 0) {
+      } else if ((atomicOr(cell_errors[kCellErrorWords * cell_count + label], kMarkMet) &
+                  (kMarkBoundary | kMarkMet)) == 0) {
         propose(enclosure, label);
       }
     } else if (kInnerWhole) {
-      const uint across = tet_meta[tet * kTetMetaWords + kAcrossAt + (label & 3u)];
+      const uint across = tet_meta[tet * kTetMetaWords + kTetAcrossAt + (label & 3u)];
       if (across != kNone) propose(across, own_slot);
     }
   }
 }
 
-void flag(uint region, uint counter, uint pair) {
-  flagged[region * flagged_room + atomicAdd(counters[counter], 1u)] = pair;
+void flag(uint list, uint counter, uint pair) {
+  flagged[list * flagged_capacity + atomicAdd(counters[counter], 1u)] = pair;
 }
 
 bool reaches_enclosure() {
@@ -92,20 +84,20 @@ bool reaches_enclosure() {
 }
 
 void write_labels(uint index, uint status) {
-  const uint at = index * (2 + kMostPlanes + kMostVertices);
-  if (status != kClipped) {
-    labels[at] = status == kEmpty ? 0 : kNone;
+  const uint at = index * (kPolyhedronHeader + kMostPlanes + kMostVertices);
+  if (status != kStatusClipped) {
+    labels[at] = status == kStatusEmpty ? 0 : kNone;
     return;
   }
   labels[at] = bounding_count;
   labels[at + 1] = vertex_count;
   [[dont_unroll]] for (uint k = 0; k < bounding_count; ++k) {
-    labels[at + 2 + k] = plane_label[bounding[k]];
+    labels[at + kPolyhedronHeader + k] = plane_label[bounding[k]];
     next_of[bounding[k]] = k;
   }
   [[dont_unroll]] for (uint v = 0; v < vertex_count; ++v) {
     const uvec3 on = planes_of(vertex_on[v]);
-    labels[at + 2 + kMostPlanes + v] = packed(next_of[on.x], next_of[on.y], next_of[on.z]);
+    labels[at + kPolyhedronHeader + kMostPlanes + v] = packed(next_of[on.x], next_of[on.y], next_of[on.z]);
   }
 }
 
@@ -120,53 +112,54 @@ void main() {
     if (pair >= (pair_count == kNone ? counters[kPairsEnd] : first_pair + pair_count)) return;
   }
   const uint tet = pairs[pair].x, slot = pairs[pair].y;
-  if (kLabels && (status_of[pair] == kEmpty || status_of[pair] == kWhole)) {
-    labels[index * (2 + kMostPlanes + kMostVertices)] = 0;
+  if (kLabels && (status_of[pair] == kStatusEmpty || status_of[pair] == kStatusWhole)) {
+    labels[index * (kPolyhedronHeader + kMostPlanes + kMostVertices)] = 0;
     return;
   }
   begin_tet(tet, slot);
-  const uint owner = tet_meta[tet * kTetMetaWords + kOwnerAt];
+  const uint owner = tet_meta[tet * kTetMetaWords + kTetOwnerAt];
   uint status;
   if (owner != kNone) {
     // A cell is convex: it holds the tetrahedron if it owns the corners.
-    status = owner == slot ? kWhole : kEmpty;
+    status = owner == slot ? kStatusWhole : kStatusEmpty;
   } else {
     const uvec4 info = list_info[slot];
     list_wide = (info.x & kWideList) != 0;
     list_first = info.x & ~kWideList;
-    status = info.y > kMostListed ? kUnsure : clip(info.y, real(uintBitsToFloat(info.z)));
+    status = info.y > kMostListed ? kStatusUnsure : clip(info.y, real(uintBitsToFloat(info.z)));
   }
   bounding_count = 0;
   Moments moments;
-  if (status == kClipped || status == kWhole) {
+  if (status == kStatusClipped || status == kStatusWhole) {
     collect();
-    if (tet == enclosure && reaches_enclosure()) status = kUnsure;
+    if (tet == enclosure && reaches_enclosure()) status = kStatusUnsure;
     else if (!kLabels) moments = integrate(kUniform);
   }
-  if (!loops_complete(two)) status = kUnsure;
+  if (!loops_complete(two)) status = kStatusUnsure;
   if (kLabels) {
     write_labels(index, status);
     return;
   }
   status_of[pair] = status;
-  if (kRung != 2 && status == kUnsure) atomicAdd(counters[kUnsureMet], 1u);
-  if (kRung == 2 && status != kClipped && status != kEmpty) atomicAdd(counters[kUnsettled], 1u);
-  if (status == kClipped || status == kWhole) {
+  if (kRung != kRungDouble && status == kStatusUnsure) atomicAdd(counters[kUnsurePairs], 1u);
+  if (kRung == kRungDouble && status != kStatusClipped && status != kStatusEmpty)
+    atomicAdd(counters[kUnsureInDouble], 1u);
+  if (status == kStatusClipped || status == kStatusWhole) {
     store_moments(pair, moments);
 #if !BISECTOR_DOUBLE
-    if (status == kClipped) {
+    if (status == kStatusClipped) {
       const real error = mass_error();
       precise real energy_error = error * reach;
-      atomicMax(doubts[2 * slot], floatBitsToUint(error));
-      atomicMax(doubts[2 * slot + 1], floatBitsToUint(energy_error));
+      atomicMax(cell_errors[kCellErrorWords * slot], floatBitsToUint(error));
+      atomicMax(cell_errors[kCellErrorWords * slot + kEnergyErrorAt], floatBitsToUint(energy_error));
     }
 #endif
     propose_all(tet);
-  } else if (kRung == 0 && (status == kShortList || status == kCrowded)) {
-    flag(0, kShort, pair);
-  } else if (kDoubleNext && status == kUnsure) {
-    flag(1, kUncertain, pair);
-  } else if (status != kEmpty) {
-    flag(2, kForCpu, pair);
+  } else if (kRung == kRungFirst && (status == kStatusShortList || status == kStatusCrowded)) {
+    flag(kFlaggedShort, kShortLists, pair);
+  } else if (kDoubleNext && status == kStatusUnsure) {
+    flag(kFlaggedUncertain, kUncertain, pair);
+  } else if (status != kStatusEmpty) {
+    flag(kFlaggedForCpu, kForCpu, pair);
   }
 }

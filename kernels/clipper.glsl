@@ -1,16 +1,15 @@
-// Clipping one facet to one restricted Voronoi cell, the twin of Clipper in src/bisector/voronoi/clip.cpp: labels first,
-// coordinates from labels by one formula, and with each corner a bound of its error, the slack. What the bounds do not decide
-// is not decided here: the pair gets a status and goes to exact arithmetic.
+// Clipping one facet to one restricted Voronoi cell, the twin of Clipper in src/voronoi/clip.cpp: labels first,
+// coordinates from labels by one formula, and with each corner a bound of its error, the slack. What the bounds do not
+// decide is not decided here: the pair gets a status and goes to exact arithmetic.
 //
-// To include: `facet_words`, `facet_meta`, `facet_base`, `residual`, `ids` and seed(), and the constant kMostCorners.
-
-#include "statuses.glsl"
+// To include: `facet_words`, `facet_meta`, `element_base`, `residual`, `ids` and seed(), and the constant kMostCorners.
 
 #if BISECTOR_DOUBLE
 const real kSquareError = 1e-12LF;   // relative, of |d|^2 with all that is compared with it
 const real kTiny = 1e-280LF;         // no product this small is told from 0
 const real kReachGrowth = 1e-5LF;    // lists may be in the order of distances in single precision
-// Lines that meet at a smaller angle (sine, squared) are left to exact arithmetic, and below the second are met in two steps.
+// Lines that meet at a smaller angle (sine, squared) are left to exact arithmetic, and below the second are met in two
+// steps.
 const real kSteep = 1e-12LF, kShallow = 1e-8LF;
 #else
 const real kSquareError = 16 * kUnit;
@@ -52,8 +51,8 @@ real reach;            // upper bound of its squared distance
 bool polygon_changed;  // by the last cut
 
 void begin_facet(uint facet, uint slot) {
-  at_facet = (facet - facet_base) * kFacetWords;
-  bits = facet_meta[kMetaWords * (facet - facet_base) + 4];
+  at_facet = (facet - element_base) * kFacetWords;
+  bits = facet_meta[kFacetMetaWords * (facet - element_base) + kFacetBitsAt];
   own_slot = slot;
   own = seed(slot);
   normal = facet_vector(at_facet + kNormalAt);
@@ -139,15 +138,16 @@ bool points_out(uint label) {
 
 // Sets corner k to where the lines meet; false if that is not certain.
 //
-// The slack in double is that of the CPU. In single all terms are at the scale of the cell: with relative rounding errors u,
-// h the height, c the offset, each line is off by
+// The slack in double is that of the CPU. In single all terms are at the scale of the cell: with relative rounding
+// errors u, h the height, c the offset, each line is off by
 //   e = u (4 |m| + 10 |h|) + 2 a      for a bisector, in units of distance (|m| = |d| the distance of the seeds),
 //   e = u |c| + 2 a                   for a facet edge, from pairs, with a the absolute error of those,
 // and the corner w, seen from the foot, by
 //   (e1 + e2 + 10 u (|c1| / |m1| + |c2| / |m2|) + 22 u |w|) / sine + 6 u |w|,
-// to which come 6 u |h| + a of the foot, u |corner| of the sum, and 8 u |corner| for the products that the corner is tested in.
-// What positions lack turns bisectors of seeds that are close together: by `vague` radians, so that (|w| + |h|) vague / sine
-// comes to it. Where that turns the lines by over a hundredth of their angle, or u does, all is left to exact arithmetic.
+// to which come 6 u |h| + a of the foot, u |corner| of the sum, and 8 u |corner| for the products that the corner is
+// tested in. What positions lack turns bisectors of seeds that are close together: by `vague` radians, so that (|w| +
+// |h|) vague / sine comes to it. Where that turns the lines by over a hundredth of their angle, or u does, all is left
+// to exact arithmetic.
 bool meet(Line before, uint before_label, Line after, uint after_label, uint k) {
   precise real determinant = dot3(before.along, after.m);
   precise real squares = before.squared * after.squared;
@@ -159,9 +159,9 @@ bool meet(Line before, uint before_label, Line after, uint after_label, uint k) 
   precise real3 w = inverse * numerator;
   precise real shallow = kShallow * squares;
   if (!(square > shallow)) {
-    // Where lines meet at a small angle the determinant's error takes w off both of them; what is left then is an error along
-    // them, which hardly changes an area. Only the lines' normals in the plane will do for it: m times the error of w across
-    // the plane may be far larger.
+    // Where lines meet at a small angle the determinant's error takes w off both of them; what is left then is an error
+    // along them, which hardly changes an area. Only the lines' normals in the plane will do for it: m times the error
+    // of w across the plane may be far larger.
     precise real left_before = before.offset - dot3(cross3(before.along, normal), w);
     precise real left_after = after.offset - dot3(cross3(after.along, normal), w);
     precise real3 correction = left_after * before.along - left_before * after.along;
@@ -179,7 +179,8 @@ bool meet(Line before, uint before_label, Line after, uint after_label, uint k) 
   const bool before_is_edge = (before_label & kEdgeLabel) != 0, after_is_edge = (after_label & kEdgeLabel) != 0;
   lines += before_is_edge ? distance_before : 4.0 * size_before + 10.0 * h;
   lines += after_is_edge ? distance_after : 4.0 * size_after + 10.0 * h;
-  const real wide_before = before_is_edge ? 0.0 : 1.75 / size_before, wide_after = after_is_edge ? 0.0 : 1.75 / size_after;
+  const real wide_before = before_is_edge ? 0.0 : 1.75 / size_before,
+             wide_after = after_is_edge ? 0.0 : 1.75 / size_after;
   precise real vague = residual * (wide_before + wide_after);
   precise real turned = vague * vague * squares;
   precise real hundredth = 1e-4 * square;
@@ -209,7 +210,8 @@ void bound_polygon() {
 #include "ties.glsl"
 
 #if BISECTOR_DOUBLE
-// The only axis along which c lies apart from the reference, if the reference is level with the own seed there; else -1.
+// The only axis along which c lies apart from the reference, if the reference is level with the own seed there; else
+// -1.
 int layer_axis(Point reference, Point c) {
   int axis = -1;
   for (int a = 0; a < 3; ++a)
@@ -220,11 +222,12 @@ int layer_axis(Point reference, Point c) {
   return axis >= 0 && reference.high[axis] == own.high[axis] ? axis : -1;
 }
 
-// The side of the corner with these labels with respect to the bisector of c, exactly, if c lies one layer of a grid from the own
-// seed or from a reference on whose bisector the corner is, and if the corner's coordinate across the layers is known: for a
-// corner of the facet, and where an edge or all of the facet has but one. Else 0. Models made by hand lie half way between
-// layers. The row of c is that of the reference plus that of a seed across the layers, whose sign depends on this coordinate
-// alone; where it is 0 the cofactors are -1 for c and +1 for the reference, times the corner's denominator.
+// The side of the corner with these labels with respect to the bisector of c, exactly, if c lies one layer of a grid
+// from the own seed or from a reference on whose bisector the corner is, and if the corner's coordinate across the
+// layers is known: for a corner of the facet, and where an edge or all of the facet has but one. Else 0. Models made by
+// hand lie half way between layers. The row of c is that of the reference plus that of a seed across the layers, whose
+// sign depends on this coordinate alone; where it is 0 the cofactors are -1 for c and +1 for the reference, times the
+// corner's denominator.
 int layer_side(uint before, uint after, uint c) {
   const bool on_after = (after & kEdgeLabel) != 0, on_before = (before & kEdgeLabel) != 0;
   const Point other = seed(c);
@@ -257,8 +260,8 @@ int layer_side(uint before, uint after, uint c) {
 }
 #endif
 
-// The side of the corner with these labels with respect to the bisector of c, where bounds do not tell but equal coordinates
-// do; 0 if they do not either.
+// The side of the corner with these labels with respect to the bisector of c, where bounds do not tell but equal
+// coordinates do; 0 if they do not either.
 int tie_side(uint before, uint after, uint c) {
   int side = 0;
 #if BISECTOR_DOUBLE
@@ -268,8 +271,8 @@ int tie_side(uint before, uint after, uint c) {
   return side;
 }
 
-// The side of corner k with respect to the bisector of the own seed and that at d: +1 inside, -1 outside, 0 if the bounds do not
-// tell.
+// The side of corner k with respect to the bisector of the own seed and that at d: +1 inside, -1 outside, 0 if the
+// bounds do not tell.
 int side_of(uint k, real3 d, real squared) {
   precise real taxicab = abs(d.x) + abs(d.y) + abs(d.z);
   precise real below = real(0.5) * squared * (real(1.0) - kSquareError) - kTiny;
@@ -301,7 +304,7 @@ uint cut(uint other, real3 d, real squared) {
   [[dont_unroll]] for (uint k = 0; k < n; ++k) {
     int side = side_of(k, d, squared);
     if (side == 0) side = tie_side(corner_label[k == 0 ? n - 1 : k - 1], corner_label[k], other);
-    if (side == 0) return kUnsure;
+    if (side == 0) return kStatusUnsure;
     const bool inside = side > 0;
     if (k == 0) {
       first_inside = inside;
@@ -319,8 +322,8 @@ uint cut(uint other, real3 d, real squared) {
   }
   if (first_inside != before_inside) ++changes;
   // A line leaves a convex polygon in one run; more would mean that a bound does not hold.
-  if (changes != 2) return kUnsure;
-  if (kept + 2 > kMostCorners) return kCrowded;
+  if (changes != 2) return kStatusUnsure;
+  if (kept + 2 > kMostCorners) return kStatusCrowded;
 
   // The corners that stay are `kept` from in_first on, cyclically; two new ones follow the last of them.
   const uint entering = corner_label[in_first == 0 ? n - 1 : in_first - 1];
@@ -342,14 +345,15 @@ uint cut(uint other, real3 d, real squared) {
   corner_label[place] = other;
   corner_label[place + 1] = entering;
   const Line line = seed_line(d, squared);
-  if (!meet(line_of(leaving), leaving, line, other, place)) return kUnsure;
-  if (!meet(line, other, line_of(entering), entering, place + 1)) return kUnsure;
+  if (!meet(line_of(leaving), leaving, line, other, place)) return kStatusUnsure;
+  if (!meet(line, other, line_of(entering), entering, place + 1)) return kStatusUnsure;
   return 0;
 }
 
 // Clips the facet to the cell of `slot` by a list of neighbours in ascending distance.
 //
-// To include: neighbour(k), the k-th slot of the list; `radius` bounds from below the squared distance of all seeds not listed.
+// To include: neighbour(k), the k-th slot of the list; `radius` bounds from below the squared distance of all seeds not
+// listed.
 uint clip(uint count, real radius) {
   bound_polygon();
   [[dont_unroll]] for (uint k = 0; k < count; ++k) {
@@ -364,15 +368,15 @@ uint clip(uint count, real radius) {
     near -= 16.0 * absolute_error * sqrt(squared);
 #endif
     precise real twice = real(4.0) * reach;
-    if (twice < near) return kClipped;
+    if (twice < near) return kStatusClipped;
     polygon_changed = false;
     const uint status = cut(other, d, squared);
     if (status != 0) return status;
-    if (corner_count == 0) return kEmpty;
+    if (corner_count == 0) return kStatusEmpty;
     if (polygon_changed) bound_polygon();
   }
   precise real twice = real(4.0) * reach;
-  return radius >= kInfinity || twice < radius ? kClipped : kShortList;
+  return radius >= kInfinity || twice < radius ? kStatusClipped : kStatusShortList;
 }
 
 #if !BISECTOR_DOUBLE
@@ -392,7 +396,8 @@ real mass_error() {
 }
 #endif
 
-// The order in which the fan of moments starts: facet edges by their vertices' indices, then seeds by the caller's index.
+// The order in which the fan of moments starts: facet edges by their vertices' indices, then seeds by the caller's
+// index.
 uint label_key(uint label) { return (label & kEdgeLabel) != 0 ? rank_of(bits, label & 3u) : 3u + ids[label].x; }
 
 uint first_corner() {
@@ -408,11 +413,7 @@ uint first_corner() {
   return first;
 }
 
-struct Moments {
-  real mass;
-  real3 first;
-  real second;
-};
+#include "moments.glsl"
 
 real density_at(uint k) {
   const uint after = corner_label[k], before = corner_label[k == 0 ? corner_count - 1 : k - 1];
@@ -421,13 +422,14 @@ real density_at(uint k) {
              r2 = facet_words[at_facet + kDensityAt + 2];
   const uint anchor = anchor_of(bits);
   precise real3 from_anchor = corner_at[k] - local[anchor];
-  precise real value = facet_words[at_facet + kDensityAt + anchor] + dot3(facet_vector(at_facet + kGradientAt), from_anchor);
+  precise real value =
+      facet_words[at_facet + kDensityAt + anchor] + dot3(facet_vector(at_facet + kGradientAt), from_anchor);
   return min(max(value, min(min(r0, r1), r2)), max(max(r0, r1), r2));
 }
 
 const real kThird = real(1.0LF / 3.0LF), kTwelfth = real(1.0LF / 12.0LF), kThirtieth = real(1.0LF / 30.0LF);
 
-// Twins of triangle_moments() in src/bisector/voronoi/moments.h.
+// Twins of triangle_moments() in src/voronoi/moments.h.
 Moments uniform_moments(real3 sum, real squares, real area) {
   Moments m;
   precise real third = kThird * area;

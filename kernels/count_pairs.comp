@@ -2,18 +2,18 @@
 #extension GL_GOOGLE_include_directive : require
 // Incident pairs per triangle and per cell.
 #include "common.glsl"
-#include "statuses.glsl"
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) readonly buffer Status { uint status_of[]; };
 layout(std430, binding = 2) readonly buffer Triangles { uint triangle_of[]; };  // of a facet
 layout(std430, binding = 3) buffer ByTriangle { uint by_triangle[]; };
 layout(std430, binding = 4) buffer ByCell { uint by_cell[]; };
-layout(push_constant) uniform Push { uint pair_count; };
+#define PUSH_COUNT
+#include "layout/push.h"
 
 void main() {
   const uint pair = invocation();
-  if (pair >= pair_count || status_of[pair] == kEmpty) return;
+  if (pair >= count || status_of[pair] == kStatusEmpty) return;
   atomicAdd(by_triangle[triangle_of[pairs[pair].x]], 1u);
   atomicAdd(by_cell[pairs[pair].y], 1u);
 }

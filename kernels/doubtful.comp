@@ -2,43 +2,40 @@
 #extension GL_GOOGLE_include_directive : require
 // Lists the pairs of cells whose masses or energies single precision may have off by too much.
 #include "common.glsl"
-#include "statuses.glsl"
 
 layout(constant_id = 0) const bool kDoubleNext = false;
 layout(constant_id = 1) const bool kSolid = false;  // masses are volumes, not areas
 
-// Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a polygon
-// for as far off as its farthest corner, by less still. The bounds of polyhedra, whose vertices have more to be off by, are found
-// to be five hundred times too large and more.
+// Of a cell's. Masses are found to be off by a fiftieth of their bounds or less, energies, whose bounds take all of a
+// polygon for as far off as its farthest corner, by less still. The bounds of polyhedra, whose vertices have more to be
+// off by, are found to be five hundred times too large and more.
 const float kMassError = kSolid ? 3e-3 : 4e-4, kEnergyError = kSolid ? 9e-3 : 1.2e-3;
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) readonly buffer Status { uint status_of[]; };
-layout(std430, binding = 2) readonly buffer Doubts { uint doubts[]; };
-layout(std430, binding = 3) readonly buffer Cells { float cells[]; };  // of cells.comp
+layout(std430, binding = 2) readonly buffer CellErrors { uint cell_errors[]; };
+layout(std430, binding = 3) readonly buffer Cells { float cells[]; }; 
 layout(std430, binding = 4) buffer Counters { uint counters[]; };
 layout(std430, binding = 5) writeonly buffer Flagged { uint flagged[]; };
-layout(push_constant) uniform Push {
-  uint first_pair;
-  uint pair_count;
-  uint flagged_room;
-  float mean_density;
-  float share;         // of the errors that are allowed
-};
-#include "counters.glsl"
+#define PUSH_DOUBTFUL
+#include "layout/push.h"
+#include "layout/counters.h"
 
 void main() {
   const uint index = invocation();
   if (index >= pair_count) return;
   const uint pair = first_pair + index, slot = pairs[pair].y;
-  if (status_of[pair] != kClipped) return;
-  precise float least = 0.25 * cells[6 * slot + 5];
-  precise float mass = max(cells[6 * slot], least);
+  if (status_of[pair] != kStatusClipped) return;
+  precise float least = 0.25 * cells[kCellWords * slot + kCellMedianAt];
+  precise float mass = max(cells[kCellWords * slot], least);
   const float extent = mass / mean_density;
-  precise float energy = max(cells[6 * slot + 4], mass * (kSolid ? pow(extent, 2.0 / 3.0) : extent));
+  precise float energy =
+      max(cells[kCellWords * slot + kSecondMomentAt], mass * (kSolid ? pow(extent, 2.0 / 3.0) : extent));
   precise float most_mass = kMassError * share * mass;
   precise float most_energy = kEnergyError * share * energy;
-  if (!(uintBitsToFloat(doubts[2 * slot]) > most_mass) && !(uintBitsToFloat(doubts[2 * slot + 1]) > most_energy)) return;
+  if (!(uintBitsToFloat(cell_errors[kCellErrorWords * slot]) > most_mass) &&
+      !(uintBitsToFloat(cell_errors[kCellErrorWords * slot + kEnergyErrorAt]) > most_energy))
+    return;
   const uint at = atomicAdd(counters[kDoubleNext ? kUncertain : kForCpu], 1u);
-  if (at < flagged_room) flagged[(kDoubleNext ? 1 : 2) * flagged_room + at] = pair;
+  if (at < flagged_capacity) flagged[(kDoubleNext ? kFlaggedUncertain : kFlaggedForCpu) * flagged_capacity + at] = pair;
 }

@@ -1,15 +1,14 @@
-// Facets as the host packs them (host/facets.cpp), twins of Facet in src/bisector/voronoi/surface.h.
+// Facets as host/passes/device_surface.cpp packs them (layout/elements.h), twins of Facet in src/voronoi/surface.h.
 //
-// To include: `facet_words`, `facet_meta` and `facet_base`, the index of the first facet in these buffers.
+// To include: `facet_words`, `facet_meta` and `element_base`, the index of the first facet in these buffers.
 
 #if BISECTOR_DOUBLE
-const uint kFacetWords = 18;     // corners, normal, density, gradient
-const uint kNormalAt = 9, kDensityAt = 12, kGradientAt = 15;
+const uint kNormalAt = kDoubleFacetNormalAt, kDensityAt = kDoubleFacetDensityAt, kGradientAt = kDoubleFacetGradientAt,
+           kFacetWords = kDoubleFacetWords;
 #else
-const uint kFacetWords = 48;     // corners, normal, outward unit normals of the edges (all high and low), density, gradient
-const uint kNormalAt = 18, kEdgesAt = 24, kDensityAt = 42, kGradientAt = 45;
+const uint kNormalAt = kSingleFacetNormalAt, kEdgesAt = kSingleFacetEdgesAt, kDensityAt = kSingleFacetDensityAt,
+           kGradientAt = kSingleFacetGradientAt, kFacetWords = kSingleFacetWords;
 #endif
-const uint kMetaWords = 5;       // sites of the corners, triangle, bits
 
 real3 facet_vector(uint at) { return real3(facet_words[at], facet_words[at + 1], facet_words[at + 2]); }
 
@@ -22,13 +21,12 @@ Point facet_point(uint at) {
   return p;
 }
 
-uint facet_triangle(uint facet) { return facet_meta[kMetaWords * (facet - facet_base) + 3]; }
+uint facet_triangle(uint facet) { return facet_meta[kFacetMetaWords * (facet - element_base) + kFacetTriangleAt]; }
 uvec3 facet_sites(uint facet) {
-  const uint at = kMetaWords * (facet - facet_base);
+  const uint at = kFacetMetaWords * (facet - element_base);
   return uvec3(facet_meta[at], facet_meta[at + 1], facet_meta[at + 2]);
 }
 
-// Bits: the anchor, then each edge's origin, then each edge's rank, two bits each.
 uint anchor_of(uint bits) { return bits & 3u; }
-uint origin_of(uint bits, uint edge) { return (bits >> (2 + 2 * edge)) & 3u; }
-uint rank_of(uint bits, uint edge) { return (bits >> (8 + 2 * edge)) & 3u; }
+uint origin_of(uint bits, uint edge) { return (bits >> (kOriginShift + 2 * edge)) & 3u; }
+uint rank_of(uint bits, uint edge) { return (bits >> (kRankShift + 2 * edge)) & 3u; }

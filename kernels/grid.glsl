@@ -1,6 +1,6 @@
-// A uniform grid over the seeds, hashed into buckets: cells are as fine as the seeds lie close, and memory is that of the seeds.
-// A bucket may hold seeds of several cells; each is asked for its own cell before it counts. The order within a bucket depends
-// on a race, so nothing may depend on it.
+// A uniform grid over the seeds, hashed into buckets: cells are as fine as the seeds lie close, and memory is that of
+// the seeds. A bucket may hold seeds of several cells; each is asked for its own cell before it counts. The order
+// within a bucket depends on a race, so nothing may depend on it.
 //
 // To include: a push constant block with `grid_lower`, `grid_inverse` and `bucket_mask`.
 

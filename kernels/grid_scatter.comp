@@ -8,12 +8,8 @@
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) buffer Places { uint places[]; };
 layout(std430, binding = 2) writeonly buffer Slots { uint bucket_slots[]; };
-layout(push_constant) uniform Push {
-  vec3 grid_lower;
-  float grid_inverse;
-  uint bucket_mask;
-  uint seed_count;
-};
+#define PUSH_GRID
+#include "layout/push.h"
 #include "grid.glsl"
 LOAD_POINT(seed, seed_words)
 

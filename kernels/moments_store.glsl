@@ -1,5 +1,5 @@
-// Moments of pairs in buffers of words, in the precision of the whole diagram: that of the build, or single where the double
-// kernels help out (kNarrow).
+// Moments of pairs in buffers of words, in the precision of the whole diagram: that of the build, or single where the
+// double kernels help out (kNarrow).
 
 #if BISECTOR_DOUBLE
 void store_real(uint at, real value, bool of_first) {
@@ -26,7 +26,7 @@ void store_real(uint at, real value, bool of_first) {
 #endif
 
 void store_moments(uint pair, Moments m) {
-  store_real(2 * pair, m.mass, false);
-  store_real(2 * pair + 1, m.second, false);
-  for (uint k = 0; k < 3; ++k) store_real(3 * pair + k, m.first[k], true);
+  store_real(kMassSecondWords * pair, m.mass, false);
+  store_real(kMassSecondWords * pair + 1, m.second, false);
+  for (uint k = 0; k < 3; ++k) store_real(kFirstWords * pair + k, m.first[k], true);
 }

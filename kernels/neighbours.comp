@@ -1,14 +1,16 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The nearest seeds of a seed in ascending distance, ties by the caller's index, and a certificate: whoever is not listed lies at
-// `radius` or more. Rings of grid cells are searched outwards until the list is full and closed, or too much has been seen.
+// The nearest seeds of a seed in ascending distance, ties by the caller's index, and a certificate: whoever is not
+// listed lies at `radius` or more. Rings of grid cells are searched outwards until the list is full and closed, or too
+// much has been seen.
 #include "common.glsl"
 #include "real.glsl"
 #include "points.glsl"
 
 layout(constant_id = 0) const uint kMost = 32;       // entries of a list
 layout(constant_id = 1) const bool kTargets = false;  // lists for some slots only, kept apart from the first ones
-layout(constant_id = 2) const uint kExamined = 512;   // seeds; if eight invocations take turns, loops stay below llvmpipe's limit
+// Seeds that are looked at: few enough for loops to stay below llvmpipe's limit if eight invocations take turns.
+layout(constant_id = 2) const uint kExamined = 512;
 
 const int kRings = 5;
 
@@ -17,20 +19,12 @@ layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
 layout(std430, binding = 2) readonly buffer Begins { uint bucket_end[]; };
 layout(std430, binding = 3) readonly buffer Slots { uint bucket_slots[]; };
 layout(std430, binding = 4) writeonly buffer Lists { uint lists[]; };
-layout(std430, binding = 5) writeonly buffer Info { uvec4 list_info[]; };  // first entry, count, bits of the squared radius
+layout(std430, binding = 5) writeonly buffer Info { uvec4 list_info[]; };  // ListInfo
 layout(std430, binding = 6) buffer Counters { uint counters[]; };
 layout(std430, binding = 7) readonly buffer Targets { uint targets[]; };
-layout(push_constant) uniform Push {
-  vec3 grid_lower;
-  float grid_inverse;
-  uint bucket_mask;
-  uint seed_count;
-  float residual;
-  uint two;
-  uint first_target;
-  uint target_room;
-};
-#include "counters.glsl"
+#define PUSH_NEIGHBOURS
+#include "layout/push.h"
+#include "layout/counters.h"
 #include "grid.glsl"
 LOAD_POINT(seed, seed_words)
 
@@ -70,7 +64,7 @@ void sift_up(uint at, real square, uint other) {
 
 void main() {
   const uint index = invocation();
-  if (kTargets ? first_target + index >= min(counters[kTargetCount], target_room) : index >= seed_count) return;
+  if (kTargets ? first_target + index >= min(counters[kWideTargets], target_capacity) : index >= seed_count) return;
   const uint slot = kTargets ? targets[first_target + index] : index;
   const Point x = seed(slot);
   const ivec3 home = cell_at(x);
@@ -85,7 +79,8 @@ void main() {
           const ivec3 cell = home + ivec3(step, y, z);
           const uint bucket = bucket_of(cell);
           const uint end = bucket_end[bucket];
-          [[dont_unroll]] for (uint k = bucket == 0 ? 0 : bucket_end[bucket - 1]; k < end && examined <= kExamined; ++k) {
+          [[dont_unroll]] for (uint k = bucket == 0 ? 0 : bucket_end[bucket - 1]; k < end && examined <= kExamined;
+                               ++k) {
             ++examined;
             const uint other = bucket_slots[k];
             const Point p = seed(other);
@@ -131,5 +126,5 @@ void main() {
   const bool complete = loops_complete(two);
   list_info[slot] = uvec4(first | (kTargets ? kWideList : 0u), complete ? listed : 0,
                           floatBitsToUint(complete ? max(float(limit), 0.0) : 0.0), 0);
-  if (met) atomicAdd(counters[kMet], 1u);
+  if (met) atomicAdd(counters[kCoincident], 1u);
 }

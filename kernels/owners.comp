@@ -12,20 +12,12 @@ layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ends { uint bucket_end[]; };
 layout(std430, binding = 2) readonly buffer Slots { uint bucket_slots[]; };
 layout(std430, binding = 3) readonly buffer Points { real point_words[]; };
-layout(std430, binding = 4) buffer Owners { uint owners[]; };  // in: a guess or kNone; out: a slot, or kNone if uncertain
+layout(std430, binding = 4) buffer Owners { uint owners[]; };  // in: guesses; out: slots; kNone: unknown
 layout(std430, binding = 5) buffer Counters { uint counters[]; };
-layout(std430, binding = 6) writeonly buffer Lost { uint lost[]; };
-layout(push_constant) uniform Push {
-  vec3 grid_lower;
-  float grid_inverse;
-  uint bucket_mask;
-  uint seed_count;
-  float residual;
-  uint two;
-  uint point_count;
-  uint report_lost;
-};
-#include "counters.glsl"
+layout(std430, binding = 6) writeonly buffer Uncertain { uint uncertain[]; };
+#define PUSH_OWNERS
+#include "layout/push.h"
+#include "layout/counters.h"
 #include "grid.glsl"
 LOAD_POINT(seed, seed_words)
 LOAD_POINT(point, point_words)
@@ -52,7 +44,8 @@ void main() {
           const ivec3 cell = home + ivec3(step, y, z);
           const uint bucket = bucket_of(cell);
           const uint end = bucket_end[bucket];
-          [[dont_unroll]] for (uint k = bucket == 0 ? 0 : bucket_end[bucket - 1]; k < end && examined <= kExamined; ++k) {
+          [[dont_unroll]] for (uint k = bucket == 0 ? 0 : bucket_end[bucket - 1]; k < end && examined <= kExamined;
+                               ++k) {
             ++examined;
             const uint other = bucket_slots[k];
             const Point p = seed(other);
@@ -76,7 +69,8 @@ void main() {
     closed = seen == seed_count || reach_squared > nearest;
   }
   precise real error = real(32.0) * kUnit * second + real(16.0) * real(residual) * sqrt(second);
-  const bool certain = loops_complete(two) && closed && best != kNone && (second == kInfinity || nearest + error < second);
+  const bool certain =
+      loops_complete(two) && closed && best != kNone && (second == kInfinity || nearest + error < second);
   owners[i] = certain ? best : kNone;
-  if (!certain && report_lost != 0) lost[atomicAdd(counters[kLostSites], 1u)] = i;
+  if (!certain && report_uncertain != 0) uncertain[atomicAdd(counters[kUncertainOwners], 1u)] = i;
 }

@@ -1,5 +1,5 @@
-// Points as they lie in buffers. Beside each seed's index (`ids`) are the low words of its coordinates as doubles: with them
-// equality is told in single precision too.
+// Points as they lie in buffers. Beside each seed's index (`ids`) are the low words of its coordinates as doubles: with
+// them equality is told in single precision too.
 
 bool same_coordinate(Point a, uvec3 low_a, Point b, uvec3 low_b, int k) {
 #if BISECTOR_DOUBLE
@@ -10,18 +10,18 @@ bool same_coordinate(Point a, uvec3 low_a, Point b, uvec3 low_b, int k) {
 }
 
 #if BISECTOR_DOUBLE
-#define LOAD_POINT(name, buffer_data)                                                                        \
-  Point name(uint i) {                                                                                       \
-    Point p;                                                                                                 \
-    p.high = real3(buffer_data[3 * i], buffer_data[3 * i + 1], buffer_data[3 * i + 2]);                      \
-    return p;                                                                                                \
+#define LOAD_POINT(name, data)                                                                                    \
+  Point name(uint i) {                                                                                            \
+    Point p;                                                                                                      \
+    p.high = real3(data[kPointWords * i], data[kPointWords * i + 1], data[kPointWords * i + 2]);                  \
+    return p;                                                                                                     \
   }
 #else
-#define LOAD_POINT(name, buffer_data)                                                                        \
-  Point name(uint i) {                                                                                       \
-    Point p;                                                                                                 \
-    p.high = real3(buffer_data[6 * i], buffer_data[6 * i + 1], buffer_data[6 * i + 2]);                      \
-    p.low = real3(buffer_data[6 * i + 3], buffer_data[6 * i + 4], buffer_data[6 * i + 5]);                   \
-    return p;                                                                                                \
+#define LOAD_POINT(name, data)                                                                                    \
+  Point name(uint i) {                                                                                            \
+    Point p;                                                                                                      \
+    p.high = real3(data[kPointWords * i], data[kPointWords * i + 1], data[kPointWords * i + 2]);                  \
+    p.low = real3(data[kPointWords * i + 3], data[kPointWords * i + 4], data[kPointWords * i + 5]);               \
+    return p;                                                                                                     \
   }
 #endif

@@ -1,11 +1,7 @@
-// One pass of a stable radix sort over four bits of the first word. Each invocation owns a run of consecutive items.
-const uint kRun = 64;
-const uint kDigits = 16;
+// One pass of a stable radix sort over kRadixBits bits of the first word. Each invocation owns a run of consecutive
+// items.
+#define PUSH_RADIX
+#include "layout/push.h"
+#include "layout/sizes.h"
 
-layout(push_constant) uniform Push {
-  uint item_count;
-  uint run_count;
-  uint shift;
-};
-
-uint digit_of(uint key) { return (key >> shift) & (kDigits - 1); }
+uint digit_of(uint key) { return (key >> shift) & (kRadixDigits - 1); }

@@ -10,9 +10,9 @@ layout(std430, binding = 1) writeonly buffer Counts { uint counts[]; };
 void main() {
   const uint run = invocation();
   if (run >= run_count) return;
-  uint own[kDigits];
-  for (uint d = 0; d < kDigits; ++d) own[d] = 0;
-  const uint end = min(item_count, (run + 1) * kRun);
-  [[dont_unroll]] for (uint k = run * kRun; k < end; ++k) ++own[digit_of(items[k].x)];
-  for (uint d = 0; d < kDigits; ++d) counts[d * run_count + run] = own[d];
+  uint own[kRadixDigits];
+  for (uint d = 0; d < kRadixDigits; ++d) own[d] = 0;
+  const uint end = min(item_count, (run + 1) * kRadixRun);
+  [[dont_unroll]] for (uint k = run * kRadixRun; k < end; ++k) ++own[digit_of(items[k].x)];
+  for (uint d = 0; d < kRadixDigits; ++d) counts[d * run_count + run] = own[d];
 }

@@ -11,10 +11,10 @@ layout(std430, binding = 2) writeonly buffer Sorted { uvec2 sorted[]; };
 void main() {
   const uint run = invocation();
   if (run >= run_count) return;
-  uint next[kDigits];
-  for (uint d = 0; d < kDigits; ++d) next[d] = places[d * run_count + run];
-  const uint end = min(item_count, (run + 1) * kRun);
-  [[dont_unroll]] for (uint k = run * kRun; k < end; ++k) {
+  uint next[kRadixDigits];
+  for (uint d = 0; d < kRadixDigits; ++d) next[d] = places[d * run_count + run];
+  const uint end = min(item_count, (run + 1) * kRadixRun);
+  [[dont_unroll]] for (uint k = run * kRadixRun; k < end; ++k) {
     const uvec2 item = items[k];
     sorted[next[digit_of(item.x)]++] = item;
   }

@@ -1,14 +1,16 @@
-// Arithmetic in the precision of the build. Every operation is `precise`, so that none is fused or reordered: in double the
-// results are those of src/bisector/core/types.h bit for bit, and in single the error bounds hold.
+// Arithmetic in the precision of the build. Every operation is `precise`, so that none is fused or reordered: in double
+// the results are those of src/core/geometry.h bit for bit, and in single the error bounds hold.
 //
 // A Point is a position as the host gives it: three doubles, or in single three pairs (high, low) of floats, which hold
 // 48 of its 53 bits; what they leave out is bounded by `residual`, which the callers have among their push constants.
+
+#include "layout/elements.h"
 
 #if BISECTOR_DOUBLE
 #define real double
 #define real3 dvec3
 const real kUnit = 1.1102230246251565e-16LF;  // 2^-53, rounding to nearest: checked when the device is opened
-const uint kPointWords = 3;
+const uint kPointWords = kDoublePointWords;
 struct Point {
   real3 high;
 };
@@ -16,7 +18,7 @@ struct Point {
 #define real float
 #define real3 vec3
 const real kUnit = 1.1920929e-7;              // 2^-23: the direction of rounding is not promised
-const uint kPointWords = 6;
+const uint kPointWords = kSinglePointWords;
 struct Point {
   real3 high, low;
 };
@@ -49,9 +51,10 @@ real3 difference(Point a, Point b) {
   return r;
 }
 
-// 1 / d correctly rounded, from additions and multiplications alone, for devices promise nothing about dividing doubles.
-// With d in [1, 2) and y near 1 / d the residual 1 - d y is a multiple of 2^-105 below 2^-51, hence computed exactly, and tells
-// which of y and its neighbours is nearest; no reciprocal lies half way. 0 if |d| is outside [2^-1000, 2^1000].
+// 1 / d correctly rounded, from additions and multiplications alone, for devices promise nothing about dividing
+// doubles. With d in [1, 2) and y near 1 / d the residual 1 - d y is a multiple of 2^-105 below 2^-51, hence computed
+// exactly, and tells which of y and its neighbours is nearest; no reciprocal lies half way. 0 if |d| is outside
+// [2^-1000, 2^1000].
 double reciprocal(double d) {
   const uvec2 words = unpackDouble2x32(d);
   const int exponent = int((words.y >> 20) & 0x7ffu) - 1023;

@@ -3,13 +3,12 @@
 // Adds to each value what the blocks before its own sum to.
 #include "common.glsl"
 
-const uint kBlock = 1024;
-
 layout(std430, binding = 0) buffer Values { uint values[]; };
 layout(std430, binding = 1) readonly buffer Before { uint before[]; };
-layout(push_constant) uniform Push { uint count; };
+#define PUSH_COUNT
+#include "layout/push.h"
 
 void main() {
   const uint i = invocation();
-  if (i < count) values[i] += before[i / kBlock];
+  if (i < count) values[i] += before[i / kScanBlock];
 }

@@ -1,12 +1,14 @@
-// What double precision is used for, on pairs, for the host to compare bit by bit: arithmetic, the error terms that contraction
-// or wrong rounding spoil, and conversions.
+// What double precision is used for, on pairs, for the host to compare bit by bit: arithmetic, the error terms that
+// contraction or wrong rounding spoil, and conversions.
 #version 460
+#extension GL_GOOGLE_include_directive : require
 
 layout(local_size_x = 64) in;
 
 layout(std430, set = 0, binding = 0) readonly buffer Pairs { uvec4 pairs[]; };
 layout(std430, set = 0, binding = 1) writeonly buffer Results { uvec2 results[]; };
-layout(push_constant) uniform Push { uint count; };
+#define PUSH_COUNT
+#include "layout/push.h"
 
 double two_sum_error(double a, double b) {
   precise double sum = a + b;

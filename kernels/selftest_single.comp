@@ -1,11 +1,13 @@
 // Sum, difference and product of pairs, for the host to check.
 #version 460
+#extension GL_GOOGLE_include_directive : require
 
 layout(local_size_x = 64) in;
 
 layout(std430, set = 0, binding = 0) readonly buffer Pairs { vec2 pairs[]; };
 layout(std430, set = 0, binding = 1) writeonly buffer Results { float results[]; };
-layout(push_constant) uniform Push { uint count; };
+#define PUSH_COUNT
+#include "layout/push.h"
 
 void main() {
   uint i = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64 + gl_LocalInvocationID.x;

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Proposes the cells around sample points of large facets, so that the search from the corners need not cross them. A cell
-// proposed in vain is found empty.
+// Proposes the cells around sample points of large facets, so that the search from the corners need not cross them. A
+// cell proposed in vain is found empty.
 #include "common.glsl"
 
 layout(std430, binding = 0) readonly buffer SampleFacets { uint sample_facets[]; };
@@ -10,25 +10,21 @@ layout(std430, binding = 2) writeonly buffer Proposals { uvec2 proposals[]; };
 layout(std430, binding = 3) buffer Counters { uint counters[]; };
 layout(std430, binding = 4) readonly buffer SiteOwners { uint site_owners[]; };
 layout(std430, binding = 5) readonly buffer FacetMeta { uint facet_meta[]; };
-layout(push_constant) uniform Push {
-  uint facet_base;
-  uint first_sample;
-  uint sample_count;
-  uint proposal_room;
-};
-#include "counters.glsl"
-
-const uint kMetaWords = 5;  // of facet.glsl; the first three are the corners' sites
+#include "layout/elements.h"
+#define PUSH_START_SAMPLES
+#include "layout/push.h"
+#include "layout/counters.h"
 
 void main() {
   const uint index = invocation();
   if (index >= sample_count) return;
   const uint owner = owners[first_sample + index];
   if (owner == kNone) return;
-  const uint meta = kMetaWords * (sample_facets[first_sample + index] - facet_base);
-  const uint a = site_owners[facet_meta[meta]], b = site_owners[facet_meta[meta + 1]], c = site_owners[facet_meta[meta + 2]];
-  if (a == b && a == c) return;  // start.comp has made a pair of the whole facet
+  const uint meta = kFacetMetaWords * (sample_facets[first_sample + index] - element_base);
+  const uint a = site_owners[facet_meta[meta]], b = site_owners[facet_meta[meta + 1]],
+             c = site_owners[facet_meta[meta + 2]];
+  if (a == b && a == c) return;  // start_facets.comp has made a pair of the whole facet
   const uint at = atomicAdd(counters[kProposals], 1u);
-  if (at < proposal_room) proposals[at] = uvec2(sample_facets[first_sample + index], owner);
+  if (at < proposal_capacity) proposals[at] = uvec2(sample_facets[first_sample + index], owner);
   else atomicOr(counters[kOverflow], kOverflowProposals);
 }

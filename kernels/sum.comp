@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The rule of all sums: a cell's terms in ascending triangle index, by blocks of 32, then the blocks' sums likewise. One
-// invocation sums one block of one level.
+// The rule of all sums: a cell's terms in ascending triangle index, by blocks of kSumBlock, then the blocks' sums
+// likewise. One invocation sums one block of one level.
 #include "common.glsl"
 #include "real.glsl"
 
@@ -18,26 +18,24 @@ layout(std430, binding = 7) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 8) readonly buffer Triangles { uint triangle_of[]; };
 layout(std430, binding = 9) writeonly buffer Sorted { uint sorted_triangles[]; };
 layout(std430, binding = 10) buffer Counters { uint counters[]; };
-layout(push_constant) uniform Push { uint cell_count; };
-#include "counters.glsl"
+#define PUSH_CELLS
+#include "layout/push.h"
+#include "layout/counters.h"
 
-struct Moments {
-  real mass;
-  real3 first;
-  real second;
-};
+#include "moments.glsl"
 
 Moments term(uint k) {
   Moments m;
   if (kPairsLevel) {
     const uint pair = items[k].y;
-    m.mass = mass_second[2 * pair];
-    m.first = real3(first_moments[3 * pair], first_moments[3 * pair + 1], first_moments[3 * pair + 2]);
-    m.second = mass_second[2 * pair + 1];
+    m.mass = mass_second[kMassSecondWords * pair];
+    m.first = real3(first_moments[kFirstWords * pair], first_moments[kFirstWords * pair + 1],
+                    first_moments[kFirstWords * pair + 2]);
+    m.second = mass_second[kMassSecondWords * pair + 1];
   } else {
-    m.mass = terms[5 * k];
-    m.first = real3(terms[5 * k + 1], terms[5 * k + 2], terms[5 * k + 3]);
-    m.second = terms[5 * k + 4];
+    m.mass = terms[kMomentWords * k];
+    m.first = real3(terms[kMomentWords * k + 1], terms[kMomentWords * k + 2], terms[kMomentWords * k + 3]);
+    m.second = terms[kMomentWords * k + kSecondMomentAt];
   }
   return m;
 }
@@ -54,13 +52,13 @@ void main() {
     if (block_begins[middle] <= block) cell = middle;
     else beyond = middle;
   }
-  const uint begin = begins[cell] + 32 * (block - block_begins[cell]);
-  const uint end = min(begin + 32, begins[cell + 1]);
+  const uint begin = begins[cell] + kSumBlock * (block - block_begins[cell]);
+  const uint end = min(begin + kSumBlock, begins[cell + 1]);
   if (kPairsLevel) {
     uint before = begin == begins[cell] ? kNone : triangle_at(begin - 1);
     [[dont_unroll]] for (uint k = begin; k < end; ++k) {
       const uint triangle = triangle_at(k);
-      if (triangle == before) atomicAdd(counters[kTwice], 1u);
+      if (triangle == before) atomicAdd(counters[kDuplicatePairs], 1u);
       sorted_triangles[k] = before = triangle;
     }
   }
@@ -74,9 +72,9 @@ void main() {
     sum.first = first;
     sum.second = second;
   }
-  sums[5 * block] = sum.mass;
-  sums[5 * block + 1] = sum.first.x;
-  sums[5 * block + 2] = sum.first.y;
-  sums[5 * block + 3] = sum.first.z;
-  sums[5 * block + 4] = sum.second;
+  sums[kMomentWords * block] = sum.mass;
+  sums[kMomentWords * block + 1] = sum.first.x;
+  sums[kMomentWords * block + 2] = sum.first.y;
+  sums[kMomentWords * block + 3] = sum.first.z;
+  sums[kMomentWords * block + kSecondMomentAt] = sum.second;
 }

@@ -1,15 +1,15 @@
-// Clipping one tetrahedron to one Voronoi cell, the twin of TetClipper in src/bisector/voronoi/clip_tet.cpp: labels first,
-// coordinates from labels by one formula, and with each vertex a bound of its error, the slack. What the bounds do not decide is
-// not decided here: the pair gets a status and goes to exact arithmetic.
+// Clipping one tetrahedron to one Voronoi cell, the twin of TetClipper in src/voronoi/clip_tet.cpp: labels first,
+// coordinates from labels by one formula, and with each vertex a bound of its error, the slack. What the bounds do not
+// decide is not decided here: the pair gets a status and goes to exact arithmetic.
 //
 // To include: `tet_words`, `tet_meta`, `residual`, `ids`, seed(), and the constants kMostPlanes and kMostVertices.
-#include "statuses.glsl"
 
 #if BISECTOR_DOUBLE
 const real kSquareError = 1e-12LF;   // relative, of |d|^2 with all that is compared with it
 const real kTiny = 1e-280LF;         // no product this small is told from 0
 const real kReachGrowth = 1e-5LF;    // lists may be in the order of distances in single precision
-// Planes that meet at a smaller angle (sine, squared) are left to exact arithmetic, and below the second are met in two steps.
+// Planes that meet at a smaller angle (sine, squared) are left to exact arithmetic, and below the second are met in two
+// steps.
 const real kSteep = 1e-12LF, kShallow = 1e-8LF;
 #else
 const real kSquareError = 16 * kUnit;
@@ -20,7 +20,7 @@ const real kSteep = 1e-8;
 
 // The tetrahedron, as seen from the seed.
 uint at_tet;           // first word
-uint bits;             // the corners in order, then the anchor of each facet, two bits each
+uint bits;             // of its whole numbers
 real3 local[4];
 real largest;          // absolute coordinate of local
 real tet_squared;      // upper bound of the squared distance of any point of the tetrahedron
@@ -47,7 +47,7 @@ uvec2 row_of[kMostPlanes];   // of each plane a set of others
 uint next_of[kMostPlanes];
 
 uint order_of(uint place) { return (bits >> (2 * place)) & 3u; }
-uint anchor_of(uint facet) { return (bits >> (8 + 2 * facet)) & 3u; }
+uint anchor_of(uint facet) { return (bits >> (kTetAnchorShift + 2 * facet)) & 3u; }
 uint rank_of(uint corner) {
   uint rank = 0;
   for (uint place = 1; place < 4; ++place)
@@ -75,7 +75,7 @@ void set_seed_plane(uint plane, uint label, real3 d, real squared) {
 
 void begin_tet(uint tet, uint slot) {
   at_tet = tet * kTetWords;
-  bits = tet_meta[tet * kTetMetaWords + kBitsAt];
+  bits = tet_meta[tet * kTetMetaWords + kTetBitsAt];
   own_slot = slot;
   own = seed(slot);
   largest = real(0.0);
@@ -116,14 +116,16 @@ void begin_tet(uint tet, uint slot) {
   was_cut = false;
 }
 
-// Sets vertex v, two facets and a bisector or one and two or three bisectors, in the order of their keys; false if that is not
-// certain. In double it is where TetClipper has it, as is the slack.
+// Sets vertex v, two facets and a bisector or one and two or three bisectors, in the order of their keys; false if that
+// is not certain. In double it is where TetClipper has it, as is the slack.
 //
-// In single all terms are at the scale of the cell. With relative rounding errors u and p the vertex, a plane is off there by
-//   e = u (|p| + 3.5 |n|) + 1.75 r (1 + |p| / |n|)   for a bisector, n reaching from seed to seed and r being what positions lack,
+// In single all terms are at the scale of the cell. With relative rounding errors u and p the vertex, a plane is off
+// there by
+//   e = u (|p| + 3.5 |n|) + 1.75 r (1 + |p| / |n|)   for a bisector, n reaching from seed to seed and r being what
+//                                                    positions lack,
 //   e = u (|p| + |k|) + a                            for a facet, from pairs, with a the absolute error of those.
-// Cramer's rule adds 6.5 u (|k1 / n1| + |k2 / n2| + |k3 / n3| + |p|) to their sum, all of it over the sine of the planes' corner,
-// |det| / (|n1| |n2| |n3|), and 5 u |p|; 6 u |p| is for the products that the vertex is tested in.
+// Cramer's rule adds 6.5 u (|k1 / n1| + |k2 / n2| + |k3 / n3| + |p|) to their sum, all of it over the sine of the
+// planes' corner, |det| / (|n1| |n2| |n3|), and 5 u |p|; 6 u |p| is for the products that the vertex is tested in.
 #if BISECTOR_DOUBLE
 bool meet_on_edge(uint v, uint f, uint g, uint by) {
   const uint not_f = plane_label[f] & 3u, not_g = plane_label[g] & 3u;
@@ -178,7 +180,8 @@ bool meet_on_facet(uint v, uint f, uint a, uint b) {
 #endif
 
 bool meet_planes(uint v, uint a, uint b, uint c) {
-  const real3 bc = cross3(plane_n[b], plane_n[c]), ca = cross3(plane_n[c], plane_n[a]), ab = cross3(plane_n[a], plane_n[b]);
+  const real3 bc = cross3(plane_n[b], plane_n[c]), ca = cross3(plane_n[c], plane_n[a]),
+              ab = cross3(plane_n[a], plane_n[b]);
   const real determinant = dot3(plane_n[a], bc);
   precise real square = determinant * determinant;
   precise real squares = plane_squared[a] * plane_squared[b] * plane_squared[c];
@@ -251,8 +254,8 @@ void bound_polyhedron() {
 
 #include "ties.glsl"
 
-// The side of vertex v with respect to the bisector of the own seed and that at d: +1 inside, -1 outside, 0 if neither the bounds
-// nor equal coordinates tell.
+// The side of vertex v with respect to the bisector of the own seed and that at d: +1 inside, -1 outside, 0 if neither
+// the bounds nor equal coordinates tell.
 int side_of(uint v, real3 d, real squared, uint other) {
   precise real taxicab = abs(d.x) + abs(d.y) + abs(d.z);
   precise real below = real(0.5) * squared * (real(1.0) - kSquareError) - kTiny;
@@ -308,7 +311,7 @@ uint cut(uint other, real3 d, real squared) {
   uint removed = 0;
   [[dont_unroll]] for (uint v = 0; v < vertex_count; ++v) {
     const int side = side_of(v, d, squared, other);
-    if (side == 0) return kUnsure;
+    if (side == 0) return kStatusUnsure;
     if (side > 0) continue;
     outside[v >> 5] |= 1u << (v & 31u);
     ++removed;
@@ -319,11 +322,12 @@ uint cut(uint other, real3 d, real squared) {
     return 0;
   }
   if (plane_count == kMostPlanes) compact_planes();
-  if (plane_count == kMostPlanes) return kCrowded;
+  if (plane_count == kMostPlanes) return kStatusCrowded;
   was_cut = polyhedron_changed = true;
 
-  // Directed edges of what is cut off: of (a, b, c) the vertex has a b, b c and c a, and the vertices across them have the reverse.
-  // Sorting the vertices puts those that stay first; what was cut off is then in the places `kept` and beyond.
+  // Directed edges of what is cut off: of (a, b, c) the vertex has a b, b c and c a, and the vertices across them have
+  // the reverse. Sorting the vertices puts those that stay first; what was cut off is then in the places `kept` and
+  // beyond.
   [[dont_unroll]] for (uint plane = 0; plane < plane_count; ++plane) row_of[plane] = uvec2(0u);
   uint kept = 0, last = vertex_count;
   [[dont_unroll]] while (kept < last) {
@@ -354,7 +358,7 @@ uint cut(uint other, real3 d, real squared) {
       [[dont_unroll]] for (uint set = row_of[a][half_word]; set != 0; set &= set - 1) {
         const uint b = 32 * half_word + uint(findLSB(set));
         if (in_set(row_of[b], a)) continue;
-        if (in_set(seen, a)) return kUnsure;
+        if (in_set(seen, a)) return kStatusUnsure;
         seen |= bit_of(a);
         next_of[a] = b;
         start = a;
@@ -362,27 +366,28 @@ uint cut(uint other, real3 d, real squared) {
       }
     }
   }
-  if (fresh < 3 || kept + fresh > kMostVertices) return fresh < 3 ? kUnsure : kCrowded;
+  if (fresh < 3 || kept + fresh > kMostVertices) return fresh < 3 ? kStatusUnsure : kStatusCrowded;
   uint a = start;
   [[dont_unroll]] for (uint k = 0; k < fresh; ++k) {
-    if (!in_set(seen, a)) return kUnsure;
+    if (!in_set(seen, a)) return kStatusUnsure;
     const uint b = next_of[a];
     const uint v = kept + k;
     vertex_on[v] = packed(a, b, by);
     vertex_count = v + 1;
     a = b;
-    if (a == start && k + 1 < fresh) return kUnsure;
+    if (a == start && k + 1 < fresh) return kStatusUnsure;
   }
-  if (a != start) return kUnsure;
+  if (a != start) return kStatusUnsure;
   vertex_count = kept + fresh;
   [[dont_unroll]] for (uint v = kept; v < vertex_count; ++v)
-    if (!place_vertex(v)) return kUnsure;
+    if (!place_vertex(v)) return kStatusUnsure;
   return 0;
 }
 
 // Clips the tetrahedron to the cell of `slot` by a list of neighbours in ascending distance.
 //
-// To include: neighbour(k), the k-th slot of the list; `radius` bounds from below the squared distance of all seeds not listed.
+// To include: neighbour(k), the k-th slot of the list; `radius` bounds from below the squared distance of all seeds not
+// listed.
 uint clip(uint count, real radius) {
   bound_polyhedron();
   [[dont_unroll]] for (uint k = 0; k < count; ++k) {
@@ -397,24 +402,20 @@ uint clip(uint count, real radius) {
     near -= 16.0 * absolute_error * sqrt(squared);
 #endif
     precise real twice = real(4.0) * reach;
-    if (twice < near) return kClipped;
+    if (twice < near) return kStatusClipped;
     polyhedron_changed = false;
     const uint status = cut(other, d, squared);
     if (status != 0) return status;
-    if (vertex_count == 0) return kEmpty;
+    if (vertex_count == 0) return kStatusEmpty;
     if (polyhedron_changed) bound_polyhedron();
   }
   precise real twice = real(4.0) * reach;
-  return radius >= kInfinity || twice < radius ? kClipped : kShortList;
+  return radius >= kInfinity || twice < radius ? kStatusClipped : kStatusShortList;
 }
 
-struct Moments {
-  real mass;
-  real3 first;
-  real second;
-};
+#include "moments.glsl"
 
-// Twin of moved() in src/bisector/voronoi/moments.h.
+// Twin of moved() in src/voronoi/moments.h.
 Moments moved(Moments m, real3 origin) {
   Moments r;
   precise real3 first = m.mass * origin + m.first;
@@ -429,7 +430,7 @@ Moments whole_moments() {
   Moments m;
   m.mass = tet_words[at_tet + kWholeAt];
   m.first = tet_vector(at_tet + kWholeAt + 1);
-  m.second = tet_words[at_tet + kWholeAt + 4];
+  m.second = tet_words[at_tet + kWholeAt + kSecondMomentAt];
   return moved(m, local[order_of(0)]);
 }
 
@@ -444,10 +445,10 @@ real density_at(uint v) {
   return min(max(value, min(min(r0, r1), min(r2, r3))), max(max(r0, r1), max(r2, r3)));
 }
 
-const real kSixth = real(1.0LF / 6.0LF), kTwentyFourth = real(1.0LF / 24.0LF), kOneHundredTwentieth = real(1.0LF / 120.0LF),
-           kThreeHundredSixtieth = real(1.0LF / 360.0LF);
+const real kSixth = real(1.0LF / 6.0LF), kTwentyFourth = real(1.0LF / 24.0LF),
+           kOneHundredTwentieth = real(1.0LF / 120.0LF), kThreeHundredSixtieth = real(1.0LF / 360.0LF);
 
-// Twins of tet_terms() in src/bisector/voronoi/moments.h: added to what `sum` holds.
+// Twins of tet_terms() in src/voronoi/moments.h: added to what `sum` holds.
 void add_uniform(inout Moments sum, real3 a, real3 b, real3 c, real six_volume) {
   precise real3 total = a + b + c;
   precise real mass = sum.mass + six_volume;
@@ -503,8 +504,8 @@ uvec2 around(uint v, uint plane) {
 }
 
 #if !BISECTOR_DOUBLE
-// What the polyhedron's volume may be off by, to first order: its surface, displaced by the vertices' errors, and the rounding of
-// products.
+// What the polyhedron's volume may be off by, to first order: its surface, displaced by the vertices' errors, and the
+// rounding of products.
 real volume_error;
 
 void add_volume_error(real3 p, real3 q, real3 r, real slack) {
@@ -524,8 +525,9 @@ real mass_error() {
 }
 #endif
 
-// Moments of the polyhedron about the seed: tetrahedra from one vertex, the apex, to the triangles that each facet is fanned into
-// from where its edge with the least key starts; the apex is where the first facet's fan starts. To be called after collect().
+// Moments of the polyhedron about the seed: tetrahedra from one vertex, the apex, to the triangles that each facet is
+// fanned into from where its edge with the least key starts; the apex is where the first facet's fan starts. To be
+// called after collect().
 Moments integrate(bool uniform_density) {
   if (!was_cut) return whole_moments();
   Moments sum;

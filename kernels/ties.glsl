@@ -2,8 +2,8 @@
 //
 // To include: `ids` and seed().
 
-// Whether c and o are opposite corners of a rectangle with sides along the axes, p and q being the others: exactly, for it is a
-// matter of equal coordinates.
+// Whether c and o are opposite corners of a rectangle with sides along the axes, p and q being the others: exactly, for
+// it is a matter of equal coordinates.
 bool is_rectangle(uint c, uint o, uint p, uint q) {
   const uvec3 low_c = ids[c].yzw, low_o = ids[o].yzw, low_p = ids[p].yzw, low_q = ids[q].yzw;
   const Point at_c = seed(c), at_o = seed(o), at_p = seed(p), at_q = seed(q);
@@ -15,10 +15,11 @@ bool is_rectangle(uint c, uint o, uint p, uint q) {
   return true;
 }
 
-// The side of a vertex where the bisectors of seeds a and b meet (and those of others, or facets), with respect to that of c, if the
-// four seeds are the corners of such a rectangle, else 0. Grids of seeds are full of them. The bisector's row of the corner opposite
-// the cell's own seed is the sum of the other two, so the determinant is 0, and each of the four weights has the cofactor +1 or
-// -1 times the corner's denominator, -1 for c and the seed opposite it (src/bisector/voronoi/exact.h): the lowest index decides.
+// The side of a vertex where the bisectors of seeds a and b meet (and those of others, or facets), with respect to that
+// of c, if the four seeds are the corners of such a rectangle, else 0. Grids of seeds are full of them. The bisector's
+// row of the corner opposite the cell's own seed is the sum of the other two, so the determinant is 0, and each of the
+// four weights has the cofactor +1 or -1 times the corner's denominator, -1 for c and the seed opposite it
+// (src/voronoi/exact.h): the lowest index decides.
 int tie_of(uint slot, uint a, uint b, uint c) {
   uint opposite;
   if (is_rectangle(c, slot, a, b)) opposite = slot;
@@ -29,8 +30,8 @@ int tie_of(uint slot, uint a, uint b, uint c) {
   return lowest == ids[c].x || lowest == ids[opposite].x ? -1 : 1;
 }
 
-// The bits of a corner of a box along the axes: 1 where its coordinate is not that of the corner `from`. Along each axis all that
-// differ must agree with the first that did, `apart`.
+// The bits of a corner of a box along the axes: 1 where its coordinate is not that of the corner `from`. Along each
+// axis all that differ must agree with the first that did, `apart`.
 bool box_corner(uint from, uint corner, inout uvec3 apart, out ivec3 bits_of_corner) {
   const uvec3 low_from = ids[from].yzw, low_corner = ids[corner].yzw;
   const Point at_from = seed(from), at_corner = seed(corner);
@@ -48,10 +49,10 @@ int determinant_of(ivec3 a, ivec3 b, ivec3 c) {
   return a.x * (b.y * c.z - b.z * c.y) + a.y * (b.z * c.x - b.x * c.z) + a.z * (b.x * c.y - b.y * c.x);
 }
 
-// The side of the vertex where the bisectors of seeds a, b and e meet, with respect to that of c, if the five seeds are corners of one
-// box along the axes, else 0. Rows of corners are sums of the rows of the three corners next to the cell's own seed, so the row of c
-// is a combination of those of a, b and e, the determinant is 0, and the weights have the combination's coefficients, times the
-// vertex's denominator, for cofactors: the lowest index that has one decides.
+// The side of the vertex where the bisectors of seeds a, b and e meet, with respect to that of c, if the five seeds are
+// corners of one box along the axes, else 0. Rows of corners are sums of the rows of the three corners next to the
+// cell's own seed, so the row of c is a combination of those of a, b and e, the determinant is 0, and the weights have
+// the combination's coefficients, times the vertex's denominator, for cofactors: the lowest index that has one decides.
 int box_tie_of(uint slot, uint a, uint b, uint e, uint c) {
   uvec3 apart = uvec3(kNone);
   ivec3 at_a, at_b, at_e, at_c;

@@ -16,13 +16,13 @@ std::atomic<std::size_t> calls{0};
 std::vector<std::string>* log = nullptr;
 
 std::string what_and_remedy(vk::Result result, std::string_view call) {
-  const std::string at = " (" + std::string(call) + "); ";
+  const std::string at = " (" + std::string(call) + ")";
   switch (result) {
-    case vk::Result::eErrorOutOfDeviceMemory: return "out of device memory" + at + "free some, or use --device cpu";
-    case vk::Result::eErrorOutOfHostMemory: return "out of host memory" + at + "free some";
+    case vk::Result::eErrorOutOfDeviceMemory: return "out of device memory" + at + "; free some";
+    case vk::Result::eErrorOutOfHostMemory: return "out of host memory" + at + "; free some";
     case vk::Result::eErrorDeviceLost:
-      return "the device was lost" + at + "run again, or use --device cpu; the system's log may tell why";
-    default: return vk::to_string(result) + at + "update the driver, or use --device cpu";
+      return "the device was lost" + at + ", and the system's log may tell why; run again";
+    default: return vk::to_string(result) + at + "; update the driver";
   }
 }
 

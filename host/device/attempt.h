@@ -1,5 +1,5 @@
-// How fallible Vulkan calls are made: each passes a checkpoint where tests inject failures (host/faults.h), and what it throws
-// leaves as a DeviceError.
+// How fallible Vulkan calls are made: each passes a checkpoint where tests inject failures (host/device/faults.h), and
+// what it throws leaves as a DeviceError.
 #pragma once
 
 #include <string_view>

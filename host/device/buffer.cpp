@@ -22,8 +22,8 @@ void Buffer::reserve(std::size_t bytes) {
   // Both limits are rounded down so that what is asked for stays a multiple of the unit.
   const std::size_t most = std::min<std::size_t>(about.limits.storage_range, about.allocation) / kUnit * kUnit;
   if (least > most) {
-    throw DeviceError(about.description.name + ": a buffer of " + bytes_text(bytes) + " is more than the device can bind (" +
-                      bytes_text(most) + "); use --device cpu");
+    throw DeviceError(about.description.name + ": a buffer of " + bytes_text(bytes) +
+                      " is more than the device can bind (" + bytes_text(most) + ")");
   }
   const std::size_t grown = std::clamp((size() + size() / 2) / kUnit * kUnit, least, most);
   impl_->allocation = {};

@@ -16,8 +16,8 @@ class Buffer {
   Buffer(Buffer&&) noexcept;
   Buffer& operator=(Buffer&&) noexcept;
 
-  // Makes room for at least `bytes`, at least 16; what was in it is lost if it has to grow. Not while commands that use it are
-  // recorded and not yet run. Throws DeviceError if there is no memory, or one binding cannot span that much.
+  // Makes room for at least `bytes`, at least 16; what was in it is lost if it has to grow. Not while commands that use
+  // it are recorded and not yet run. Throws DeviceError if there is no memory, or one binding cannot span that much.
   void reserve(std::size_t bytes);
   std::size_t size() const;  // bytes; what was last reserved or more
 

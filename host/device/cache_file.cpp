@@ -50,7 +50,8 @@ fs::path cache_path(const std::string& device_uuid) {
   if (!name || !*name) return {};
   const fs::path path = name;
   std::error_code ignored;
-  return !path.has_filename() || fs::is_directory(path, ignored) ? path / ("pipelines-" + device_uuid + ".cache") : path;
+  return !path.has_filename() || fs::is_directory(path, ignored) ? path / ("pipelines-" + device_uuid + ".cache")
+                                                                 : path;
 }
 
 std::vector<std::uint8_t> load_cache(const fs::path& path, const CacheOwner& owner) {

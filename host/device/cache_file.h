@@ -24,8 +24,8 @@ std::filesystem::path cache_path(const std::string& device_uuid);
 // What store_cache() was given; empty if there is no such file, it cannot be read, is another owner's, or is damaged.
 std::vector<std::uint8_t> load_cache(const std::filesystem::path& path, const CacheOwner& owner);
 
-// Replaces the file at once, so that others read the old or the new one; leaves it alone if it has this content. False if it
-// cannot be written.
+// Replaces the file at once, so that others read the old or the new one; leaves it alone if it has this content. False
+// if it cannot be written.
 bool store_cache(const std::filesystem::path& path, const CacheOwner& owner, const std::vector<std::uint8_t>& data);
 
 }  // namespace bisector::host

@@ -87,9 +87,9 @@ Candidate describe(vk::raii::PhysicalDevice physical, unsigned index) {
     return candidate;
   }
 
-  const auto chain = candidate.physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceIDProperties,
-                                                       vk::PhysicalDeviceMaintenance3Properties,
-                                                       vk::PhysicalDeviceDriverProperties>();
+  const auto chain =
+      candidate.physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceIDProperties,
+                                        vk::PhysicalDeviceMaintenance3Properties, vk::PhysicalDeviceDriverProperties>();
   const auto& driver = chain.get<vk::PhysicalDeviceDriverProperties>();
   text.uuid = uuid_text(chain.get<vk::PhysicalDeviceIDProperties>().deviceUUID.data());
   text.driver = std::string(driver.driverName.data()) + ' ' + driver.driverInfo.data();

@@ -17,7 +17,7 @@ struct Candidate {
   vk::raii::PhysicalDevice physical;
   DeviceDescription description;  // float64 only says that the driver promises it
   DeviceLimits limits;
-  std::uint64_t allocation = 0;      // bytes that one allocation may have
+  std::uint64_t allocation = 0;  // bytes that one allocation may have
   std::uint32_t queue_family = 0;
   std::uint32_t timestamp_bits = 0;  // 0 without timestamps
   double timestamp_period = 0;       // seconds

@@ -21,7 +21,8 @@ using AccessBit = vk::AccessFlagBits;
 constexpr std::uint64_t kTimeout = 600'000'000'000;  // nanoseconds
 
 void check_range(const Buffer& buffer, std::size_t offset, std::size_t bytes) {
-  if (offset > buffer.size() || bytes > buffer.size() - offset) throw std::logic_error("a transfer is out of its buffer");
+  if (offset > buffer.size() || bytes > buffer.size() - offset)
+    throw std::logic_error("a transfer is out of its buffer");
 }
 
 }  // namespace
@@ -39,9 +40,7 @@ struct Commands::Impl {
                                   return std::move(vk::raii::CommandBuffers(device.device, info).front());
                                 })),
         fence(device.attempt("vkCreateFence", [&] { return vk::raii::Fence(device.device, vk::FenceCreateInfo()); })),
-        staging(device),
-        descriptors(device),
-        timestamps(device) {}
+        staging(device), descriptors(device), timestamps(device) {}
 
   struct Readback {
     const std::byte* from;
@@ -58,7 +57,7 @@ struct Commands::Impl {
   Timestamps timestamps;
   Hazards hazards;
   std::vector<Readback> readbacks;
-  Phase phase = Phase::transfer;
+  Phase phase = &DeviceSeconds::transfer;
   bool recording = false;
 
   void use(const Buffer& buffer, vk::PipelineStageFlags stages, vk::AccessFlags reads, vk::AccessFlags writes) {
@@ -98,15 +97,14 @@ struct Commands::Impl {
     device.attempt("vkEndCommandBuffer", [&] { commands.end(); });
     recording = false;
     try {
-      device.attempt("vkQueueSubmit",
-                     [&] { device.queue.submit(vk::SubmitInfo({}, {}, *commands), *fence); });
-      const vk::Result result = device.attempt(
-          "vkWaitForFences", [&] { return device.device.waitForFences(*fence, true, kTimeout); });
+      device.attempt("vkQueueSubmit", [&] { device.queue.submit(vk::SubmitInfo({}, {}, *commands), *fence); });
+      const vk::Result result =
+          device.attempt("vkWaitForFences", [&] { return device.device.waitForFences(*fence, true, kTimeout); });
       if (result == vk::Result::eTimeout) {
-        throw DeviceError(device.about.description.name + ": no answer for 10 minutes; use --device cpu");
+        throw DeviceError(device.about.description.name + ": no answer for 10 minutes");
       }
     } catch (const DeviceError&) {
-      settle();
+      wait_until_idle();
       throw;
     }
     timestamps.collect();
@@ -120,7 +118,7 @@ struct Commands::Impl {
   }
 
   // After a failure the device may still be at work with what is about to be destroyed.
-  void settle() const noexcept {
+  void wait_until_idle() const noexcept {
     try {
       device.device.waitIdle();
     } catch (const vk::SystemError&) {
@@ -229,6 +227,6 @@ void Commands::dispatch_indirect(const Kernel& kernel, std::initializer_list<Bin
 
 void Commands::run() { impl_->submit(); }
 
-std::array<double, kPhases> Commands::take_seconds() { return impl_->timestamps.take(); }
+DeviceSeconds Commands::take_seconds() { return impl_->timestamps.take(); }
 
 }  // namespace bisector::host

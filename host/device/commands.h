@@ -1,7 +1,6 @@
 // A recorded run of kernels and transfers.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -9,14 +8,16 @@
 #include <string>
 #include <vector>
 
+#include "bisector/device.h"
 #include "host/device/buffer.h"
 #include "host/device/device.h"
+#include "kernels/layout/sizes.h"
 
 namespace bisector::host {
 
-// Names one of the embedded SPIR-V modules (kernels/NAME.comp gives "NAME", or "NAME_single" and "NAME_double" where it is
-// built for both precisions) and gives its specialisation constants 0, 1, ... The number of bindings and of bytes of push
-// constants are read off the first dispatch.
+// Names one of the embedded SPIR-V modules (kernels/NAME.comp gives "NAME", or "NAME_single" and "NAME_double" where it
+// is built for both precisions) and gives its specialisation constants 0, 1, ... The number of bindings and of bytes of
+// push constants are read off the first dispatch.
 struct Kernel {
   std::string name;
   std::vector<std::uint32_t> constants;
@@ -32,14 +33,11 @@ inline Binding reads(const Buffer& buffer) { return {&buffer, Access::read}; }
 inline Binding writes(const Buffer& buffer) { return {&buffer, Access::write}; }
 inline Binding updates(const Buffer& buffer) { return {&buffer, Access::update}; }
 
-// What device time is counted for.
-enum class Phase { transfer, grid, neighbours, owners, clip, sort, sum };
-inline constexpr std::size_t kPhases = 7;
+// What device time is counted for: one of the fields of DeviceSeconds.
+using Phase = double DeviceSeconds::*;
 
-inline constexpr std::uint32_t kGroupSize = 64;  // local_size_x of every kernel
-
-// Each command sees what the commands before it wrote: barriers are put where a buffer written before is touched again, and
-// only for that buffer. Commands are recorded until run(), which submits them and waits.
+// Each command sees what the commands before it wrote: barriers are put where a buffer written before is touched again,
+// and only for that buffer. Commands are recorded until run(), which submits them and waits.
 class Commands {
  public:
   explicit Commands(Device& device);
@@ -54,8 +52,8 @@ class Commands {
   // offset and bytes are multiples of 4.
   void fill(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::uint32_t word);
 
-  // Runs the kernel with at least `items` invocations, in workgroups of kGroupSize laid out in x and y so that both stay within
-  // the device's limits; none if items is 0. Bindings are numbered in order, set 0, each the whole buffer.
+  // Runs the kernel with at least `items` invocations, in workgroups of kGroupSize laid out in x and y so that both
+  // stay within the device's limits; none if items is 0. Bindings are numbered in order, set 0, each the whole buffer.
   template <class Push>
   void dispatch(const Kernel& kernel, std::initializer_list<Binding> bindings, const Push& push, std::size_t items) {
     static_assert(sizeof(Push) <= 128 && sizeof(Push) % 4 == 0);
@@ -74,10 +72,11 @@ class Commands {
   void run();
 
   // Seconds on the device by phase, over all runs since the last call, which it clears. All 0 without timestamps.
-  std::array<double, kPhases> take_seconds();
+  DeviceSeconds take_seconds();
 
  private:
-  void dispatch(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes, std::size_t items);
+  void dispatch(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes,
+                std::size_t items);
   void dispatch_indirect(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes,
                          const Buffer& arguments, std::size_t offset);
   struct Impl;

@@ -10,8 +10,9 @@ constexpr std::uint32_t kBuffers = kSets * 8;  // of all sets of a pool
 
 }  // namespace
 
-vk::DescriptorSet Descriptors::bind(vk::DescriptorSetLayout layout, const std::vector<vk::DescriptorBufferInfo>& buffers) {
-  make_room(buffers.size());
+vk::DescriptorSet Descriptors::bind(vk::DescriptorSetLayout layout,
+                                    const std::vector<vk::DescriptorBufferInfo>& buffers) {
+  choose_pool(buffers.size());
   const vk::DescriptorSetAllocateInfo info(*pools_[used_pools_ - 1], layout);
   const vk::Device device = *device_.device;
   // Not one RAII object a set: sets are given back with their pool.
@@ -27,7 +28,7 @@ vk::DescriptorSet Descriptors::bind(vk::DescriptorSetLayout layout, const std::v
   return set;
 }
 
-void Descriptors::make_room(std::size_t buffers) {
+void Descriptors::choose_pool(std::size_t buffers) {
   if (used_pools_ && sets_left_ && buffers <= buffers_left_) return;
   if (used_pools_ == pools_.size()) {
     const vk::DescriptorPoolSize size(vk::DescriptorType::eStorageBuffer, kBuffers);

@@ -19,8 +19,8 @@ class Descriptors {
   void reset();
 
  private:
-  // Room in the current pool for one more set.
-  void make_room(std::size_t buffers);
+  // Goes on to the next pool unless the current one can hold one more set.
+  void choose_pool(std::size_t buffers);
 
   Device::Impl& device_;
   std::vector<vk::raii::DescriptorPool> pools_;

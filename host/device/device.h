@@ -1,8 +1,9 @@
-// A Vulkan 1.2 device, opened through a loader that is found at run time. No Vulkan types are visible outside host/*.cpp.
+// A Vulkan 1.2 device, opened through a loader that is found at run time. No Vulkan types are visible outside
+// host/device/.
 //
-// Environment variables: BISECTOR_CACHE names a file or folder to keep compiled pipelines in (nothing is kept without it);
-// BISECTOR_VULKAN_VALIDATION=1 or 2 enables the validation layers; BISECTOR_VULKAN_LOADER names another loader than
-// libvulkan.so.1.
+// Environment variables: BISECTOR_CACHE names a file or folder to keep compiled pipelines in (nothing is kept without
+// it); BISECTOR_VULKAN_VALIDATION=1 or 2 enables the validation layers; BISECTOR_VULKAN_LOADER names another loader
+// than libvulkan.so.1.
 #pragma once
 
 #include <cstddef>
@@ -11,10 +12,13 @@
 #include <string>
 #include <vector>
 
-#include "bisector/error.h"
 #include "bisector/device.h"
+#include "bisector/error.h"
 
 namespace bisector::host {
+
+// Never throws for lack of a loader, a driver or a device.
+DeviceList list_devices();
 
 struct DeviceLimits {
   std::size_t storage_range = 0;      // bytes of one storage buffer binding

@@ -43,9 +43,8 @@ std::vector<const Candidate*> matching(const std::vector<Candidate>& candidates,
     if (!wanted_digits.empty() && uuid_digits(description.uuid) != wanted_digits) continue;
     found.push_back(&candidate);
   }
-  std::ranges::stable_sort(found, [](const Candidate* a, const Candidate* b) {
-    return better(a->description, b->description);
-  });
+  std::ranges::stable_sort(
+      found, [](const Candidate* a, const Candidate* b) { return better(a->description, b->description); });
   return found;
 }
 
@@ -71,19 +70,15 @@ std::unique_ptr<Device> Device::open(const DeviceRequest& request) {
   throw DeviceError(refusal, Reason::no_such_device);
 }
 
-}  // namespace bisector::host
-
-namespace bisector {
-
 DeviceList list_devices() {
   DeviceList list;
   try {
-    const auto instance = std::make_shared<const host::Instance>();
-    for (const host::Candidate& candidate : host::enumerate_candidates(*instance)) {
+    const auto instance = std::make_shared<const Instance>();
+    for (const Candidate& candidate : enumerate_candidates(*instance)) {
       DeviceDescription& description = list.devices.emplace_back(candidate.description);
       if (!description.rejected.empty()) continue;
       try {
-        description = host::Device::Impl::make(instance, candidate)->description();
+        description = Device::Impl::make(instance, candidate)->description();
       } catch (const DeviceError& error) {
         description.rejected = error.what();
       }
@@ -95,4 +90,4 @@ DeviceList list_devices() {
   return list;
 }
 
-}  // namespace bisector
+}  // namespace bisector::host

@@ -25,8 +25,8 @@ void Hazards::record_barrier(const vk::raii::CommandBuffer& commands) {
     if (unseen || overwrites) {
       from |= state.write_stages;
       to |= use.stages;
-      barriers.emplace_back(state.write_access, use.reads | use.writes, VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED,
-                            use.buffer, 0, VK_WHOLE_SIZE);
+      barriers.emplace_back(state.write_access, use.reads | use.writes, VK_QUEUE_FAMILY_IGNORED,
+                            VK_QUEUE_FAMILY_IGNORED, use.buffer, 0, VK_WHOLE_SIZE);
     }
     if (use.writes && state.read_stages) {
       from |= state.read_stages;

@@ -8,13 +8,15 @@
 
 namespace bisector::host {
 
-// Follows what was done to each buffer. A read waits for the last write and sees it, once per kind of access; a write waits for
-// the reads since, or for the last write where there were none. What was done before the recording is complete.
+// Follows what was done to each buffer. A read waits for the last write and sees it, once per kind of access; a write
+// waits for the reads since, or for the last write where there were none. What was done before the recording is
+// complete.
 class Hazards {
  public:
   // The next command touches the buffer. Several uses of one buffer count as one that does all of it.
   void use(vk::Buffer buffer, vk::PipelineStageFlags stages, vk::AccessFlags reads, vk::AccessFlags writes);
-  // To be called when the uses of a command are complete, before it is recorded: records what it has to wait for, if anything.
+  // To be called when the uses of a command are complete, before it is recorded: records what it has to wait for, if
+  // anything.
   void record_barrier(const vk::raii::CommandBuffer& commands);
   // Forgets all, as a new recording starts.
   void reset();
@@ -28,8 +30,8 @@ class Hazards {
   struct State {
     vk::PipelineStageFlags write_stages;  // none if it was not written
     vk::AccessFlags write_access;
-    vk::PipelineStageFlags read_stages;   // since the write
-    vk::AccessFlags visible;              // reads that were made to see the write
+    vk::PipelineStageFlags read_stages;  // since the write
+    vk::AccessFlags visible;             // reads that were made to see the write
   };
 
   std::vector<Use> uses_;

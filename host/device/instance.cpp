@@ -46,7 +46,7 @@ vk::DebugUtilsMessengerCreateInfoEXT messenger_info() {
 vk::raii::Instance make_instance(const vk::raii::Context& context) {
   const bool has_version = context.getDispatcher()->vkEnumerateInstanceVersion != nullptr;
   if (!has_version || context.enumerateInstanceVersion() < VK_API_VERSION_1_2) {
-    throw DeviceError("the Vulkan loader is older than 1.2; update it, or use --device cpu");
+    throw DeviceError("the Vulkan loader is older than 1.2; update it");
   }
   const auto extensions = attempt("Vulkan", "vkEnumerateInstanceExtensionProperties",
                                   [&] { return context.enumerateInstanceExtensionProperties(); });
@@ -79,7 +79,7 @@ vk::raii::Instance make_instance(const vk::raii::Context& context) {
     checkpoint("vkCreateInstance");
     return {context, info};
   } catch (const vk::IncompatibleDriverError&) {
-    throw DeviceError("there is no Vulkan driver; install the GPU's driver, or use --device cpu");
+    throw DeviceError("there is no Vulkan driver; install the GPU's driver");
   } catch (const vk::SystemError& error) {
     fail("Vulkan", "vkCreateInstance", error);
   }
@@ -94,8 +94,7 @@ Instance::Library::Library() {
   const char* name = override_name ? override_name : "libvulkan.so.1";
   handle = dlopen(name, RTLD_NOW | RTLD_LOCAL);
   if (!handle) {
-    throw DeviceError(std::string("there is no Vulkan loader (") + name +
-                      "); install the GPU's driver and libvulkan1, or use --device cpu");
+    throw DeviceError(std::string("there is no Vulkan loader (") + name + "); install the GPU's driver and libvulkan1");
   }
 }
 
@@ -103,7 +102,7 @@ Instance::Library::~Library() { dlclose(handle); }
 
 PFN_vkGetInstanceProcAddr Instance::Library::entry() const {
   const auto entry = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(handle, "vkGetInstanceProcAddr"));
-  if (!entry) throw DeviceError("the Vulkan loader lacks vkGetInstanceProcAddr; install it anew, or use --device cpu");
+  if (!entry) throw DeviceError("the Vulkan loader lacks vkGetInstanceProcAddr; install it anew");
   return entry;
 }
 

@@ -28,14 +28,15 @@ Allocation allocate(const Device::Impl& device, std::size_t bytes, vk::BufferUsa
                     std::initializer_list<vk::MemoryPropertyFlags> wishes) {
   const std::string size = bytes_text(bytes);
   Allocation allocation;
-  allocation.buffer = device.attempt("vkCreateBuffer of " + size,
-                                     [&] { return vk::raii::Buffer(device.device, vk::BufferCreateInfo({}, bytes, usage)); });
+  allocation.buffer = device.attempt("vkCreateBuffer of " + size, [&] {
+    return vk::raii::Buffer(device.device, vk::BufferCreateInfo({}, bytes, usage));
+  });
   const vk::MemoryRequirements needs = allocation.buffer.getMemoryRequirements();
   const std::optional<std::uint32_t> type = memory_type(device.memory, needs.memoryTypeBits, wishes);
-  if (!type) throw DeviceError(device.about.description.name + ": no memory type fits; use --device cpu");
+  if (!type) throw DeviceError(device.about.description.name + ": no memory type fits");
   if (needs.size > device.about.allocation) {
     throw DeviceError(device.about.description.name + ": " + size + " is more than one allocation may have (" +
-                      bytes_text(device.about.allocation) + "); use --device cpu");
+                      bytes_text(device.about.allocation) + ")");
   }
   const vk::MemoryDedicatedAllocateInfo dedicated({}, *allocation.buffer);
   const vk::MemoryAllocateInfo info(needs.size, *type, &dedicated);
@@ -56,8 +57,8 @@ Allocation allocate_local(const Device::Impl& device, std::size_t bytes) {
 
 Allocation allocate_staging(const Device::Impl& device, std::size_t bytes) {
   const vk::MemoryPropertyFlags coherent = Property::eHostVisible | Property::eHostCoherent;
-  Allocation allocation = allocate(device, bytes, Usage::eTransferSrc | Usage::eTransferDst,
-                                   {coherent | Property::eHostCached, coherent});
+  Allocation allocation =
+      allocate(device, bytes, Usage::eTransferSrc | Usage::eTransferDst, {coherent | Property::eHostCached, coherent});
   allocation.mapped = static_cast<std::byte*>(
       device.attempt("vkMapMemory", [&] { return allocation.memory.mapMemory(0, VK_WHOLE_SIZE); }));
   return allocation;

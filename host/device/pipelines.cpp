@@ -26,9 +26,7 @@ bool Pipelines::Less::operator()(const Kernel& a, const Kernel& b) const {
 }
 
 Pipelines::Pipelines(const Device::Impl& device)
-    : device_(device),
-      owner_(owner_of(device.about)),
-      file_(cache_path(device.about.description.uuid)),
+    : device_(device), owner_(owner_of(device.about)), file_(cache_path(device.about.description.uuid)),
       cache_(nullptr) {
   const std::vector<std::uint8_t> start = load_cache(file_, owner_);
   cache_ = device_.attempt("vkCreatePipelineCache", [&] {

@@ -8,13 +8,10 @@
 #include <vector>
 
 #include "host/device/commands.h"
+#include "kernels/layout/push.h"
 
 namespace bisector::host {
 namespace {
-
-struct Push {
-  std::uint32_t count;
-};
 
 // Fixed bits that look random: splitmix64.
 std::uint64_t next_bits(std::uint64_t& state) {
@@ -49,11 +46,26 @@ std::vector<std::array<double, 2>> telling_pairs() {
   constexpr double kSmallest = std::numeric_limits<double>::denorm_min();
   constexpr double kNormal = std::numeric_limits<double>::min();
   constexpr double kUlp = std::numeric_limits<double>::epsilon();
-  return {{kNormal, -1.5 * kNormal}, {kNormal, 0.5},        {kSmallest, kSmallest},  {kSmallest, 1},
-          {1, kUlp / 2},             {1 + kUlp, kUlp / 2},  {1, -kUlp / 4},          {1 + kUlp, 1 - kUlp / 2},
-          {1 + kUlp, 1 + kUlp},      {0x1p53, 1},           {0x1p53, 3},             {0x1p100, -0x1p-100},
-          {1, -1},                   {-0.0, 0.0},           {-0.0, -0.0},            {1.0 / 3, 3},
-          {0.1, 10},                 {1e-160, 1e-160},      {-1e-155, 3e-155},       {1 + 0x1p-27, 1 + 0x1p-26}};
+  return {{kNormal, -1.5 * kNormal},
+          {kNormal, 0.5},
+          {kSmallest, kSmallest},
+          {kSmallest, 1},
+          {1, kUlp / 2},
+          {1 + kUlp, kUlp / 2},
+          {1, -kUlp / 4},
+          {1 + kUlp, 1 - kUlp / 2},
+          {1 + kUlp, 1 + kUlp},
+          {0x1p53, 1},
+          {0x1p53, 3},
+          {0x1p100, -0x1p-100},
+          {1, -1},
+          {-0.0, 0.0},
+          {-0.0, -0.0},
+          {1.0 / 3, 3},
+          {0.1, 10},
+          {1e-160, 1e-160},
+          {-1e-155, 3e-155},
+          {1 + 0x1p-27, 1 + 0x1p-26}};
 }
 
 template <class Result, class Pair>
@@ -64,7 +76,7 @@ std::vector<Result> run(Device& device, const char* kernel, const std::vector<Pa
   output.reserve(results.size() * sizeof(Result));
   Commands commands(device);
   commands.upload(input, 0, pairs.data(), pairs.size() * sizeof(Pair));
-  commands.dispatch({kernel, {}}, {reads(input), writes(output)}, Push{static_cast<std::uint32_t>(pairs.size())},
+  commands.dispatch({kernel, {}}, {reads(input), writes(output)}, CountPush{static_cast<std::uint32_t>(pairs.size())},
                     pairs.size());
   commands.download(output, 0, results.data(), results.size() * sizeof(Result));
   commands.run();

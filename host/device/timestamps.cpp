@@ -48,12 +48,12 @@ void Timestamps::collect() {
   const std::uint64_t mask = ~std::uint64_t{0} >> (64 - std::max(1u, device_.about.timestamp_bits));
   for (std::size_t i = 0; i < phases_.size(); ++i) {
     const std::uint64_t elapsed = (ticks[i + 1] - ticks[i]) & mask;
-    seconds_[static_cast<std::size_t>(phases_[i])] += static_cast<double>(elapsed) * device_.about.timestamp_period;
+    seconds_.*phases_[i] += static_cast<double>(elapsed) * device_.about.timestamp_period;
   }
   phases_.clear();
   written_ = 0;
 }
 
-std::array<double, kPhases> Timestamps::take() { return std::exchange(seconds_, {}); }
+DeviceSeconds Timestamps::take() { return std::exchange(seconds_, {}); }
 
 }  // namespace bisector::host

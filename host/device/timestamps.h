@@ -1,7 +1,6 @@
 // Time on the device by phase.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -15,13 +14,14 @@ class Timestamps {
  public:
   explicit Timestamps(Device::Impl& device) : device_(device) {}
 
-  // What follows in the recording counts for the phase; the first call of a recording starts the clock. Throws DeviceError.
+  // What follows in the recording counts for the phase; the first call of a recording starts the clock. Throws
+  // DeviceError.
   void mark(const vk::raii::CommandBuffer& commands, Phase phase);
   void finish(const vk::raii::CommandBuffer& commands);
   // Adds up what the device has run. Throws DeviceError.
   void collect();
   // Sums since the last call, in seconds.
-  std::array<double, kPhases> take();
+  DeviceSeconds take();
 
  private:
   void write(const vk::raii::CommandBuffer& commands, vk::PipelineStageFlagBits stage);
@@ -30,7 +30,7 @@ class Timestamps {
   std::vector<vk::raii::QueryPool> pools_;
   std::vector<Phase> phases_;  // that begin at the marks of this recording
   std::size_t written_ = 0;
-  std::array<double, kPhases> seconds_{};
+  DeviceSeconds seconds_;
 };
 
 }  // namespace bisector::host

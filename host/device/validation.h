@@ -1,4 +1,5 @@
-// Validation layers, for tests: BISECTOR_VULKAN_VALIDATION=1 enables them, 2 synchronisation and GPU-assisted checks too.
+// Validation layers, for tests: BISECTOR_VULKAN_VALIDATION=1 enables them, 2 synchronisation and GPU-assisted checks
+// too.
 #pragma once
 
 #include <cstddef>

@@ -6,27 +6,23 @@
 
 #include "core/parallel.h"
 #include "host/passes/packing.h"
+#include "kernels/layout/push.h"
+#include "kernels/layout/sizes.h"
 
 namespace bisector::host {
 namespace {
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
-constexpr std::size_t kRun = 64, kDigits = 16, kDigitBits = 4;  // of kernels/radix.glsl
-constexpr std::size_t kBlock = 32;
-constexpr std::size_t kCellReals = 6, kSumReals = 5;
 
-struct RadixPush {
-  std::uint32_t items, runs, shift;
-};
-
-std::uint32_t word(std::size_t n) { return static_cast<std::uint32_t>(n); }
+uint word(std::size_t n) { return static_cast<uint>(n); }
 
 }  // namespace
 
 CellPass::CellPass(Device& device, bool is_double, bool is_solid)
-    : device_(device), double_(is_double), solid_(is_solid), place_of_(device), by_place_(device), begins_(device),
-      items_{Buffer(device), Buffer(device)}, digit_counts_(device), block_begins_{Buffer(device), Buffer(device)},
-      sums_{Buffer(device), Buffer(device)}, sorted_places_(device), cells_(device) {}
+    : device_(device), double_(is_double), solid_(is_solid), place_of_(device), by_place_(device),
+      begins_(device), items_{Buffer(device), Buffer(device)},
+      digit_counts_(device), block_begins_{Buffer(device), Buffer(device)}, sums_{Buffer(device), Buffer(device)},
+      sorted_places_(device), cells_(device) {}
 
 void CellPass::set_elements(Commands& commands, const std::vector<Index>& places, std::size_t count) {
   places_ = count;
@@ -36,12 +32,12 @@ void CellPass::set_elements(Commands& commands, const std::vector<Index>& places
 void CellPass::sort(Commands& commands, std::size_t cells, Scan& scan, const PairStore& store) {
   by_place_.reserve((places_ + 1) * kWord);
   begins_.reserve((cells + 1) * kWord);
-  for (Buffer& items : items_) items.reserve(store.count * 2 * kWord);
+  for (Buffer& items : items_) items.reserve(store.count * sizeof(SortItem));
   scan.reserve(std::max(places_, cells) + 1);
-  commands.phase(Phase::sort);
+  commands.phase(&DeviceSeconds::sort);
   commands.fill(by_place_, 0, (places_ + 1) * kWord, 0);
   commands.fill(begins_, 0, (cells + 1) * kWord, 0);
-  const std::uint32_t pairs = word(store.count);
+  const CountPush pairs{word(store.count)};
   commands.dispatch({"count_pairs", {}},
                     {reads(store.pairs), reads(store.status), reads(place_of_), updates(by_place_), updates(begins_)},
                     pairs, store.count);
@@ -55,18 +51,18 @@ void CellPass::sort(Commands& commands, std::size_t cells, Scan& scan, const Pai
   commands.download(begins_, 0, begins.data(), begins.size() * kWord);
   commands.run();
 
-  const std::size_t items = begins.back(), runs = (items + kRun - 1) / kRun;
-  digit_counts_.reserve(kDigits * runs * kWord);
-  scan.reserve(kDigits * runs);
-  commands.phase(Phase::sort);
+  const std::size_t items = begins.back(), runs = (items + kRadixRun - 1) / kRadixRun;
+  digit_counts_.reserve(kRadixDigits * runs * kWord);
+  scan.reserve(kRadixDigits * runs);
+  commands.phase(&DeviceSeconds::sort);
   sorted_ = 0;
   const auto bits = static_cast<std::size_t>(std::bit_width(cells - 1));
-  for (std::size_t shift = 0; shift < bits; shift += kDigitBits) {
+  for (std::size_t shift = 0; shift < bits; shift += kRadixBits) {
     const RadixPush push{word(items), word(runs), word(shift)};
     commands.dispatch({"radix_count", {}}, {reads(items_[sorted_]), writes(digit_counts_)}, push, runs);
-    scan.record(commands, digit_counts_, kDigits * runs);
-    commands.dispatch({"radix_scatter", {}}, {reads(items_[sorted_]), reads(digit_counts_), writes(items_[1 - sorted_])}, push,
-                      runs);
+    scan.record(commands, digit_counts_, kRadixDigits * runs);
+    commands.dispatch({"radix_scatter", {}},
+                      {reads(items_[sorted_]), reads(digit_counts_), writes(items_[1 - sorted_])}, push, runs);
     sorted_ = 1 - sorted_;
   }
 }
@@ -82,15 +78,15 @@ void CellPass::sum(SeedStage& stage, const PairStore& store, CellMoments& result
   for (std::size_t c = 0; c < cells; ++c) {
     const std::size_t terms = begins[c + 1] - begins[c];
     most = std::max(most, terms);
-    blocks += (terms + kBlock - 1) / kBlock;
+    blocks += (terms + kSumBlock - 1) / kSumBlock;
   }
-  for (Buffer& sums : sums_) sums.reserve(blocks * kSumReals * real);
+  for (Buffer& sums : sums_) sums.reserve(blocks * kMomentWords * real);
   for (Buffer& block_begins : block_begins_) block_begins.reserve((cells + 1) * kWord);
   sorted_places_.reserve(items * kWord);
-  cells_.reserve(cells * kCellReals * real);
+  cells_.reserve(cells * kCellWords * real);
 
-  commands.phase(Phase::sum);
-  const std::uint32_t count = word(cells);
+  commands.phase(&DeviceSeconds::sum);
+  const CellsPush count{word(cells)};
   const Buffer* term_begins = &begins_;
   unsigned level = 0;
   for (std::size_t terms = most; level == 0 || terms > 1; ++level) {
@@ -103,8 +99,8 @@ void CellPass::sum(SeedStage& stage, const PairStore& store, CellMoments& result
                        writes(sorted_places_), updates(stage.counters)},
                       count, blocks);
     term_begins = &block_begins;
-    terms = (terms + kBlock - 1) / kBlock;
-    blocks = std::min(blocks, blocks / kBlock + cells);
+    terms = (terms + kSumBlock - 1) / kSumBlock;
+    blocks = std::min(blocks, blocks / kSumBlock + cells);
   }
   const Buffer& totals = sums_[(level + 1) % 2];
   commands.dispatch(kernel("cells", double_, {!stage.delaunay()}),
@@ -112,29 +108,31 @@ void CellPass::sum(SeedStage& stage, const PairStore& store, CellMoments& result
                      reads(neighbours.wide_lists()), writes(cells_)},
                     count, cells);
 
-  std::vector<std::byte> words(cells * kCellReals * real);
+  std::vector<std::byte> words(cells * kCellWords * real);
   std::vector<std::uint32_t> sorted_places(items);
   Counters counted{};
-  commands.phase(Phase::transfer);
+  commands.phase(&DeviceSeconds::transfer);
   commands.download(cells_, 0, words.data(), words.size());
   if (items) commands.download(sorted_places_, 0, sorted_places.data(), items * kWord);
   commands.download(stage.counters, 0, counted.data(), sizeof counted);
   commands.run();
-  if (counted[kTwice])
-    throw DeviceError(device_.description().name + ": pairs were met twice, so its atomic operations are not to be trusted; "
-                      "use --device cpu");
+  if (counted[kDuplicatePairs])
+    throw DeviceError(device_.description().name +
+                      ": pairs were met twice, so its atomic operations are not to be trusted");
 
   read_cells(seeds, words, result);
   const std::size_t n = result.cells.size();
   result.triangles.offsets.assign(n + 1, 0);
   for (std::size_t i = 0; i < n; ++i) {
     const Index slot = seeds.sorted.slot[i];
-    result.triangles.offsets[i + 1] = result.triangles.offsets[i] + (slot == kNone ? 0 : begins[slot + 1] - begins[slot]);
+    result.triangles.offsets[i + 1] =
+        result.triangles.offsets[i] + (slot == kNone ? 0 : begins[slot + 1] - begins[slot]);
   }
   result.triangles.values.resize(items);
   parallel_each(cells, [&](std::size_t slot) {
-    std::copy(sorted_places.begin() + begins[slot], sorted_places.begin() + begins[slot + 1],
-              result.triangles.values.begin() + static_cast<std::ptrdiff_t>(result.triangles.offsets[seeds.sorted.id[slot]]));
+    std::copy(
+        sorted_places.begin() + begins[slot], sorted_places.begin() + begins[slot + 1],
+        result.triangles.values.begin() + static_cast<std::ptrdiff_t>(result.triangles.offsets[seeds.sorted.id[slot]]));
   });
 }
 
@@ -144,19 +142,19 @@ void CellPass::read_cells(const DeviceSeeds& seeds, const std::vector<std::byte>
   result.step_mass.assign(n, 0);
   const double scale = 1 / seeds.scale;
   parallel_each(seeds.count(), [&](std::size_t slot) {
-    double reals[kCellReals];
-    for (std::size_t k = 0; k < kCellReals; ++k) {
+    double reals[kCellWords];
+    for (std::size_t k = 0; k < kCellWords; ++k) {
       if (double_) {
-        std::memcpy(&reals[k], &words[(kCellReals * slot + k) * sizeof(double)], sizeof(double));
+        std::memcpy(&reals[k], &words[(kCellWords * slot + k) * sizeof(double)], sizeof(double));
       } else {
         float narrow;
-        std::memcpy(&narrow, &words[(kCellReals * slot + k) * sizeof(float)], sizeof(float));
+        std::memcpy(&narrow, &words[(kCellWords * slot + k) * sizeof(float)], sizeof(float));
         reals[k] = static_cast<double>(narrow);
       }
     }
     const Index i = seeds.sorted.id[slot];
-    result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[4]}, scale, solid_);
-    result.step_mass[i] = reals[5] < 0 ? -1 : scaled({reals[5], {}, 0}, scale, solid_).mass;
+    result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[kSecondMomentAt]}, scale, solid_);
+    result.step_mass[i] = reals[kCellMedianAt] < 0 ? -1 : scaled({reals[kCellMedianAt], {}, 0}, scale, solid_).mass;
   });
   result.mass = fixed_sum(n, [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(n, [&](std::size_t i) { return result.cells[i].second; });

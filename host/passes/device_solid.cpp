@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "host/passes/packing.h"
@@ -9,22 +10,26 @@
 namespace bisector::host {
 namespace {
 
-constexpr std::size_t kTetReals[2] = {60, 36};  // single, double: of kernels/tet.glsl
-constexpr std::size_t kMetaWords = 10;
-
-void pack(const TetFrame& frame, double scale, RealWords& words) {
+void pack(const TetFrame& frame, double scale, bool is_double, RealWords& words) {
+  const TetLayout layout = tet_layout(is_double);
+  const std::size_t begin = words.count();
   for (const Vec3& corner : frame.corners) words.point(scale * corner);
+  words.expect_at(begin + layout.normals);
   for (const Vec3& normal : frame.normals) words.point(normal);
+  words.expect_at(begin + layout.density);
   for (const double density : frame.density) words.number(density);
+  words.expect_at(begin + layout.gradient);
   words.vector((1 / scale) * frame.gradient);
+  words.expect_at(begin + layout.moments);
   words.moments(scaled(frame.moments, scale, true));
+  words.expect_at(begin + layout.words);
 }
 
-Index order_and_anchors(const TetFrame& frame) {
-  Index bits = 0;
+uint order_and_anchors(const TetFrame& frame) {
+  uint bits = 0;
   for (unsigned k = 0; k < 4; ++k) {
-    bits |= Index{frame.order[k]} << (2 * k);
-    bits |= Index{frame.anchor[k]} << (8 + 2 * k);
+    bits |= uint{frame.order[k]} << (2 * k);
+    bits |= uint{frame.anchor[k]} << (kTetAnchorShift + 2 * k);
   }
   return bits;
 }
@@ -38,36 +43,40 @@ DeviceSolid::DeviceSolid(Device& device, Commands& commands, const Solid& given,
     : solid(given), frames(tet_frames(given)), words(device), double_words(device), meta(device), tet_of_facet(device),
       has_doubles(with_doubles) {
   frames.push_back(TetFrame(solid.enclosure, {0, 1, 2, 3}, nullptr, 0));
-  const std::size_t bytes = is_double || with_doubles ? kTetReals[1] * sizeof(double) : kTetReals[0] * sizeof(float);
+  const std::size_t bytes =
+      is_double || with_doubles ? tet_layout(true).words * sizeof(double) : tet_layout(false).words * sizeof(float);
   if (frames.size() > device.limits().storage_range / bytes)
-    throw DeviceError(fmt::format("{}: {} tetrahedra are more than its buffers hold; use --device cpu",
-                                  device.description().name, tets()));
-  std::vector<Index> place(solid.mesh.vertices.size(), kNone), meta_words;
+    throw DeviceError(
+        fmt::format("{}: {} tetrahedra are more than its buffers hold", device.description().name, tets()));
+  std::vector<Index> place(solid.mesh.vertices.size(), kNone);
+  std::vector<TetMeta> metas;
   RealWords packed(is_double), wide(true);
-  packed.reserve(frames.size() * kTetReals[is_double]);
+  packed.reserve(frames.size() * tet_layout(is_double).words);
+  metas.reserve(frames.size());
   for (std::size_t t = 0; t < frames.size(); ++t) {
-    pack(frames[t], scale, packed);
-    if (with_doubles) pack(frames[t], scale, wide);
-    if (t == tets() || !(solid.six_volumes[t] > 0)) {
-      meta_words.insert(meta_words.end(), kMetaWords, kNone);
-    } else {
-      for (const Index v : solid.mesh.tets[t]) {
-        if (place[v] == kNone) {
-          place[v] = static_cast<Index>(vertices.size());
-          vertices.push_back(v);
-        }
-        meta_words.push_back(place[v]);
+    pack(frames[t], scale, is_double, packed);
+    if (with_doubles) pack(frames[t], scale, true, wide);
+    TetMeta& tet = metas.emplace_back();
+    tet.sites.fill(kNone);
+    tet.across.fill(kNone);
+    tet.bits = order_and_anchors(frames[t]);
+    tet.owner = kNone;
+    if (t == tets() || !(solid.six_volumes[t] > 0)) continue;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Index v = solid.mesh.tets[t][k];
+      if (place[v] == kNone) {
+        place[v] = static_cast<Index>(vertices.size());
+        vertices.push_back(v);
       }
-      meta_words.insert(meta_words.end(), solid.adjacent[t].begin(), solid.adjacent[t].end());
-      meta_words.insert(meta_words.end(), 2, kNone);
+      tet.sites[k] = place[v];
     }
-    meta_words[kMetaWords * t + 8] = order_and_anchors(frames[t]);
+    std::copy(solid.adjacent[t].begin(), solid.adjacent[t].end(), tet.across.begin());
   }
   std::vector<Index> under;
   for (const FacetSummary& summary : solid.boundary.summaries) under.push_back(solid.tet_of_triangle[summary.triangle]);
   upload(commands, words, packed);
   if (with_doubles) upload(commands, double_words, wide);
-  upload(commands, meta, meta_words);
+  upload(commands, meta, metas);
   upload(commands, tet_of_facet, under);
   commands.run();
 }

@@ -4,15 +4,15 @@
 #include <cstddef>
 #include <vector>
 
-#include "voronoi/clip_tet.h"
-#include "voronoi/solid.h"
 #include "host/device/buffer.h"
 #include "host/device/commands.h"
+#include "voronoi/clip_tet.h"
+#include "voronoi/solid.h"
 
 namespace bisector::host {
 
-// The power of two by which lengths are multiplied on the device: the diagonal is then near 2^16, so that second moments of all
-// of a solid and of cells 2^-36 of its size are within the range of single precision.
+// The power of two by which lengths are multiplied on the device: the diagonal is then near 2^16, so that second
+// moments of all of a solid and of cells 2^-36 of its size are within the range of single precision.
 double device_scale(const Solid& solid);
 
 // Tetrahedra in their order, then the enclosure, as the clipping reads them on either side.
@@ -22,11 +22,11 @@ struct DeviceSolid {
 
   const Solid& solid;
   std::vector<TetFrame> frames;
-  std::vector<Index> vertices;    // that tetrahedra with volume use
-  Buffer words;                   // in the backend's precision
-  Buffer double_words;            // for the rung of double precision; may be empty
+  std::vector<Index> vertices;  // that tetrahedra with volume use
+  Buffer words;                 // in the backend's precision
+  Buffer double_words;          // for the rung of double precision; may be empty
   Buffer meta;
-  Buffer tet_of_facet;            // under the facets of the boundary
+  Buffer tet_of_facet;  // under the facets of the boundary
   bool has_doubles;
 
   std::size_t tets() const { return solid.mesh.tets.size(); }

@@ -5,13 +5,12 @@
 #include <numbers>
 
 #include "host/passes/packing.h"
+#include "kernels/layout/pairs.h"
 
 namespace bisector::host {
 namespace {
 
-constexpr std::size_t kFacetReals[2] = {48, 18};  // single, double: of kernels/facet.glsl
-constexpr std::size_t kMetaWords = 5;
-constexpr double kCellsPerSample = 8;
+constexpr double kCellsPerSample = 8;  // area of a large facet that one sample stands for, in areas of a cell
 
 // The outward unit normal of edge k within the facet's plane.
 Vec3 edge_normal(const Facet& f, int k) {
@@ -21,21 +20,29 @@ Vec3 edge_normal(const Facet& f, int k) {
 }
 
 void pack(const Facet& f, double scale, bool is_double, RealWords& words) {
+  const FacetLayout layout = facet_layout(is_double);
+  const std::size_t begin = words.count();
   for (const Vec3& corner : f.corners) words.point(scale * corner);
+  words.expect_at(begin + layout.normal);
   words.point(f.normal);
-  if (!is_double)
+  if (!is_double) {
+    words.expect_at(begin + layout.edges);
     for (int k = 0; k < 3; ++k) words.point(edge_normal(f, k));
+  }
+  words.expect_at(begin + layout.density);
   for (const double density : f.density) words.number(density);
+  words.expect_at(begin + layout.gradient);
   words.vector((1 / scale) * f.gradient);
+  words.expect_at(begin + layout.words);
 }
 
-void pack_meta(const Facet& f, const FacetSummary& summary, std::vector<Index>& meta) {
-  Index bits = f.anchor;
+FacetMeta meta_of(const Facet& f, const FacetSummary& summary) {
+  uint bits = f.anchor;
   for (unsigned k = 0; k < 3; ++k) {
-    bits |= Index{f.origin[k]} << (2 + 2 * k);
-    bits |= Index{f.rank[k]} << (8 + 2 * k);
+    bits |= uint{f.origin[k]} << (kOriginShift + 2 * k);
+    bits |= uint{f.rank[k]} << (kRankShift + 2 * k);
   }
-  meta.insert(meta.end(), {summary.vertex[0], summary.vertex[1], summary.vertex[2], summary.triangle, bits});
+  return {{summary.vertex[0], summary.vertex[1], summary.vertex[2]}, summary.triangle, bits};
 }
 
 }  // namespace
@@ -44,19 +51,19 @@ double device_scale(const Surface& surface) { return std::ldexp(1.0, 24 - std::i
 
 std::vector<FacetChunk> upload_facets(Device& device, Commands& commands, const Surface& surface, double scale,
                                       bool is_double) {
-  constexpr std::size_t kBytes = std::max(kFacetReals[0] * sizeof(float), kFacetReals[1] * sizeof(double));
+  constexpr std::size_t kBytes = std::max(kSingleFacetWords * sizeof(float), kDoubleFacetWords * sizeof(double));
   const std::size_t most = device.limits().storage_range / kBytes, n = surface.facets.size();
   std::vector<FacetChunk> chunks;
   for (std::size_t first = 0; first < n; first += most) {
     const std::size_t count = std::min(most, n - first);
     RealWords words(is_double), wholes(is_double);
-    words.reserve(count * kFacetReals[is_double]);
-    wholes.reserve(count * 5);
-    std::vector<Index> meta;
-    meta.reserve(count * kMetaWords);
+    words.reserve(count * facet_layout(is_double).words);
+    wholes.reserve(count * kMomentWords);
+    std::vector<FacetMeta> meta;
+    meta.reserve(count);
     for (std::size_t k = first; k < first + count; ++k) {
       pack(surface.facets[k], scale, is_double, words);
-      pack_meta(surface.facets[k], surface.summaries[k], meta);
+      meta.push_back(meta_of(surface.facets[k], surface.summaries[k]));
       wholes.moments(scaled(surface.summaries[k].moments, scale));
     }
     chunks.push_back({first, count, Buffer(device), Buffer(device), Buffer(device)});

@@ -27,7 +27,8 @@ std::vector<Index> ExactRung::owners(const std::vector<Vec3>& points) {
   const Neighbours& near = neighbours();
   std::vector<Index> slots(points.size());
   parallel_each(
-      points.size(), [&](std::size_t k) { slots[k] = find_owner(*seeds_, near, points[k], near.nearest(points[k])); }, 64);
+      points.size(), [&](std::size_t k) { slots[k] = find_owner(*seeds_, near, points[k], near.nearest(points[k])); },
+      64);
   return slots;
 }
 

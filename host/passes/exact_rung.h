@@ -16,7 +16,8 @@ class ExactRung {
   std::vector<Index> owners(const std::vector<Vec3>& points);
   // Neighbours that can answer Neighbours::nearest_to().
   const Neighbours& neighbours();
-  // Calls visit(k, clipper) for k < count, with a clipper (voronoi/clip.h, clip_tet.h) that knows the seeds, in parallel.
+  // Calls visit(k, clipper) for k < count, with a clipper (voronoi/clip.h, clip_tet.h) that knows the seeds, in
+  // parallel.
   template <class Clipper, class Visit>
   void for_each(std::size_t count, const Visit& visit, std::size_t chunk = 64) {
     const Neighbours& near = neighbours();

@@ -1,21 +1,17 @@
 #include "host/passes/facet_pairs.h"
 
-#include "voronoi/clip.h"
 #include "host/passes/packing.h"
+#include "kernels/layout/pairs.h"
+#include "voronoi/clip.h"
 
 namespace bisector::host {
 namespace {
 
-constexpr std::uint32_t kWideCorners = 48;
+constexpr uint kWideCorners = 48;  // of a polygon, on the rungs after the first
 
-struct StartPush {
-  std::uint32_t facet_base, first_facet, facet_count, proposal_room, pair_room;
-};
-struct SamplesPush {
-  std::uint32_t facet_base, first, count, proposal_room;
-};
+static_assert(kEdgeLabel == LAYOUT_BORDER_LABEL && kNone == LAYOUT_NONE);
 
-std::uint32_t word(std::size_t n) { return static_cast<std::uint32_t>(n); }
+uint word(std::size_t n) { return static_cast<uint>(n); }
 
 }  // namespace
 
@@ -40,37 +36,38 @@ void FacetPairs::start(const PairJob& job, const PairBuffers& buffers, std::size
   const FacetBatch& batch = plan_.batches[index];
   const FacetChunk& facets = surface_.facets[chunk_of(index)];
   const PairStore& store = job.store;
-  const StartPush push{word(facets.first), word(batch.first), word(batch.count), word(buffers.proposal_room),
-                       word(store.room)};
-  job.commands.dispatch(kernel("start", double_),
-                        {reads(job.seeds.words), reads(facets.words), reads(facets.meta), reads(facets.wholes),
-                         reads(sites_.owners()), updates(store.pairs), updates(store.status), updates(store.mass_second),
-                         updates(store.first), writes(buffers.proposals), updates(job.counters)},
-                        push, batch.count);
+  const StartFacetsPush push{word(facets.first), word(batch.first), word(batch.count), word(buffers.proposal_capacity),
+                             word(store.capacity)};
+  job.commands.dispatch(
+      kernel("start_facets", double_),
+      {reads(job.seeds.words), reads(facets.words), reads(facets.meta), reads(facets.wholes), reads(sites_.owners()),
+       updates(store.pairs), updates(store.status), updates(store.mass_second), updates(store.first),
+       writes(buffers.proposals), updates(job.counters)},
+      push, batch.count);
   if (batch.sample_count == 0) return;
-  const SamplesPush samples{word(facets.first), word(batch.first_sample), word(batch.sample_count),
-                            word(buffers.proposal_room)};
+  const StartSamplesPush samples{word(facets.first), word(batch.first_sample), word(batch.sample_count),
+                                 word(buffers.proposal_capacity)};
   job.commands.dispatch({"start_samples", {}},
                         {reads(sample_facets_), reads(owners_of_samples_.owners()), updates(buffers.proposals),
                          updates(job.counters), reads(sites_.owners()), reads(facets.meta)},
                         samples, batch.sample_count);
 }
 
-void FacetPairs::clip(const PairJob& job, const PairBuffers& buffers, std::size_t chunk, const ClipKind& kind, ClipPush push,
-                      const Buffer& labels, const ClipDispatch& dispatch) {
-  const bool doubled = kind.rung == 2;
+void FacetPairs::clip(const PairJob& job, const PairBuffers& buffers, std::size_t chunk, const ClipKind& kind,
+                      ClipPush push, const Buffer& labels, const ClipDispatch& dispatch) {
+  const bool doubled = kind.rung == kRungDouble;
   const FacetChunk& facets = (doubled ? surface_.double_facets : surface_.facets)[chunk];
   push.element_base = word(facets.first);
-  const std::uint32_t corners = kind.labels || kind.rung == 0 ? kMostCorners : kWideCorners;
+  const std::uint32_t corners = kind.labels || kind.rung == kRungFirst ? kMostCorners : kWideCorners;
   const PairStore& store = job.store;
   dispatch(kernel("clip", double_ || doubled,
                   {corners, surface().density.empty(), kind.rung, kind.listed, kind.labels, doubled,
                    !doubled && double_next()}),
            {reads(doubled ? job.seeds.doubles : job.seeds.words), reads(job.seeds.ids), reads(facets.words),
-            reads(facets.meta), reads(job.neighbours.info()), updates(buffers.doubts), reads(job.neighbours.lists()),
-            reads(job.neighbours.wide_lists()), reads(store.pairs), updates(store.status), updates(store.mass_second),
-            updates(store.first), updates(buffers.proposals), updates(job.counters), updates(buffers.flagged),
-            writes(labels)},
+            reads(facets.meta), reads(job.neighbours.info()), updates(buffers.cell_errors),
+            reads(job.neighbours.lists()), reads(job.neighbours.wide_lists()), reads(store.pairs),
+            updates(store.status), updates(store.mass_second), updates(store.first), updates(buffers.proposals),
+            updates(job.counters), updates(buffers.flagged), writes(labels)},
            push);
 }
 

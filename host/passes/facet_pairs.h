@@ -18,8 +18,8 @@ struct SurfaceBuffers {
 class FacetPairs : public PairDomain {
  public:
   // Pairs start from the owners of sites and, on large facets, of samples, which must have been found when pairs are.
-  FacetPairs(Device& device, bool is_double, const SurfaceBuffers& surface, const OwnerPass& sites, const OwnerPass& samples,
-             ExactRung& exact);
+  FacetPairs(Device& device, bool is_double, const SurfaceBuffers& surface, const OwnerPass& sites,
+             const OwnerPass& samples, ExactRung& exact);
 
   // Batches and samples for the number of seeds; records the upload of what they say.
   void plan(Commands& commands, std::size_t seeds, double batch_pairs);

@@ -10,14 +10,14 @@ namespace bisector::host {
 
 // How long lists are, and the edges of the grids' cells that they are found with, in typical spacings.
 struct ListSizes {
-  std::uint32_t most, examined;            // entries of a first list, and seeds that are looked at for it
+  std::uint32_t most, examined;  // entries of a first list, and seeds that are looked at for it
   double cell;
   std::uint32_t wide_most, wide_examined;
   double wide_cell;
-  double wide_share;                       // of the seeds, that there is room for
+  double wide_share;  // of the seeds, whose wide lists there is memory for
 };
-// A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and takes
-// about 80, or 20 once it is optimised.
+// A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and
+// takes about 80, or 20 once it is optimised.
 inline constexpr ListSizes kSurfaceLists{32, 512, 1.8, 224, 1024, 4.5, 0.25},
     kSolidLists{96, 1024, 2.9, 256, 1536, 3.3, 1};
 
@@ -25,8 +25,8 @@ class NeighbourPass {
  public:
   NeighbourPass(Device& device, bool is_double, const ListSizes& sizes);
 
-  // Plans grids for seeds that lie about `spacing` apart and makes room; not while commands are recorded. Records the first
-  // grid.
+  // Plans grids for seeds that lie about `spacing` apart and reserves memory; not while commands are recorded. Records
+  // the first grid.
   void begin(Commands& commands, const DeviceSeeds& seeds, double spacing, Scan& scan);
   // Records the search for the first lists.
   void list_nearest(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters);
@@ -50,8 +50,8 @@ class NeighbourPass {
   ListSizes sizes_;
   SeedGrid grid_, wide_grid_;
   Buffer info_, lists_, wide_lists_, targets_, is_target_;
-  std::uint32_t most_ = 0;         // entries of a first list
-  std::size_t target_room_ = 0;
+  std::uint32_t most_ = 0;  // entries of a first list
+  std::size_t target_capacity_ = 0;
   bool wide_grid_built_ = false;
 };
 

@@ -1,58 +1,56 @@
 #include "host/passes/owner_pass.h"
 
+#include <utility>
+
 #include "host/passes/packing.h"
+#include "kernels/layout/pairs.h"
+#include "kernels/layout/push.h"
 
 namespace bisector::host {
-namespace {
-
-struct OwnersPush {
-  GridPush grid;
-  float residual;
-  std::uint32_t two, points, report;
-};
-static_assert(sizeof(OwnersPush) == 40);
-
-}  // namespace
 
 OwnerPass::OwnerPass(Device& device, bool is_double)
-    : double_(is_double), points_(device), owners_(device), lost_(device), pokes_(device) {}
+    : double_(is_double), positions_(device), owners_(device), uncertain_(device), found_(device) {}
 
-void OwnerPass::set_points(Commands& commands, const std::vector<Vec3>& points, double scale) {
-  count_ = points.size();
+void OwnerPass::set_points(Commands& commands, std::vector<Vec3> points, double scale) {
+  points_ = std::move(points);
   RealWords words(double_);
-  words.reserve(count_ * 6);
-  for (const Vec3& p : points) words.point(scale * p);
-  upload(commands, points_, words);
-  owners_.reserve(count_ * sizeof(Index));
-  lost_.reserve(count_ * sizeof(Index));
-  fresh_ = true;
+  words.reserve(points_.size() * point_words(double_));
+  for (const Vec3& p : points_) words.point(scale * p);
+  upload(commands, positions_, words);
+  owners_.reserve(points_.size() * sizeof(Index));
+  uncertain_.reserve(points_.size() * sizeof(Index));
+  from_scratch_ = true;
 }
 
 void OwnerPass::record(Commands& commands, const DeviceSeeds& seeds, const SeedGrid& grid, const Buffer& counters,
                        bool report) {
-  if (count_ == 0) return;
-  commands.phase(Phase::owners);
-  if (fresh_) commands.fill(owners_, 0, count_ * sizeof(Index), kNone);
-  fresh_ = false;
-  const OwnersPush push{grid.push(), seeds.residual, 2, static_cast<std::uint32_t>(count_), report};
+  const std::size_t count = points_.size();
+  if (count == 0) return;
+  commands.phase(&DeviceSeconds::owners);
+  if (from_scratch_) commands.fill(owners_, 0, count * sizeof(Index), kNone);
+  from_scratch_ = false;
+  const GridPush& at = grid.push();
+  const OwnersPush push{at.grid_lower, at.grid_inverse,          at.bucket_mask, at.seed_count, seeds.residual,
+                        kTwo,          static_cast<uint>(count), report};
   commands.dispatch(kernel("owners", double_),
-                    {reads(seeds.words), reads(grid.ends()), reads(grid.slots()), reads(points_), updates(owners_),
-                     updates(counters), writes(lost_)},
-                    push, count_);
+                    {reads(seeds.words), reads(grid.ends()), reads(grid.slots()), reads(positions_), updates(owners_),
+                     updates(counters), writes(uncertain_)},
+                    push, count);
 }
 
-std::vector<Index> OwnerPass::lost(Commands& commands, std::size_t count) {
-  std::vector<Index> points(count);
-  commands.download(lost_, 0, points.data(), count * sizeof(Index));
+void OwnerPass::complete(Commands& commands, std::size_t uncertain, ExactRung& exact) {
+  if (uncertain == 0) return;
+  std::vector<Index> listed(uncertain);
+  commands.download(uncertain_, 0, listed.data(), uncertain * sizeof(Index));
   commands.run();
-  return points;
-}
-
-void OwnerPass::settle(Commands& commands, const std::vector<Index>& points, const std::vector<Index>& slots) {
-  std::vector<Index> pokes;
-  for (std::size_t k = 0; k < points.size(); ++k) pokes.insert(pokes.end(), {points[k], slots[k]});
-  upload(commands, pokes_, pokes);
-  commands.dispatch({"poke", {}}, {reads(pokes_), updates(owners_)}, static_cast<std::uint32_t>(points.size()), points.size());
+  std::vector<Vec3> positions;
+  for (const Index k : listed) positions.push_back(points_[k]);
+  const std::vector<Index> slots = exact.owners(positions);
+  std::vector<PointOwner> found;
+  for (std::size_t k = 0; k < uncertain; ++k) found.push_back({listed[k], slots[k]});
+  upload(commands, found_, found);
+  commands.dispatch({"set_owners", {}}, {reads(found_), updates(owners_)}, CountPush{static_cast<uint>(uncertain)},
+                    uncertain);
 }
 
 }  // namespace bisector::host

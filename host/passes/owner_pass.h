@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "host/passes/exact_rung.h"
 #include "host/passes/neighbour_pass.h"
 #include "host/passes/seeds.h"
 
@@ -13,23 +14,22 @@ class OwnerPass {
   OwnerPass(Device& device, bool is_double);
 
   // Records the upload of new points. Their owners are looked for from scratch at first.
-  void set_points(Commands& commands, const std::vector<Vec3>& points, double scale);
+  void set_points(Commands& commands, std::vector<Vec3> points, double scale);
   // Forgets the last owners, whose slots no longer mean the same seeds.
-  void forget() { fresh_ = true; }
+  void forget() { from_scratch_ = true; }
   // Records the search. With `report`, points without a certain owner are listed; else they are left with none.
   void record(Commands& commands, const DeviceSeeds& seeds, const SeedGrid& grid, const Buffer& counters, bool report);
-  // Downloads the points listed, `count` of them.
-  std::vector<Index> lost(Commands& commands, std::size_t count);
-  // Records the owners that were found elsewhere.
-  void settle(Commands& commands, const std::vector<Index>& points, const std::vector<Index>& slots);
+  // Once that has run: finds the owners of the `uncertain` points that were listed in exact arithmetic, and records
+  // their upload.
+  void complete(Commands& commands, std::size_t uncertain, ExactRung& exact);
 
   const Buffer& owners() const { return owners_; }
 
  private:
   bool double_;
-  Buffer points_, owners_, lost_, pokes_;
-  std::size_t count_ = 0;
-  bool fresh_ = true;
+  std::vector<Vec3> points_;
+  Buffer positions_, owners_, uncertain_, found_;
+  bool from_scratch_ = true;
 };
 
 }  // namespace bisector::host

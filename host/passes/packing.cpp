@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 
 namespace bisector::host {
 
@@ -27,6 +28,10 @@ void RealWords::moments(const Moments& m) {
   number(m.mass);
   vector(m.first);
   number(m.second);
+}
+
+void RealWords::expect_at(std::size_t place) const {
+  if (count() != place) throw std::logic_error("reals are not packed where the kernels read them");
 }
 
 std::uint32_t low_word(double x, double scale, std::size_t slot) {

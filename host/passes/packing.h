@@ -1,4 +1,4 @@
-// How positions and moments lie in device buffers: twins of kernels/real.glsl and points.glsl.
+// How positions and moments lie in device buffers: twins of kernels/real.glsl, points.glsl and layout/elements.h.
 #pragma once
 
 #include <cstddef>
@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "core/geometry.h"
-#include "voronoi/moments.h"
 #include "host/device/buffer.h"
 #include "host/device/commands.h"
+#include "kernels/layout/elements.h"
+#include "voronoi/moments.h"
 
 namespace bisector::host {
 
-// Words of one real, in bytes of a buffer.
+// Reals one after the other, as a buffer holds them.
 class RealWords {
  public:
   explicit RealWords(bool is_double) : double_(is_double) {}
@@ -25,7 +26,11 @@ class RealWords {
   // A position or direction with 48 bits or more: as it is in double, a high and a low part in single.
   void point(const Vec3& p);
   void moments(const Moments& m);
+  // Throws std::logic_error unless the next real is the one at this place: packing then does not follow
+  // kernels/layout/.
+  void expect_at(std::size_t place) const;
 
+  std::size_t count() const { return bytes_.size() / size(); }
   std::size_t size() const { return double_ ? sizeof(double) : sizeof(float); }
   const std::vector<std::byte>& bytes() const { return bytes_; }
 
@@ -34,12 +39,12 @@ class RealWords {
   std::vector<std::byte> bytes_;
 };
 
-// With it, equal pairs of floats mean equal doubles: the low half of the bits of x, a coordinate of the seed in `slot`, which
-// scaling by a power of two leaves as it is. A number that a float cannot hold counts as equal to no other.
+// With it, equal pairs of floats mean equal doubles: the low half of the bits of x, a coordinate of the seed in `slot`,
+// which scaling by a power of two leaves as it is. A number that a float cannot hold counts as equal to no other.
 std::uint32_t low_word(double x, double scale, std::size_t slot);
 
-// What a coordinate of the difference of two positions may lack in single precision, coordinates being at most `largest`: two
-// positions of 48 bits and the rounding of their difference.
+// What a coordinate of the difference of two positions may lack in single precision, coordinates being at most
+// `largest`: two positions of 48 bits and the rounding of their difference.
 inline float residual_of(double largest) { return static_cast<float>(0x1p-44 * largest); }
 
 // Makes room in the buffer for the data and records their transfer.
@@ -48,12 +53,17 @@ template <class T>
 void upload(Commands& commands, Buffer& buffer, const std::vector<T>& values) {
   upload(commands, buffer, values.data(), values.size() * sizeof(T));
 }
-inline void upload(Commands& commands, Buffer& buffer, const RealWords& words) { upload(commands, buffer, words.bytes()); }
+inline void upload(Commands& commands, Buffer& buffer, const RealWords& words) {
+  upload(commands, buffer, words.bytes());
+}
 
 // The kernel of that name in the given precision.
 inline Kernel kernel(const char* name, bool is_double, std::vector<std::uint32_t> constants = {}) {
   return {std::string(name) + (is_double ? "_double" : "_single"), std::move(constants)};
 }
+
+// What loops_complete() of kernels/common.glsl needs: the compiler of the kernels may not know it.
+inline constexpr uint kTwo = 2;
 
 // Lengths times `scale`, a power of two, of moments over an area or a volume.
 Moments scaled(const Moments& m, double scale, bool is_solid = false);

@@ -1,6 +1,6 @@
-// Incident pairs of elements (facets of a surface, tetrahedra of a solid) and cells, with their moments: clipping by batches of
-// elements, from a few certain pairs outwards, and the rungs for what is not certain: wider lists, double precision, exact
-// arithmetic.
+// Incident pairs of elements (facets of a surface, tetrahedra of a solid) and cells, with their moments: clipping by
+// batches of elements, from a few certain pairs outwards, and the rungs for what is not certain: wider lists, double
+// precision, exact arithmetic.
 #pragma once
 
 #include <array>
@@ -8,39 +8,36 @@
 #include <initializer_list>
 #include <vector>
 
-#include "voronoi/restricted.h"
-#include "host/passes/counters.h"
+#include "host/passes/capacities.h"
 #include "host/passes/neighbour_pass.h"
-#include "host/passes/rooms.h"
 #include "host/passes/seeds.h"
+#include "kernels/layout/counters.h"
+#include "kernels/layout/pairs.h"
+#include "kernels/layout/push.h"
+#include "voronoi/restricted.h"
 
 namespace bisector::host {
 
-// Pairs in the order in which they were met, which is not the same from run to run; their set is, and what is stored of each.
+// Pairs in the order in which they were met, which is not the same from run to run; their set is, and what is stored of
+// each.
 struct PairStore {
   explicit PairStore(Device& device) : pairs(device), status(device), mass_second(device), first(device) {}
 
   struct Range {
     std::size_t chunk, begin, end;
   };
-  Buffer pairs;                // element, slot
-  Buffer status;               // of kernels/statuses.glsl
-  Buffer mass_second, first;   // moments
-  std::size_t room = 0, count = 0;
-  std::vector<Range> ranges;   // of the batches
+  Buffer pairs;               // PairName
+  Buffer status;              // kStatus... of kernels/layout/pairs.h
+  Buffer mass_second, first;  // moments
+  std::size_t capacity = 0, count = 0;
+  std::vector<Range> ranges;  // of the batches
 };
 
-inline constexpr std::uint32_t kStatusClipped = 1, kStatusEmpty = 2, kStatusWhole = 6;
-
-struct PairName {
-  Index element, slot;
-};
-
-// A pair that the CPU settled.
+// What exact arithmetic on the CPU found for a pair.
 struct ExactPair {
   bool empty = true;
-  Moments moments;                   // in lengths of the device
-  std::vector<PairName> proposals;   // the pairs that it makes known
+  Moments moments;                  // in lengths of the device
+  std::vector<PairName> proposals;  // the pairs that it makes known
 };
 
 class PairDomain;
@@ -58,27 +55,22 @@ struct PairJob {
 
 // What the pass keeps between its dispatches.
 struct PairBuffers {
-  PairBuffers(Device& device, const Rooms& rooms)
-      : proposals(device), table(device), flagged(device), doubts(device), no_labels(device), proposal_room(rooms.proposals),
-        table_size(rooms.table) {}
+  PairBuffers(Device& device, const Capacities& capacities)
+      : proposals(device), table(device), flagged(device), cell_errors(device), no_labels(device),
+        proposal_capacity(capacities.proposals), table_size(capacities.table) {}
 
-  Buffer proposals, table, flagged;
-  Buffer doubts;             // by slot: the bits of two errors; then one word for each slot that a domain may use
-  Buffer no_labels;
-  std::size_t proposal_room, table_size;
+  Buffer proposals;    // PairName
+  Buffer table;        // the set of the pairs of a batch
+  Buffer flagged;      // lists of pairs, each as long as the table
+  Buffer cell_errors;  // bounds of the errors of cells, then marks of cells
+  Buffer no_labels;    // bound where none are asked for
+  std::size_t proposal_capacity, table_size;
 };
 
 // Which specialisation of a clip kernel.
 struct ClipKind {
-  unsigned rung = 0;
+  uint rung = kRungFirst;
   bool listed = false, labels = false;
-};
-
-// Push constants of kernels/clip.comp and clip_tet.comp.
-struct ClipPush {
-  std::uint32_t element_base;
-  float residual;
-  std::uint32_t two, first_pair, pair_count, proposal_room, flagged_room, cells;
 };
 
 using ClipDispatch = std::function<void(const Kernel&, std::initializer_list<Binding>, const ClipPush&)>;
@@ -88,29 +80,30 @@ class PairDomain {
  public:
   virtual ~PairDomain() = default;
 
-  virtual const char* elements() const = 0;     // for messages: "triangles"
-  virtual bool is_solid() const = 0;            // masses are volumes
+  virtual const char* elements() const = 0;  // for messages: "triangles"
+  virtual bool is_solid() const = 0;         // masses are volumes
   virtual double mean_density() const = 0;
-  virtual bool double_next() const = 0;         // whether single precision may hand pairs to the double kernels
+  virtual bool double_next() const = 0;  // whether single precision may hand pairs to the double kernels
   virtual double expected_pairs() const = 0;
   virtual std::size_t batches() const = 0;
   virtual std::size_t chunk_of(std::size_t batch) const = 0;  // the part of the elements that one binding spans
   // Records the first pairs and proposals of a batch.
   virtual void start(const PairJob& job, const PairBuffers& buffers, std::size_t batch) = 0;
   // Dispatches the kernel for pairs of a chunk. `push` says which.
-  virtual void clip(const PairJob& job, const PairBuffers& buffers, std::size_t chunk, const ClipKind& kind, ClipPush push,
-                    const Buffer& labels, const ClipDispatch& dispatch) = 0;
+  virtual void clip(const PairJob& job, const PairBuffers& buffers, std::size_t chunk, const ClipKind& kind,
+                    ClipPush push, const Buffer& labels, const ClipDispatch& dispatch) = 0;
   virtual std::vector<ExactPair> clip_exactly(const PairJob& job, const std::vector<PairName>& pairs) = 0;
 };
 
 class PairPass {
  public:
-  PairPass(Device& device, bool is_double, const Rooms& rooms);
+  PairPass(Device& device, bool is_double, const Capacities& capacities);
 
   // Finds all pairs. Counts in `certification` what climbed which rung.
   void run(const PairJob& job, Certification& certification);
-  // In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs. `cells` are those of
-  // CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there were.
+  // In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs. `cells` are
+  // those of CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there
+  // were.
   std::size_t refine(const PairJob& job, const Buffer& cells, float share, Certification& certification);
   // Records the clipping of `count` pairs from `first` on, of one batch, for their labels.
   void label(const PairJob& job, std::size_t chunk, std::size_t first, std::size_t count, const Buffer& labels);
@@ -118,26 +111,26 @@ class PairPass {
  private:
   std::size_t real_size() const { return double_ ? sizeof(double) : sizeof(float); }
   std::size_t most_pairs() const;
-  void make_room(const PairJob& job);
+  void reserve(const PairJob& job);
   bool climb(const PairJob& job, std::size_t chunk, const Counters& counters, Certification& certification);
   bool run_batch(const PairJob& job, std::size_t batch, Certification& certification);
   void start(const PairJob& job, std::size_t batch);
   void spread(const PairJob& job, std::size_t chunk);
   void advance(const PairJob& job, bool of_pairs, std::size_t most);
   Counters read_counters(const PairJob& job);
-  void set_counter(const PairJob& job, Counter counter, std::uint32_t value);
-  void clip_flagged(const PairJob& job, std::size_t chunk, unsigned rung, unsigned region, std::size_t count);
-  void settle_exactly(const PairJob& job, const Counters& counters);
+  void set_counter(const PairJob& job, uint counter, uint value);
+  void clip_flagged(const PairJob& job, std::size_t chunk, uint rung, uint list, std::size_t count);
+  void clip_exactly(const PairJob& job, const Counters& counters);
   void clip(const PairJob& job, std::size_t chunk, const ClipKind& kind, ClipPush push, const Buffer& labels,
             const ClipDispatch& dispatch);
 
   Device& device_;
   bool double_;
   PairBuffers buffers_;
-  Buffer gathered_, settled_, values_;
-  std::uint32_t unsettled_ = 0;  // pairs that double precision did not settle, as far as they are counted
-  std::size_t first_room_;  // of pairs, 0: by what is expected
-  std::size_t most_at_once_;  // pairs or proposals of one dispatch
+  Buffer gathered_, answers_, values_;
+  uint unsure_in_double_ = 0;   // pairs that double precision left uncertain, as far as they are counted
+  std::size_t first_capacity_;  // of pairs; 0: by what is expected
+  std::size_t most_at_once_;    // pairs or proposals of one dispatch
 };
 
 }  // namespace bisector::host

@@ -10,13 +10,13 @@ namespace bisector::host {
 namespace {
 
 constexpr std::size_t kWindow = std::size_t{1} << 16;  // pairs that are labelled at once
-constexpr std::size_t kStride = FacetPairs::kMostCorners + 1;
-constexpr std::size_t kChunk = 1024;
+constexpr std::size_t kStride = kPolygonHeader + FacetPairs::kMostCorners;
+constexpr std::size_t kChunk = 1024;  // polygons that one task completes
 
 // Where the labels of a pair are; none if the pair is to be clipped exactly or is whole.
 struct Found {
   Index facet, slot;
-  Index count = 0;                 // of labels
+  Index count = 0;  // of labels
   std::size_t first_label = 0;
 };
 
@@ -25,10 +25,11 @@ struct Found {
 void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, RestrictedPolygons& polygons) {
   const PairStore& store = job.store;
   labels_.reserve(kWindow * kStride * sizeof(Index));
-  std::vector<Index> names(2 * store.count), status(store.count);
-  job.commands.phase(Phase::transfer);
+  std::vector<PairName> names(store.count);
+  std::vector<Index> status(store.count);
+  job.commands.phase(&DeviceSeconds::transfer);
   if (store.count) {
-    job.commands.download(store.pairs, 0, names.data(), names.size() * sizeof(Index));
+    job.commands.download(store.pairs, 0, names.data(), names.size() * sizeof(PairName));
     job.commands.download(store.status, 0, status.data(), status.size() * sizeof(Index));
     job.commands.run();
   }
@@ -46,14 +47,14 @@ void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, R
       for (std::size_t k = 0; k < count; ++k) {
         const std::size_t pair = first + k;
         if (status[pair] == kStatusEmpty) continue;
-        Found entry{names[2 * pair], names[2 * pair + 1]};
+        Found entry{names[pair].element, names[pair].slot};
         const Index* words = window.data() + k * kStride;
         entry.first_label = labels.size();
         if (words[0] == kNone) {
           doubtful.push_back(found.size());
         } else {
           entry.count = words[0];
-          labels.insert(labels.end(), words + 1, words + 1 + words[0]);
+          labels.insert(labels.end(), words + kPolygonHeader, words + kPolygonHeader + words[0]);
         }
         found.push_back(entry);
       }

@@ -1,9 +1,9 @@
-// Polygons of a diagram that the device has found: labels from the device, coordinates by the CPU's formula from these, so
-// that they are the CPU's bit for bit in either precision.
+// Polygons of a diagram that the device has found: labels from the device, coordinates by the CPU's formula from these,
+// so that they are the CPU's bit for bit in either precision.
 #pragma once
 
-#include "voronoi/restricted.h"
 #include "host/passes/facet_pairs.h"
+#include "voronoi/restricted.h"
 
 namespace bisector::host {
 

@@ -9,14 +9,14 @@ namespace bisector::host {
 namespace {
 
 constexpr std::size_t kWindow = std::size_t{1} << 14;  // pairs that are labelled at once
-constexpr std::size_t kStride = 2 + TetPairs::kMostPlanes + TetPairs::kMostVertices;
-constexpr std::size_t kChunk = 256;
+constexpr std::size_t kStride = kPolyhedronHeader + TetPairs::kMostPlanes + TetPairs::kMostVertices;
+constexpr std::size_t kChunk = 256;  // polyhedra that one task completes
 
 // What the device says of a pair.
 struct Found {
   Index tet, slot;
-  bool exactly = false;          // it is to be clipped anew
-  std::vector<Index> labels;     // none: the whole tetrahedron
+  bool exactly = false;       // it is to be clipped anew
+  std::vector<Index> labels;  // none: the whole tetrahedron
   std::vector<std::array<Index, 3>> triples;
 };
 
@@ -39,10 +39,11 @@ void PolyhedraPass::run(PairPass& pairs, const PairJob& job, TetPairs& domain, E
                         ClippedPolyhedra& polyhedra) {
   const PairStore& store = job.store;
   labels_.reserve(kWindow * kStride * sizeof(Index));
-  std::vector<Index> names(2 * store.count), status(store.count), window;
-  job.commands.phase(Phase::transfer);
+  std::vector<PairName> names(store.count);
+  std::vector<Index> status(store.count), window;
+  job.commands.phase(&DeviceSeconds::transfer);
   if (store.count) {
-    job.commands.download(store.pairs, 0, names.data(), names.size() * sizeof(Index));
+    job.commands.download(store.pairs, 0, names.data(), names.size() * sizeof(PairName));
     job.commands.download(store.status, 0, status.data(), status.size() * sizeof(Index));
     job.commands.run();
   }
@@ -59,13 +60,14 @@ void PolyhedraPass::run(PairPass& pairs, const PairJob& job, TetPairs& domain, E
         const std::size_t pair = first + k;
         if (status[pair] == kStatusEmpty) continue;
         Found entry;
-        entry.tet = names[2 * pair];
-        entry.slot = names[2 * pair + 1];
+        entry.tet = names[pair].element;
+        entry.slot = names[pair].slot;
         const Index* words = window.data() + k * kStride;
         entry.exactly = words[0] == kNone;
         if (words[0] != kNone && words[0] != 0) {
-          entry.labels.assign(words + 2, words + 2 + words[0]);
-          const Index* vertices = words + 2 + TetPairs::kMostPlanes;
+          const Index* labels = words + kPolyhedronHeader;
+          entry.labels.assign(labels, labels + words[0]);
+          const Index* vertices = labels + TetPairs::kMostPlanes;
           for (Index v = 0; v < words[1]; ++v)
             entry.triples.push_back({vertices[v] & 255, vertices[v] >> 8 & 255, vertices[v] >> 16 & 255});
         }
@@ -79,17 +81,20 @@ void PolyhedraPass::run(PairPass& pairs, const PairJob& job, TetPairs& domain, E
   });
   const Index enclosure = domain.solid().enclosure();
   std::vector<ClippedPolyhedra> parts((found.size() + kChunk - 1) / kChunk);
-  exact.for_each<TetClipper>(parts.size(), [&](std::size_t c, TetClipper& clipper) {
-    for (std::size_t k = c * kChunk; k < std::min(found.size(), (c + 1) * kChunk); ++k) {
-      const Found& entry = found[k];
-      const TetFrame& frame = domain.solid().frames[entry.tet];
-      clipper.begin(entry.slot);
-      if (entry.exactly) clipper.clip(frame);
-      else if (entry.labels.empty()) clipper.take(frame);
-      else clipper.take(frame, entry.labels, entry.triples);
-      append_polyhedron(clipper, seeds, entry.tet == enclosure ? kNone : entry.tet, entry.slot, parts[c]);
-    }
-  }, 1);
+  exact.for_each<TetClipper>(
+      parts.size(),
+      [&](std::size_t c, TetClipper& clipper) {
+        for (std::size_t k = c * kChunk; k < std::min(found.size(), (c + 1) * kChunk); ++k) {
+          const Found& entry = found[k];
+          const TetFrame& frame = domain.solid().frames[entry.tet];
+          clipper.begin(entry.slot);
+          if (entry.exactly) clipper.clip(frame);
+          else if (entry.labels.empty()) clipper.take(frame);
+          else clipper.take(frame, entry.labels, entry.triples);
+          append_polyhedron(clipper, seeds, entry.tet == enclosure ? kNone : entry.tet, entry.slot, parts[c]);
+        }
+      },
+      1);
   polyhedra = {};
   for (const ClippedPolyhedra& part : parts) append(part, polyhedra);
 }

@@ -1,9 +1,9 @@
-// Polyhedra of a diagram that the device has found: labels from the device, coordinates by the CPU's formula from these, so that
-// they are the CPU's bit for bit in either precision.
+// Polyhedra of a diagram that the device has found: labels from the device, coordinates by the CPU's formula from
+// these, so that they are the CPU's bit for bit in either precision.
 #pragma once
 
-#include "voronoi/clipped.h"
 #include "host/passes/tet_pairs.h"
+#include "voronoi/clipped.h"
 
 namespace bisector::host {
 

@@ -11,7 +11,7 @@ class Scan {
  public:
   explicit Scan(Device& device) : device_(device) {}
 
-  // Makes room for arrays of up to `count` words; not while commands are recorded.
+  // Reserves memory for arrays of up to `count` words; not while commands are recorded.
   void reserve(std::size_t count);
   // Records the replacement of the first `count` words by the sums of those before them.
   void record(Commands& commands, const Buffer& words, std::size_t count);

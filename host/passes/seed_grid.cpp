@@ -42,21 +42,23 @@ void SeedGrid::plan(const SortedSeeds& seeds, double cell, double scale, Scan& s
   const double least = seeds.extent > 0 ? seeds.extent / kMostCells : 1 / scale;
   const double size = std::max(cell, least) * scale;
   const Box box = bounding_box(seeds.x);
-  for (int k = 0; k < 3; ++k) push_.lower[k] = static_cast<float>(box.lo[k] * scale - size);
-  push_.inverse = static_cast<float>(1 / size);
-  push_.mask = static_cast<std::uint32_t>(buckets - 1);
-  push_.seeds = static_cast<std::uint32_t>(n);
+  for (int k = 0; k < 3; ++k)
+    push_.grid_lower[static_cast<std::size_t>(k)] = static_cast<float>(box.lo[k] * scale - size);
+  push_.grid_inverse = static_cast<float>(1 / size);
+  push_.bucket_mask = static_cast<std::uint32_t>(buckets - 1);
+  push_.seed_count = static_cast<std::uint32_t>(n);
   ends_.reserve(buckets * sizeof(std::uint32_t));
   slots_.reserve(n * sizeof(std::uint32_t));
   scan.reserve(buckets);
 }
 
 void SeedGrid::record(Commands& commands, const Buffer& seeds, bool is_double, Scan& scan) {
-  const std::size_t buckets = std::size_t{push_.mask} + 1;
+  const std::size_t buckets = std::size_t{push_.bucket_mask} + 1;
   commands.fill(ends_, 0, buckets * sizeof(std::uint32_t), 0);
-  commands.dispatch(kernel("grid_count", is_double), {reads(seeds), updates(ends_)}, push_, push_.seeds);
+  commands.dispatch(kernel("grid_count", is_double), {reads(seeds), updates(ends_)}, push_, push_.seed_count);
   scan.record(commands, ends_, buckets);
-  commands.dispatch(kernel("grid_scatter", is_double), {reads(seeds), updates(ends_), writes(slots_)}, push_, push_.seeds);
+  commands.dispatch(kernel("grid_scatter", is_double), {reads(seeds), updates(ends_), writes(slots_)}, push_,
+                    push_.seed_count);
 }
 
 }  // namespace bisector::host

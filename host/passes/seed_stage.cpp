@@ -1,17 +1,15 @@
 #include "host/passes/seed_stage.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "core/parallel.h"
-#include "voronoi/step_mass.h"
+#include "core/stopwatch.h"
 #include "host/passes/packing.h"
+#include "voronoi/step_mass.h"
 
 namespace bisector::host {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr double kFarthest = 1e12;  // coordinate on the device; beyond, squares of singles would overflow
 
@@ -25,12 +23,11 @@ Precisions choose_precisions(const Device& device, Precision asked, bool double_
   return {is_double, !is_double && double_rung && description.float64};
 }
 
-SeedStage::SeedStage(std::unique_ptr<Device> opened, const Precisions& precisions, NeighbourSource source, double scale,
+SeedStage::SeedStage(std::shared_ptr<Device> opened, const Precisions& precisions, NeighbourSource source, double scale,
                      const Box& box, bool in_solid)
-    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung), in_solid_(in_solid),
-      source_(source), box_(box),
-      commands(*device_), scan(*device_), counters(*device_), seeds(*device_),
-      neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists) {
+    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung),
+      in_solid_(in_solid), source_(source), box_(box), commands(*device_), scan(*device_), counters(*device_),
+      seeds(*device_), neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists) {
   counters.reserve(kCounters * sizeof(std::uint32_t));
   seeds.scale = scale;
 }
@@ -48,7 +45,7 @@ void SeedStage::sort(const std::vector<Vec3>& given) {
 }
 
 void SeedStage::begin(const std::vector<Vec3>& given) {
-  const Clock::time_point start = Clock::now();
+  const Stopwatch watch;
   SortedSeeds& sorted = seeds.sorted;
   followed_ = !delaunay() && given.size() == sorted.x.size() && given.size() == sorted.slot.size();
   if (followed_) {
@@ -58,7 +55,7 @@ void SeedStage::begin(const std::vector<Vec3>& given) {
     sort(given);
   }
   if (delaunay()) rings_.build(sorted, NeighbourSource::delaunay);
-  lists_seconds_ = std::chrono::duration<double>(Clock::now() - start).count();
+  lists_seconds_ = watch.seconds();
   spacing_ = typical_spacing(given, in_solid_);
 }
 
@@ -71,22 +68,22 @@ void SeedStage::record() {
   else neighbours.list_nearest(commands, seeds, counters);
 }
 
-bool SeedStage::settle(const std::vector<Vec3>& given, const Counters& counted) {
-  if (!followed_ || !counted[kMet]) return true;
+bool SeedStage::keeps_slots(const std::vector<Vec3>& given, const Counters& counted) {
+  if (!followed_ || !counted[kCoincident]) return true;
   sort(given);
   return false;
 }
 
 void SeedStage::upload_seeds() {
   RealWords words(double_), wide(true);
-  words.reserve(6 * seeds.count());
-  std::vector<std::uint32_t> ids;
-  ids.reserve(4 * seeds.count());
+  words.reserve(point_words(double_) * seeds.count());
+  std::vector<SeedId> ids;
+  ids.reserve(seeds.count());
   double largest = 0;
   for (std::size_t slot = 0; slot < seeds.count(); ++slot) {
     const Vec3& x = seeds.sorted.x[slot];
-    ids.push_back(seeds.sorted.id[slot]);
-    for (int k = 0; k < 3; ++k) ids.push_back(low_word(x[k], seeds.scale, slot));
+    const auto low = [&](double coordinate) { return low_word(coordinate, seeds.scale, slot); };
+    ids.push_back({seeds.sorted.id[slot], {low(x.x), low(x.y), low(x.z)}});
     words.point(seeds.scale * x);
     if (double_rung_) wide.point(seeds.scale * x);
     largest = std::max({largest, std::abs(x.x), std::abs(x.y), std::abs(x.z)});
@@ -94,7 +91,7 @@ void SeedStage::upload_seeds() {
   for (const Vec3& corner : {box_.lo, box_.hi})
     largest = std::max({largest, std::abs(corner.x), std::abs(corner.y), std::abs(corner.z)});
   seeds.residual = double_ ? 0 : residual_of(largest * seeds.scale);
-  commands.phase(Phase::transfer);
+  commands.phase(&DeviceSeconds::transfer);
   upload(commands, seeds.words, words);
   if (double_rung_) upload(commands, seeds.doubles, wide);
   upload(commands, seeds.ids, ids);
@@ -107,11 +104,6 @@ Counters SeedStage::run_counted() {
   return counted;
 }
 
-DeviceSeconds SeedStage::take_seconds() {
-  const std::array<double, kPhases> seconds = commands.take_seconds();
-  return {seconds[0], seconds[1], seconds[2], seconds[3], seconds[4], seconds[5], seconds[6]};
-}
-
 BackendDescription SeedStage::description() const {
   const DeviceDescription& device = device_->description();
   return {device.name, device.kind, double_ ? "double" : "single", ""};
@@ -119,7 +111,8 @@ BackendDescription SeedStage::description() const {
 
 void SeedStage::set_step_masses(CellMoments& moments) {
   if (delaunay()) return bisector::set_step_masses(seeds.sorted, rings_, moments);
-  complete_step_masses(seeds.sorted, [&]() -> const Neighbours& { return exact.neighbours(); }, moments);
+  complete_step_masses(
+      seeds.sorted, [&]() -> const Neighbours& { return exact.neighbours(); }, moments);
 }
 
 }  // namespace bisector::host

@@ -1,15 +1,16 @@
-// What an evaluation on a device starts with, whatever its domain: the seeds on the device in a spatial order, and lists of their
-// neighbours.
+// What an evaluation on a device starts with, whatever its domain: the seeds on the device in a spatial order, and
+// lists of their neighbours.
 #pragma once
 
 #include <memory>
 
 #include "backend/backend.h"
-#include "host/passes/counters.h"
 #include "host/passes/exact_rung.h"
 #include "host/passes/neighbour_pass.h"
 #include "host/passes/scan.h"
 #include "host/passes/seeds.h"
+#include "kernels/layout/counters.h"
+#include "kernels/layout/pairs.h"
 
 namespace bisector::host {
 
@@ -23,7 +24,7 @@ Precisions choose_precisions(const Device& device, Precision asked, bool double_
 class SeedStage {
  public:
   // `box` is the domain's; `in_solid`: seeds lie in space, not on a surface.
-  SeedStage(std::unique_ptr<Device> device, const Precisions& precisions, NeighbourSource source, double scale,
+  SeedStage(std::shared_ptr<Device> device, const Precisions& precisions, NeighbourSource source, double scale,
             const Box& box, bool in_solid);
 
   // Whether all seeds have coordinates that single precision can square.
@@ -34,14 +35,12 @@ class SeedStage {
   void record();
   // Whether slots mean other seeds than in the last evaluation.
   bool sorted_anew() const { return !followed_; }
-  // To be called once what was recorded has run. If seeds that were followed have met, takes them anew, and all has to be
-  // recorded again: then it returns false.
-  bool settle(const std::vector<Vec3>& seeds, const Counters& counters);
+  // To be called once what was recorded has run. If seeds that kept their slots have come to coincide, sorts all anew
+  // and returns false: then all has to be recorded again.
+  bool keeps_slots(const std::vector<Vec3>& seeds, const Counters& counters);
   // Runs what is recorded and reads the counters.
   Counters run_counted();
   void set_step_masses(CellMoments& moments);
-  // On the device, since the last call.
-  DeviceSeconds take_seconds();
 
   BackendDescription description() const;
   Device& device() { return *device_; }
@@ -54,7 +53,7 @@ class SeedStage {
   void sort(const std::vector<Vec3>& seeds);
   void upload_seeds();
 
-  std::unique_ptr<Device> device_;
+  std::shared_ptr<Device> device_;
   bool double_, double_rung_, in_solid_;
   NeighbourSource source_;
   Box box_;

@@ -3,20 +3,22 @@
 namespace bisector::host {
 namespace {
 
-constexpr double kReplan = 1.5;  // change of the number of seeds
+// By what factor the number of seeds changes before batches and samples are planned anew.
+constexpr double kReplan = 1.5;
 
 }  // namespace
 
-SurfaceStage::SurfaceStage(SeedStage& seeds, const Surface& surface, const Rooms& rooms)
+SurfaceStage::SurfaceStage(SeedStage& seeds, const Surface& surface, const Capacities& capacities)
     : seeds_(seeds), surface_(surface), sites_(seeds.device(), seeds.is_double()),
       samples_(seeds.device(), seeds.is_double()),
       domain_(seeds.device(), seeds.is_double(), buffers_, sites_, samples_, seeds.exact),
-      pairs_(seeds.device(), seeds.is_double(), rooms), store_(seeds.device()), polygon_pass_(seeds.device()),
-      batch_pairs_(rooms.batch_pairs) {
+      pairs_(seeds.device(), seeds.is_double(), capacities), store_(seeds.device()), polygon_pass_(seeds.device()),
+      batch_pairs_(capacities.batch_pairs) {
   buffers_.surface = &surface_;
   const double scale = seeds.seeds.scale;
   buffers_.facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, seeds.is_double());
-  if (seeds.has_double_rung()) buffers_.double_facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, true);
+  if (seeds.has_double_rung())
+    buffers_.double_facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, true);
   std::vector<Vec3> points;
   for (const Index v : surface_.used_vertices) points.push_back(surface_.mesh.vertices[v]);
   sites_.set_points(seeds.commands, points, scale);
@@ -39,12 +41,15 @@ void SurfaceStage::record_owners() {
   samples_.record(seeds_.commands, seeds_.seeds, seeds_.neighbours.grid(), seeds_.counters, false);
 }
 
-void SurfaceStage::settle_owners(const Counters& counters) {
-  if (!counters[kLostSites]) return;
-  const std::vector<Index> lost = sites_.lost(seeds_.commands, counters[kLostSites]);
-  std::vector<Vec3> points;
-  for (const Index site : lost) points.push_back(surface_.mesh.vertices[surface_.used_vertices[site]]);
-  sites_.settle(seeds_.commands, lost, seeds_.exact.owners(points));
+void SurfaceStage::find_owners(const std::vector<Vec3>& given) {
+  for (;;) {
+    seeds_.record();
+    record_owners();
+    const Counters counters = seeds_.run_counted();
+    if (!seeds_.keeps_slots(given, counters)) continue;
+    sites_.complete(seeds_.commands, counters[kUncertainOwners], seeds_.exact);
+    return;
+  }
 }
 
 }  // namespace bisector::host

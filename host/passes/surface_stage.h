@@ -9,12 +9,10 @@ namespace bisector::host {
 
 class SurfaceStage {
  public:
-  SurfaceStage(SeedStage& seeds, const Surface& surface, const Rooms& rooms);
+  SurfaceStage(SeedStage& seeds, const Surface& surface, const Capacities& capacities);
 
-  // Records the search for the owners of sites and samples, for seeds that are recorded.
-  void record_owners();
-  // Once that has run: finds those that are lost.
-  void settle_owners(const Counters& counters);
+  // Uploads the seeds that the seed stage has begun with, and finds their lists and the owners of sites and samples.
+  void find_owners(const std::vector<Vec3>& seeds);
   void find_pairs(Certification& certification) { pairs_.run(job(), certification); }
   std::size_t refine(const Buffer& cells, float share, Certification& certification) {
     return pairs_.refine(job(), cells, share, certification);
@@ -22,9 +20,9 @@ class SurfaceStage {
   void polygons(RestrictedPolygons& polygons) { polygon_pass_.run(pairs_, job(), domain_, polygons); }
 
   const PairStore& store() const { return store_; }
-  const Surface& surface() const { return surface_; }
 
  private:
+  void record_owners();
   PairJob job() {
     return {seeds_.commands, seeds_.seeds, seeds_.neighbours, seeds_.scan, seeds_.counters, store_, domain_};
   }

@@ -3,25 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mesh/tet_adjacency.h"
 #include "host/passes/packing.h"
+#include "kernels/layout/pairs.h"
+#include "mesh/tet_adjacency.h"
 
 namespace bisector::host {
 namespace {
 
-constexpr std::uint32_t kWidePlanes = 64;
+constexpr uint kWidePlanes = 64;  // of a polyhedron, on the rungs after the first
 
-struct StartPush {
-  std::uint32_t first_tet, tet_count, proposal_room;
-};
-struct ShellPush {
-  std::uint32_t pair_count, cell_count, proposal_room;
-};
+static_assert(kFacetLabel == LAYOUT_BORDER_LABEL);
 
-std::uint32_t word(std::size_t n) { return static_cast<std::uint32_t>(n); }
+uint word(std::size_t n) { return static_cast<uint>(n); }
 
-// Cells that a tetrahedron meets, of `density` per volume: those balls of a cell's volume that do, by Steiner's formula, edges being
-// as sharp as a regular one's.
+// Cells that a tetrahedron meets, of `density` per volume: those balls of a cell's volume that do, by Steiner's
+// formula, edges being as sharp as a regular one's.
 double expected_cells(const TetFrame& tet, double volume, double density) {
   double area = 0, length = 0;
   for (int k = 0; k < 4; ++k) {
@@ -71,32 +67,33 @@ void TetPairs::set_shell(const PairStore& pairs, const CellMoments& moments, std
 
 void TetPairs::start(const PairJob& job, const PairBuffers& buffers, std::size_t index) {
   const Batch& batch = batches_[index];
-  const StartPush push{word(batch.first), word(batch.count), word(buffers.proposal_room)};
-  job.commands.dispatch({"start_tets", {!inner_whole_}},
-                        {updates(solid_.meta), reads(corners_.owners()), updates(buffers.proposals), updates(job.counters)},
-                        push, batch.count);
+  const StartTetsPush push{word(batch.first), word(batch.count), word(buffers.proposal_capacity)};
+  job.commands.dispatch(
+      {"start_tets", {!inner_whole_}},
+      {updates(solid_.meta), reads(corners_.owners()), updates(buffers.proposals), updates(job.counters)}, push,
+      batch.count);
   if (!inner_whole_) return;
-  const ShellPush shell{word(shell_->count), word(job.seeds.count()), word(buffers.proposal_room)};
-  job.commands.dispatch({"start_shell", {}},
-                        {reads(shell_->pairs), reads(shell_->status), reads(solid_.tet_of_facet), updates(buffers.doubts),
-                         updates(buffers.proposals), updates(job.counters)},
+  const StartBoundaryPush shell{word(shell_->count), word(job.seeds.count()), word(buffers.proposal_capacity)};
+  job.commands.dispatch({"start_boundary", {}},
+                        {reads(shell_->pairs), reads(shell_->status), reads(solid_.tet_of_facet),
+                         updates(buffers.cell_errors), updates(buffers.proposals), updates(job.counters)},
                         shell, shell_->count);
 }
 
 void TetPairs::clip(const PairJob& job, const PairBuffers& buffers, std::size_t, const ClipKind& kind, ClipPush push,
                     const Buffer& labels, const ClipDispatch& dispatch) {
-  const bool doubled = kind.rung == 2;
+  const bool doubled = kind.rung == kRungDouble;
   push.element_base = solid_.enclosure();
-  const std::uint32_t planes = kind.labels || kind.rung == 0 ? kMostPlanes : kWidePlanes;
+  const std::uint32_t planes = kind.labels || kind.rung == kRungFirst ? kMostPlanes : kWidePlanes;
   const PairStore& store = job.store;
   dispatch(kernel("clip_tet", double_ || doubled,
                   {planes, 2 * planes - 4, solid_.solid.density.empty(), kind.rung, kind.listed, kind.labels, doubled,
                    !doubled && double_next(), inner_whole_}),
            {reads(doubled ? job.seeds.doubles : job.seeds.words), reads(job.seeds.ids),
             reads(doubled ? solid_.double_words : solid_.words), reads(solid_.meta), reads(job.neighbours.info()),
-            updates(buffers.doubts), reads(job.neighbours.lists()), reads(job.neighbours.wide_lists()), reads(store.pairs),
-            updates(store.status), updates(store.mass_second), updates(store.first), updates(buffers.proposals),
-            updates(job.counters), updates(buffers.flagged), writes(labels)},
+            updates(buffers.cell_errors), reads(job.neighbours.lists()), reads(job.neighbours.wide_lists()),
+            reads(store.pairs), updates(store.status), updates(store.mass_second), updates(store.first),
+            updates(buffers.proposals), updates(job.counters), updates(buffers.flagged), writes(labels)},
            push);
 }
 

@@ -10,9 +10,10 @@ namespace bisector::host {
 
 class TetPairs : public PairDomain {
  public:
-  // With `inner_whole` cells that do not meet the boundary are pairs of the enclosure, and pairs start from those of the boundary;
-  // else they start from the owners of the vertices.
-  TetPairs(bool is_double, DeviceSolid& solid, const OwnerPass& corners, ExactRung& exact, bool inner_whole, double batch_pairs);
+  // With `inner_whole` cells that do not meet the boundary are pairs of the enclosure, and pairs start from those of
+  // the boundary; else they start from the owners of the vertices.
+  TetPairs(bool is_double, DeviceSolid& solid, const OwnerPass& corners, ExactRung& exact, bool inner_whole,
+           double batch_pairs);
 
   // The pairs of the boundary's facets, and the triangles of each of the `cells` cells.
   void set_shell(const PairStore& pairs, const CellMoments& moments, std::size_t cells);

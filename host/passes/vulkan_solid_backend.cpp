@@ -1,19 +1,14 @@
 #include "host/passes/vulkan_solid_backend.h"
 
-#include <chrono>
-#include <cmath>
-
 #include "backend/cpu_backend.h"
+#include "core/stopwatch.h"
 #include "host/passes/cell_pass.h"
+#include "host/passes/device_backend.h"
 #include "host/passes/polyhedra_pass.h"
 #include "host/passes/surface_stage.h"
 
 namespace bisector::host {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 Box box_of(const Solid& solid) {
   std::vector<Vec3> points(solid.enclosure.begin(), solid.enclosure.end());
@@ -21,27 +16,24 @@ Box box_of(const Solid& solid) {
   return bounding_box(points);
 }
 
-class VulkanSolidBackend : public SolidBackend {
+class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
  public:
-  VulkanSolidBackend(const Solid& solid, std::unique_ptr<Device> device, const VulkanOptions& options,
+  VulkanSolidBackend(const Solid& solid, std::shared_ptr<Device> device, const VulkanOptions& options,
                      const Precisions& precisions, InnerCells inner);
 
-  BackendDescription description() const override { return stage_.description(); }
-  double mass_tolerance() const override { return double_ ? 1e-12 : 1e-6; }
-  // Energies are sums of terms that are off by a few units of 2^-24 each, mostly at random.
-  double energy_noise() const override { return double_ ? 0 : 1e-7; }
-
  private:
-  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  DeviceWork compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
   void find_owners(const std::vector<Vec3>& seeds);
+  void find_boundary_moments(CellMoments& boundary, Certification& certification);
+  void find_moments(CellMoments& moments, Certification& certification);
   PairJob job() {
     return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.scan, stage_.counters, store_, tets_};
   }
 
-  bool double_;
-  SeedStage stage_;
+  // The solid's boundary.
   SurfaceStage shell_;
   CellPass shell_cells_;
+  // Its inside.
   DeviceSolid device_solid_;
   OwnerPass corners_;
   TetPairs tets_;
@@ -49,20 +41,20 @@ class VulkanSolidBackend : public SolidBackend {
   PairStore store_;
   CellPass cells_;
   PolyhedraPass polyhedra_;
-  CpuSolidBackend cpu_;
 };
 
-VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::unique_ptr<Device> device, const VulkanOptions& options,
+VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Device> device, const VulkanOptions& options,
                                        const Precisions& precisions, InnerCells inner)
-    : SolidBackend(solid), double_(precisions.is_double),
-      stage_(std::move(device), precisions, options.neighbours, device_scale(solid), box_of(solid), true),
-      shell_(stage_, solid.boundary, options.rooms), shell_cells_(stage_.device(), double_, false),
-      device_solid_(stage_.device(), stage_.commands, solid, stage_.seeds.scale, double_, precisions.double_rung),
-      corners_(stage_.device(), double_),
-      tets_(double_, device_solid_, corners_, stage_.exact, inner == InnerCells::whole && solid.density.empty(),
-            options.rooms.batch_pairs),
-      pairs_(stage_.device(), double_, options.rooms), store_(stage_.device()), cells_(stage_.device(), double_, true),
-      polyhedra_(stage_.device()), cpu_(solid, options.neighbours, inner) {
+    : DeviceBackend(solid, std::move(device), precisions, options.neighbours, device_scale(solid), box_of(solid), true,
+                    inner),
+      shell_(stage_, solid.boundary, options.capacities), shell_cells_(stage_.device(), stage_.is_double(), false),
+      device_solid_(stage_.device(), stage_.commands, solid, stage_.seeds.scale, stage_.is_double(),
+                    precisions.double_rung),
+      corners_(stage_.device(), stage_.is_double()),
+      tets_(stage_.is_double(), device_solid_, corners_, stage_.exact,
+            inner == InnerCells::whole && solid.density.empty(), options.capacities.batch_pairs),
+      pairs_(stage_.device(), stage_.is_double(), options.capacities), store_(stage_.device()),
+      cells_(stage_.device(), stage_.is_double(), true), polyhedra_(stage_.device()) {
   std::vector<Index> triangles, places;
   for (const FacetSummary& summary : solid.boundary.summaries) triangles.push_back(summary.triangle);
   shell_cells_.set_elements(stage_.commands, triangles, solid.boundary.facet_of.size());
@@ -75,76 +67,57 @@ VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::unique_ptr<Devic
   stage_.commands.run();
 }
 
-void VulkanSolidBackend::find_owners(const std::vector<Vec3>& given) {
-  for (;;) {
-    stage_.record();
-    shell_.record_owners();
-    const Counters counters = stage_.run_counted();
-    if (!stage_.settle(given, counters)) continue;
-    shell_.settle_owners(counters);
-    break;
-  }
-  if (stage_.sorted_anew()) corners_.forget();
-  stage_.commands.fill(stage_.counters, kLostSites * sizeof(std::uint32_t), sizeof(std::uint32_t), 0);
-  corners_.record(stage_.commands, stage_.seeds, stage_.neighbours.grid(), stage_.counters, true);
-  const Counters counters = stage_.run_counted();
-  if (!counters[kLostSites]) return;
-  const std::vector<Index> lost = corners_.lost(stage_.commands, counters[kLostSites]);
-  std::vector<Vec3> points;
-  for (const Index corner : lost) points.push_back(solid().mesh.vertices[device_solid_.vertices[corner]]);
-  corners_.settle(stage_.commands, lost, stage_.exact.owners(points));
-}
-
-EvaluationReport VulkanSolidBackend::compute(const std::vector<Vec3>& given, Want want, Diagram& diagram) {
+DeviceWork VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   CellMoments& moments = diagram.moments;
-  if (!stage_.within_reach(given)) {
-    EvaluationReport report = cpu_.evaluate(given, want, diagram);
-    report.certification.cpu = report.certification.pairs;
-    return report;
-  }
-  stage_.begin(given);
-  const Clock::time_point searching = Clock::now();
-  find_owners(given);
-  const double searched = seconds_since(searching);
+  DeviceWork work;
+  Stopwatch watch;
+  find_owners(seeds);
+  work.searched = watch.lap();
 
-  const Clock::time_point pairing = Clock::now();
-  Certification certification;
   CellMoments shell;
-  shell_.find_pairs(certification);
-  shell_cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, shell_.store());
-  shell_cells_.sum(stage_, shell_.store(), shell);
+  find_boundary_moments(shell, work.certification);
   if (includes(want, Want::polygons)) shell_.polygons(diagram.polygons);
   tets_.set_shell(shell_.store(), shell, stage_.seeds.count());
-  const double paired = seconds_since(pairing);
+  work.paired = watch.lap();
 
-  const Clock::time_point clipping = Clock::now();
+  find_moments(moments, work.certification);
+  moments.triangles = std::move(shell.triangles);
+  stage_.set_step_masses(moments);
+  work.clipped = watch.lap();
+  if (includes(want, Want::polyhedra)) polyhedra_.run(pairs_, job(), tets_, stage_.exact, diagram.polyhedra);
+  return work;
+}
+
+void VulkanSolidBackend::find_owners(const std::vector<Vec3>& seeds) {
+  shell_.find_owners(seeds);
+  if (stage_.sorted_anew()) corners_.forget();
+  stage_.commands.fill(stage_.counters, kUncertainOwners * sizeof(uint), sizeof(uint), 0);
+  corners_.record(stage_.commands, stage_.seeds, stage_.neighbours.grid(), stage_.counters, true);
+  const Counters counters = stage_.run_counted();
+  corners_.complete(stage_.commands, counters[kUncertainOwners], stage_.exact);
+}
+
+void VulkanSolidBackend::find_boundary_moments(CellMoments& boundary, Certification& certification) {
+  shell_.find_pairs(certification);
+  shell_cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, shell_.store());
+  shell_cells_.sum(stage_, shell_.store(), boundary);
+}
+
+void VulkanSolidBackend::find_moments(CellMoments& moments, Certification& certification) {
   pairs_.run(job(), certification);
   cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, store_);
   const auto sum = [&] { cells_.sum(stage_, store_, moments); };
   sum();
-  if (!double_) {
-    // If all masses still do not add up, what is left to doubt climbs too, and in the end everything.
-    for (const float share : {1.0f, 0.05f, 0.0f}) {
-      if (pairs_.refine(job(), cells_.cells(), share, certification) > 0) sum();
-      if (std::abs(moments.mass - mass()) <= mass_tolerance() * mass()) break;
-    }
+  if (!stage_.is_double()) {
+    const auto refine = [&](float share) { return pairs_.refine(job(), cells_.cells(), share, certification); };
+    refine_masses(mass(), moments, refine, sum);
   }
   certification.pairs = moments.triangles.values.size();
-  moments.triangles = std::move(shell.triangles);
-  stage_.set_step_masses(moments);
-  DiagramSeconds seconds;
-  (stage_.delaunay() ? seconds.delaunay : seconds.neighbours) = stage_.lists_seconds();
-  seconds.neighbours += searched;
-  seconds.pairs = paired;
-  seconds.clip = seconds_since(clipping);
-  if (includes(want, Want::polyhedra)) polyhedra_.run(pairs_, job(), tets_, stage_.exact, diagram.polyhedra);
-  seconds.device = stage_.take_seconds();
-  return {certification, seconds};
 }
 
 }  // namespace
 
-std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid& solid, std::unique_ptr<Device> device,
+std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid& solid, std::shared_ptr<Device> device,
                                                         const VulkanOptions& options, InnerCells inner) {
   const Precisions precisions = choose_precisions(*device, options.precision, options.double_rung);
   return std::make_unique<VulkanSolidBackend>(solid, std::move(device), options, precisions, inner);

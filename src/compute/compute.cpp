@@ -4,9 +4,9 @@
 
 #include <utility>
 
-#include "bisector/error.h"
 #include "backend/cpu_backend.h"
 #include "backend/fallback_backend.h"
+#include "bisector/error.h"
 #include "host/device/ranking.h"
 #include "host/passes/vulkan_backend.h"
 #include "host/passes/vulkan_solid_backend.h"
@@ -22,16 +22,17 @@ std::unique_ptr<SolidBackend> cpu_backend(const Solid& solid, NeighbourSource so
   return std::make_unique<CpuSolidBackend>(solid, source, InnerCells::whole, std::move(fallback));
 }
 
-std::unique_ptr<Backend> device_backend(const Surface& surface, const DeviceRequest& device,
+std::unique_ptr<Backend> device_backend(const Surface& surface, std::shared_ptr<host::Device> device,
                                         const host::VulkanOptions& options) {
-  return host::make_vulkan_backend(surface, host::Device::open(device), options);
+  return host::make_vulkan_backend(surface, std::move(device), options);
 }
-std::unique_ptr<SolidBackend> device_backend(const Solid& solid, const DeviceRequest& device,
+std::unique_ptr<SolidBackend> device_backend(const Solid& solid, std::shared_ptr<host::Device> device,
                                              const host::VulkanOptions& options) {
-  return host::make_vulkan_solid_backend(solid, host::Device::open(device), options);
+  return host::make_vulkan_solid_backend(solid, std::move(device), options);
 }
 
-std::unique_ptr<Backend> with_fallback(std::unique_ptr<Backend> device, NeighbourSource source, const Context& context) {
+std::unique_ptr<Backend> with_fallback(std::unique_ptr<Backend> device, NeighbourSource source,
+                                       const Context& context) {
   return std::make_unique<FallbackBackend>(std::move(device), source, context);
 }
 std::unique_ptr<SolidBackend> with_fallback(std::unique_ptr<SolidBackend> device, NeighbourSource source,
@@ -39,52 +40,14 @@ std::unique_ptr<SolidBackend> with_fallback(std::unique_ptr<SolidBackend> device
   return std::make_unique<FallbackSolidBackend>(std::move(device), source, context);
 }
 
-template <class Domain>
-auto make_cpu_backend(const Domain& domain, const ComputeOptions& options) {
-  if (options.precision == Precision::single)
+void check_cpu_precision(Precision precision) {
+  if (precision == Precision::single)
     throw Error("the CPU computes in double precision only", Reason::no_single_precision);
-  return cpu_backend(domain, options.neighbours, {});
-}
-
-template <class Domain>
-auto make_device_backend(const Domain& domain, const DeviceRequest& device, const ComputeOptions& options) {
-  host::VulkanOptions vulkan;
-  vulkan.precision = options.precision;
-  vulkan.neighbours = options.neighbours;
-  return device_backend(domain, device, vulkan);
-}
-
-// The best GPU for as long as it works.
-template <class Domain>
-auto make_best_backend(const Domain& domain, const ComputeOptions& options, const Context& context) {
-  const DeviceList list = list_devices();
-  std::string failure;
-  if (const auto gpu = best_gpu(list, options.precision)) {
-    try {
-      return with_fallback(make_device_backend(domain, *gpu, options), options.neighbours, context);
-    } catch (const DeviceError& error) {
-      failure = error.what();
-    }
-  } else if (const auto other = best_gpu(list)) {
-    failure = fmt::format("{}: the device has no double precision", word_of(*other));
-  } else {
-    return make_cpu_backend(domain, options);
-  }
-  context.warn("computing on the CPU because of this: " + failure);
-  return cpu_backend(domain, options.neighbours, failure);
-}
-
-template <class Domain>
-auto make_backend_for(const Domain& domain, const ComputeOptions& options, const Context& context) {
-  switch (options.device.kind) {
-    case DeviceRequest::Kind::automatic: return make_best_backend(domain, options, context);
-    case DeviceRequest::Kind::cpu: return make_cpu_backend(domain, options);
-    case DeviceRequest::Kind::vulkan: break;
-  }
-  return make_device_backend(domain, options.device, options);
 }
 
 }  // namespace
+
+DeviceList list_devices() { return host::list_devices(); }
 
 std::optional<DeviceRequest> best_gpu(DeviceList list, Precision precision) {
   if (precision == Precision::double_)
@@ -94,12 +57,65 @@ std::optional<DeviceRequest> best_gpu(DeviceList list, Precision precision) {
   return DeviceRequest{.kind = DeviceRequest::Kind::vulkan, .index = best->index};
 }
 
+Compute::Compute(const ComputeOptions& options, const Context& context) : options_(options), context_(context) {
+  switch (options_.device.kind) {
+    case DeviceRequest::Kind::automatic: choose_best(); break;
+    case DeviceRequest::Kind::cpu: check_cpu_precision(options_.precision); break;
+    case DeviceRequest::Kind::vulkan: device_ = options_.device; break;
+  }
+}
+
+void Compute::choose_best() {
+  const DeviceList list = list_devices();
+  device_ = best_gpu(list, options_.precision);
+  if (device_) return;
+  const std::optional<DeviceRequest> other = best_gpu(list);
+  if (!other) return check_cpu_precision(options_.precision);
+  failure_ = fmt::format("{}: the device has no double precision", word_of(*other));
+}
+
+template <class Domain>
+auto Compute::make_on_device(const Domain& domain) {
+  host::VulkanOptions vulkan;
+  vulkan.precision = options_.precision;
+  vulkan.neighbours = options_.neighbours;
+  if (opened_) try {
+      return device_backend(domain, opened_, vulkan);
+    } catch (const DeviceError&) {
+      // The device may have been lost to another backend; it is opened anew.
+    }
+  opened_ = host::Device::open(*device_);
+  return device_backend(domain, opened_, vulkan);
+}
+
+template <class Domain>
+auto Compute::make(const Domain& domain) {
+  if (device_ && options_.device.kind == DeviceRequest::Kind::vulkan) return make_on_device(domain);
+  std::string failure = failure_;
+  if (device_) try {
+      return with_fallback(make_on_device(domain), options_.neighbours, context_);
+    } catch (const DeviceError& error) {
+      failure = error.what();
+    }
+  if (!failure.empty()) warn(failure);
+  return cpu_backend(domain, options_.neighbours, failure);
+}
+
+void Compute::warn(const std::string& failure) {
+  if (failure == warned_) return;
+  warned_ = failure;
+  context_.warn("computing on the CPU because of this: " + failure);
+}
+
+std::unique_ptr<Backend> Compute::backend(const Surface& surface) { return make(surface); }
+std::unique_ptr<SolidBackend> Compute::backend(const Solid& solid) { return make(solid); }
+
 std::unique_ptr<Backend> make_backend(const Surface& surface, const ComputeOptions& options, const Context& context) {
-  return make_backend_for(surface, options, context);
+  return Compute(options, context).backend(surface);
 }
 
 std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const ComputeOptions& options, const Context& context) {
-  return make_backend_for(solid, options, context);
+  return Compute(options, context).backend(solid);
 }
 
 }  // namespace bisector

@@ -84,7 +84,8 @@ TEST_F(CacheFile, IsIgnoredIfDamaged) {
 
 TEST_F(CacheFile, IsIgnoredIfAnothersOrNoFile) {
   ASSERT_TRUE(store_cache(path, kOwner, {1, 2, 3}));
-  for (const CacheOwner& other : {CacheOwner{9, 2, 3, {4, 5, 6}}, {1, 9, 3, {4, 5, 6}}, {1, 2, 9, {4, 5, 6}}, {1, 2, 3, {}}}) {
+  for (const CacheOwner& other :
+       {CacheOwner{9, 2, 3, {4, 5, 6}}, {1, 9, 3, {4, 5, 6}}, {1, 2, 9, {4, 5, 6}}, {1, 2, 3, {}}}) {
     EXPECT_TRUE(load_cache(path, other).empty());
   }
   EXPECT_TRUE(load_cache(folder, kOwner).empty());

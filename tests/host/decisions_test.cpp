@@ -22,13 +22,14 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "host/device/commands.h"
+#include "host/device/modules.h"
+#include "host/passes/device_surface.h"
+#include "host/passes/packing.h"
+#include "kernels/layout/push.h"
+#include "support/models.h"
 #include "voronoi/exact.h"
 #include "voronoi/surface.h"
-#include "host/device/commands.h"
-#include "host/passes/device_surface.h"
-#include "host/device/modules.h"
-#include "host/passes/packing.h"
-#include "support/models.h"
 
 namespace bisector::host {
 
@@ -57,13 +58,13 @@ enum class Directions {
 
 struct Family {
   const char* name;
-  double scale = 1;                    // of all lengths
-  double offset = 0;                   // from the origin, in sizes of the surface
-  std::array<double, 2> facet{-2, 0};  // decimal logarithms: size of the facet in that of the surface,
-  std::array<double, 2> cell{-1, 0};   // distance of the seeds in that of the facet,
+  double scale = 1;                     // of all lengths
+  double offset = 0;                    // from the origin, in sizes of the surface
+  std::array<double, 2> facet{-2, 0};   // decimal logarithms: size of the facet in that of the surface,
+  std::array<double, 2> cell{-1, 0};    // distance of the seeds in that of the facet,
   std::array<double, 2> thin{-0.5, 0};  // and height of the facet over its length
   Directions directions = Directions::spread;
-  double lift = 0;                     // share of problems whose seeds are straight over the facet
+  double lift = 0;  // share of problems whose seeds are straight over the facet
 };
 
 const std::vector<Family>& families() {
@@ -86,7 +87,11 @@ const std::vector<Family>& families() {
       {.name = "remote", .offset = 1e6, .facet = {-3, 0}, .cell = {-3, 0}, .lift = 0.2},
       {.name = "remote_steep", .offset = 1e6, .facet = {-1, 0}, .cell = {-2, 0}, .directions = Directions::steep},
       {.name = "remote_upright", .offset = 1e6, .facet = {-1, 0}, .cell = {-2, 0}, .directions = Directions::upright},
-      {.name = "remote_clusters", .offset = 1e6, .facet = {-1, 0}, .cell = {-1, 0}, .directions = Directions::clustered},
+      {.name = "remote_clusters",
+       .offset = 1e6,
+       .facet = {-1, 0},
+       .cell = {-1, 0},
+       .directions = Directions::clustered},
       {.name = "remote_needles", .scale = 1e-6, .offset = 1e5, .cell = {-2, 0}, .thin = {-6, -1}},
   };
   return all;
@@ -99,7 +104,9 @@ Vec3 direction(SplitMix64& random) {
     if (const Vec3 p = random_point(random); norm2(p) > 0.01 && norm2(p) <= 1) return (1 / norm(p)) * p;
 }
 
-double power(SplitMix64& random, const std::array<double, 2>& range) { return std::pow(10, random.range(range[0], range[1])); }
+double power(SplitMix64& random, const std::array<double, 2>& range) {
+  return std::pow(10, random.range(range[0], range[1]));
+}
 
 // 0 one time in eight, else of either sign and of any magnitude from 1e-17 to 0.1.
 double imbalance(SplitMix64& random) {
@@ -255,9 +262,9 @@ struct Batch {
   const Family* family = nullptr;
   std::vector<Problem> problems;
   std::vector<Corner> kinds;
-  std::vector<Index> ids;                      // of the seeds
-  std::vector<std::array<Index, 4>> corners;   // facet, slot, labels; facet kNone: to be left out
-  std::vector<Row> shares;                     // the corner in barycentric coordinates, up to a factor
+  std::vector<Index> ids;                     // of the seeds
+  std::vector<std::array<Index, 4>> corners;  // facet, slot, labels; facet kNone: to be left out
+  std::vector<Row> shares;                    // the corner in barycentric coordinates, up to a factor
 };
 
 constexpr std::size_t kBatch = 1 << 15;
@@ -280,30 +287,33 @@ Batch make_batch(const Family& family, std::uint64_t number) {
   batch.corners.assign(kBatch, {kNone, 0, 0, 0});
   batch.shares.resize(kBatch);
   for (std::size_t s = 0; s < kBatch * kSeeds; ++s) batch.ids.push_back(static_cast<Index>(s * 0x9e3779b1u));
-  parallel_each(kBatch, [&](std::size_t i) {
-    SplitMix64 random((number << 32) + i);
-    Corner& kind = batch.kinds[i];
-    kind.edges = static_cast<int>((random.below(7) + 1) / 3);  // 0: 2/7, 1: 3/7, 2: 2/7
-    kind.edge = static_cast<unsigned char>(random.below(3));
-    batch.problems[i] = make_problem(random, family, kind);
-    const auto slot = static_cast<Index>(kSeeds * i);
-    Index before = slot + 1, after = slot + 2;
-    if (kind.edges) after = kEdgeLabel | kind.edge;
-    if (kind.edges == 2) before = kEdgeLabel | (kind.edge + 2u) % 3;
-    const ExactFrame frame = frame_of(batch, i);
-    Row shares = cross(row_of(frame, line_of(batch, i, before)), row_of(frame, line_of(batch, i, after)));
-    long double sum = shares[0].value + shares[1].value + shares[2].value;
-    if (sum < 0) {
-      std::swap(before, after);
-      sum = -sum;
-      for (Approximate& s : shares) s.value = -s.value;
-    }
-    // The clipping only meets corners on the facet.
-    for (const Approximate& s : shares)
-      if (!(s.value >= -1e-3L * sum)) return;
-    batch.corners[i] = {0, slot, before, after};
-    batch.shares[i] = shares;
-  }, 256);
+  parallel_each(
+      kBatch,
+      [&](std::size_t i) {
+        SplitMix64 random((number << 32) + i);
+        Corner& kind = batch.kinds[i];
+        kind.edges = static_cast<int>((random.below(7) + 1) / 3);  // 0: 2/7, 1: 3/7, 2: 2/7
+        kind.edge = static_cast<unsigned char>(random.below(3));
+        batch.problems[i] = make_problem(random, family, kind);
+        const auto slot = static_cast<Index>(kSeeds * i);
+        Index before = slot + 1, after = slot + 2;
+        if (kind.edges) after = kEdgeLabel | kind.edge;
+        if (kind.edges == 2) before = kEdgeLabel | (kind.edge + 2u) % 3;
+        const ExactFrame frame = frame_of(batch, i);
+        Row shares = cross(row_of(frame, line_of(batch, i, before)), row_of(frame, line_of(batch, i, after)));
+        long double sum = shares[0].value + shares[1].value + shares[2].value;
+        if (sum < 0) {
+          std::swap(before, after);
+          sum = -sum;
+          for (Approximate& s : shares) s.value = -s.value;
+        }
+        // The clipping only meets corners on the facet.
+        for (const Approximate& s : shares)
+          if (!(s.value >= -1e-3L * sum)) return;
+        batch.corners[i] = {0, slot, before, after};
+        batch.shares[i] = shares;
+      },
+      256);
   return batch;
 }
 
@@ -326,7 +336,7 @@ std::vector<double> widened(const std::vector<std::byte>& bytes, bool is_double)
   return reals;
 }
 
-// All as host/vulkan_backend.cpp does it.
+// All as host/passes/vulkan_backend.cpp does it.
 Answers ask(Device& device, const Surface& surface, const Batch& batch, bool is_double) {
   Commands commands(device);
   const double scale = device_scale(surface);
@@ -357,8 +367,8 @@ Answers ask(Device& device, const Surface& surface, const Batch& batch, bool is_
   places.reserve(bytes.size());
   const DecisionPush push{0, is_double ? 0 : residual_of(largest * scale), kBatch};
   commands.dispatch(kernel("decisions", is_double),
-                    {reads(seeds), reads(id_words), reads(facets[0].words), reads(facets[0].meta), reads(corners), writes(sides),
-                     writes(places)},
+                    {reads(seeds), reads(id_words), reads(facets[0].words), reads(facets[0].meta), reads(corners),
+                     writes(sides), writes(places)},
                     push, kBatch);
   Answers answers;
   answers.sides.resize(kBatch * kTested);
@@ -375,8 +385,9 @@ Answers ask(Device& device, const Surface& surface, const Batch& batch, bool is_
 struct Tally {
   std::size_t corners = 0, uncertain_corners = 0, beyond = 0;
   std::size_t decisions = 0, unsure = 0, ties = 0, wrong = 0, exact = 0;
-  double worst = 0;         // error of a corner over its slack, where lines were met
-  double tightest = 1e300;  // distance of the exact corner from a bisector over the error of the product that certifies it
+  double worst = 0;  // error of a corner over its slack, where lines were met
+  double tightest =
+      1e300;  // distance of the exact corner from a bisector over the error of the product that certifies it
 
   Tally& operator+=(const Tally& b) {
     corners += b.corners, uncertain_corners += b.uncertain_corners, beyond += b.beyond;
@@ -513,12 +524,16 @@ TEST_F(Decisions, AreRightWhereTheyAreCertain) {
         }
     }
   }
-  const auto percent = [](std::size_t a, std::size_t b) { return 100.0 * static_cast<double>(a) / static_cast<double>(b); };
+  const auto percent = [](std::size_t a, std::size_t b) {
+    return 100.0 * static_cast<double>(a) / static_cast<double>(b);
+  };
   const auto show = [&](const std::string& name, const Tally& t, const char* precision) {
-    std::printf("  %-22s %s %9zu decisions: unsure %5.1f%%, ties %5.1f%%, wrong %zu; %8zu corners: %5.1f%% uncertain, beyond %zu, "
-                "error/slack %.3f; margin/bound from %.3f\n",
-                name.c_str(), precision, t.decisions, percent(t.unsure, t.decisions), percent(t.ties, t.decisions), t.wrong,
-                t.corners, percent(t.uncertain_corners, t.corners), t.beyond, t.worst, t.tightest);
+    std::printf(
+        "  %-22s %s %9zu decisions: unsure %5.1f%%, ties %5.1f%%, wrong %zu; %8zu corners: %5.1f%% uncertain, beyond "
+        "%zu, "
+        "error/slack %.3f; margin/bound from %.3f\n",
+        name.c_str(), precision, t.decisions, percent(t.unsure, t.decisions), percent(t.ties, t.decisions), t.wrong,
+        t.corners, percent(t.uncertain_corners, t.corners), t.beyond, t.worst, t.tightest);
   };
   for (std::size_t d = 0; d < 2; ++d) {
     if (d == 1 && !has_double()) break;
@@ -540,10 +555,6 @@ TEST_F(Decisions, AreRightWhereTheyAreCertain) {
 }
 
 // --- Arithmetic ---
-
-struct CountPush {
-  std::uint32_t count;
-};
 
 std::vector<double> compute(Device& device, const RealWords& numbers, std::size_t count, bool is_double) {
   Commands commands(device);
@@ -575,9 +586,15 @@ TEST_F(Decisions, ReciprocalsAreRoundedCorrectly) {
         case 1: m = 2 - std::ldexp(1, -52) - few; break;
         case 2: m = 1 + std::ldexp(1, -1 - static_cast<int>(random.below(52))); break;
         case 3: m = 2 - std::ldexp(1, -static_cast<int>(random.below(52)) - 1); break;
-        case 4: m = 1 + std::ldexp(static_cast<double>(random.below(1 << 26)), -26) + few * static_cast<double>(random.below(2)); break;
+        case 4:
+          m = 1 + std::ldexp(static_cast<double>(random.below(1 << 26)), -26) +
+              few * static_cast<double>(random.below(2));
+          break;
         // Reciprocals of these lie close to half way: m (y + half a place) is near 1.
-        case 5: m = std::min(1.9999999999999998, std::max(1.0, 1 / (0.5 + std::ldexp(static_cast<double>(random.below(1 << 20)), -21)))); break;
+        case 5:
+          m = std::min(1.9999999999999998,
+                       std::max(1.0, 1 / (0.5 + std::ldexp(static_cast<double>(random.below(1 << 20)), -21))));
+          break;
         default: break;
       }
       const int exponent = static_cast<int>(random.below(i % 5 == 0 ? 2001 : 81)) - (i % 5 == 0 ? 1000 : 40);
@@ -588,7 +605,8 @@ TEST_F(Decisions, ReciprocalsAreRoundedCorrectly) {
     for (std::size_t i = 0; i < kRound; ++i) {
       const double right = 1 / given[i];
       if (std::memcmp(&found[i], &right, sizeof right) != 0 && ++different < 5)
-        ADD_FAILURE() << "1 / " << given[i] << " (" << std::hexfloat << given[i] << ") is " << found[i] << ", not " << right;
+        ADD_FAILURE() << "1 / " << given[i] << " (" << std::hexfloat << given[i] << ") is " << found[i] << ", not "
+                      << right;
     }
   }
   EXPECT_EQ(different, 0u);
@@ -624,7 +642,8 @@ TEST_F(Decisions, PairsHoldWhatTheyShould) {
         right += static_cast<long double>(v[k]) * (static_cast<long double>(a[k]) - b[k]);
         largest = std::max(largest, std::abs(a[k] - b[k]));
       }
-      const double error = std::abs(static_cast<double>(found[i] - right)) - 0x1p-23 * std::abs(static_cast<double>(right));
+      const double error =
+          std::abs(static_cast<double>(found[i] - right)) - 0x1p-23 * std::abs(static_cast<double>(right));
       worst = std::max(worst, error / (4e-12 * largest + 4 * residual));
     }
   }
@@ -663,7 +682,8 @@ std::vector<std::string> faults_of(const Module& module) {
       const auto word = [&](std::size_t k) { return module.words[at + k]; };
       if (!arithmetic) {
         if (op == kOpDecorate && word(2) == kNoContraction) exact.insert(word(1));
-        if (op == kOpCapability && word(1) == kFloat64 && module.name.ends_with("_single")) faults.push_back("declares Float64");
+        if (op == kOpCapability && word(1) == kFloat64 && module.name.ends_with("_single"))
+          faults.push_back("declares Float64");
         if (op == 6035 || op == 5614 || op == 5615) faults.push_back("has floating-point atomics");
       } else if (op == kOpExtInst && word(4) == kFma) {
         faults.push_back("calls fma");
@@ -687,14 +707,35 @@ TEST(Modules, ArithmeticIsNotContracted) {
 
 // The check finds what it looks for.
 TEST(Modules, ContractionIsFound) {
-  constexpr std::uint32_t kWords[] = {0x07230203, 0x10500, 0, 9, 0,
-                                      2u << 16 | kOpCapability, kFloat64,
-                                      3u << 16 | kOpDecorate, 3, kNoContraction,
-                                      5u << 16 | 133, 1, 3, 2, 2,   // decorated
-                                      5u << 16 | 129, 1, 4, 3, 2,   // not
-                                      7u << 16 | 6035, 1, 5, 2, 2, 2, 2};
-  EXPECT_EQ(faults_of({"x_single", kWords}),
-            (std::vector<std::string>{"declares Float64", "has floating-point atomics", "OpFAdd %4 may be contracted"}));
+  constexpr std::uint32_t kWords[] = {0x07230203,
+                                      0x10500,
+                                      0,
+                                      9,
+                                      0,
+                                      2u << 16 | kOpCapability,
+                                      kFloat64,
+                                      3u << 16 | kOpDecorate,
+                                      3,
+                                      kNoContraction,
+                                      5u << 16 | 133,
+                                      1,
+                                      3,
+                                      2,
+                                      2,  // decorated
+                                      5u << 16 | 129,
+                                      1,
+                                      4,
+                                      3,
+                                      2,  // not
+                                      7u << 16 | 6035,
+                                      1,
+                                      5,
+                                      2,
+                                      2,
+                                      2,
+                                      2};
+  EXPECT_EQ(faults_of({"x_single", kWords}), (std::vector<std::string>{"declares Float64", "has floating-point atomics",
+                                                                       "OpFAdd %4 may be contracted"}));
   EXPECT_EQ(faults_of({"x_double", kWords}).size(), 2u);
 }
 

@@ -63,8 +63,9 @@ TEST_F(Faults, RejectADeviceInTheList) {
       continue;
     }
     EXPECT_EQ(list.devices.size(), devices);
-    EXPECT_EQ(std::ranges::count_if(list.devices, [](const auto& d) { return d.rejected.find("lost") != d.rejected.npos; }),
-              1);
+    EXPECT_EQ(
+        std::ranges::count_if(list.devices, [](const auto& d) { return d.rejected.find("lost") != d.rejected.npos; }),
+        1);
   }
   inject_fault(Fault::none, 0);
 }

@@ -13,6 +13,7 @@
 
 #include "host/device/commands.h"
 #include "host/device/modules.h"
+#include "kernels/layout/push.h"
 
 namespace bisector::host {
 
@@ -57,10 +58,6 @@ class HostTest : public testing::Test {
   }
 };
 
-struct CountPush {
-  std::uint32_t count;
-};
-
 struct StepPush {
   std::uint32_t count, shift;
 };
@@ -71,7 +68,8 @@ inline void put(Commands& commands, Buffer& buffer, const std::vector<std::uint3
 }
 
 // What kernels/test_step.comp computes.
-inline std::vector<std::uint32_t> step(const std::vector<std::uint32_t>& from, std::uint32_t shift, std::uint32_t factor) {
+inline std::vector<std::uint32_t> step(const std::vector<std::uint32_t>& from, std::uint32_t shift,
+                                       std::uint32_t factor) {
   std::vector<std::uint32_t> to(from.size());
   for (std::uint32_t i = 0; i < to.size(); ++i) to[i] = from[(i + shift) % from.size()] * factor + i;
   return to;

@@ -15,12 +15,12 @@
 #include <string>
 #include <vector>
 
-#include "mesh/tet_adjacency.h"
-#include "voronoi/exact_tet.h"
-#include "host/passes/device_solid.h"
 #include "host/device/modules.h"
+#include "host/passes/device_solid.h"
 #include "host/passes/packing.h"
+#include "mesh/tet_adjacency.h"
 #include "support/models.h"
+#include "voronoi/exact_tet.h"
 
 namespace bisector::host {
 
@@ -42,11 +42,11 @@ struct Family {
   bool grid = false;  // everything at points of a grid, with exact ties
 };
 
-constexpr Family kFamilies[] = {{"cells as large", 1, 1, 0.3, 0},       {"small cells", 0.01, 1, 0.3, 0},
-                                {"tiny cells", 1e-5, 1, 0.3, 0},        {"large cells", 30, 1, 0.3, 0},
-                                {"slivers", 1, 1e-3, 0.3, 0},           {"near ties", 0.3, 1, 1e-5, 0},
-                                {"nearer ties", 0.3, 1, 1e-10, 0},      {"far away", 0.1, 1, 0.1, 1e4},
-                                {"far away, near ties", 0.1, 1, 1e-7, 1e4}, {"grid", 1, 1, 0, 0, true}};
+constexpr Family kFamilies[] = {
+    {"cells as large", 1, 1, 0.3, 0},  {"small cells", 0.01, 1, 0.3, 0}, {"tiny cells", 1e-5, 1, 0.3, 0},
+    {"large cells", 30, 1, 0.3, 0},    {"slivers", 1, 1e-3, 0.3, 0},     {"near ties", 0.3, 1, 1e-5, 0},
+    {"nearer ties", 0.3, 1, 1e-10, 0}, {"far away", 0.1, 1, 0.1, 1e4},   {"far away, near ties", 0.1, 1, 1e-7, 1e4},
+    {"grid", 1, 1, 0, 0, true}};
 
 struct Problems {
   TetMesh mesh;
@@ -114,8 +114,8 @@ Problems make_problems(const Family& family, std::uint64_t number) {
     // Counter-clockwise.
     const double determinant = dot(outward[0], cross(outward[1], outward[2]));
     if (determinant < 0) std::swap(labels[1], labels[2]);
-    problems.left_out.push_back(std::abs(determinant) < 1e-12 * norm(outward[0]) * norm(outward[1]) * norm(outward[2]) ||
-                                determinant == 0);
+    problems.left_out.push_back(
+        std::abs(determinant) < 1e-12 * norm(outward[0]) * norm(outward[1]) * norm(outward[2]) || determinant == 0);
     problems.vertices.insert(problems.vertices.end(), {slot, labels[0], labels[1], labels[2]});
   }
   return problems;
@@ -166,8 +166,8 @@ Answers ask(const Solid& solid, const Problems& problems, bool is_double) {
   places.reserve(bytes.size());
   const VertexPush push{is_double ? 0 : residual_of(largest * scale), static_cast<std::uint32_t>(kProblems)};
   commands.dispatch(kernel("decisions_tet", is_double),
-                    {reads(seeds), reads(id_words), reads(device_solid.words), reads(device_solid.meta), reads(vertices),
-                     writes(sides), writes(places)},
+                    {reads(seeds), reads(id_words), reads(device_solid.words), reads(device_solid.meta),
+                     reads(vertices), writes(sides), writes(places)},
                     push, kProblems);
   commands.download(sides, 0, answers.sides.data(), answers.sides.size() * sizeof(std::int32_t));
   commands.download(places, 0, bytes.data(), bytes.size());

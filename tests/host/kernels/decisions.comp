@@ -14,9 +14,9 @@ layout(std430, binding = 2) readonly buffer Facets { real facet_words[]; };
 layout(std430, binding = 3) readonly buffer FacetMeta { uint facet_meta[]; };
 layout(std430, binding = 4) readonly buffer Corners { uvec4 corners[]; };  // facet, slot, label before, label after
 layout(std430, binding = 5) writeonly buffer Sides { int sides[]; };       // +-1: by the bounds, +-2: a tie, 0: unsure
-layout(std430, binding = 6) writeonly buffer Places { real places[]; };    // the corner and its slack, -1 if it is unsure
+layout(std430, binding = 6) writeonly buffer Places { real places[]; };  // the corner, its slack or -1
 layout(push_constant) uniform Push {
-  uint facet_base;
+  uint element_base;
   float residual;
   uint count;
 };

@@ -12,9 +12,9 @@ layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
 layout(std430, binding = 2) readonly buffer Tets { real tet_words[]; };
 layout(std430, binding = 3) readonly buffer TetMeta { uint tet_meta[]; };
-layout(std430, binding = 4) readonly buffer Vertices { uvec4 vertices[]; };  // slot, then three labels; the tetrahedron has its number
+layout(std430, binding = 4) readonly buffer Vertices { uvec4 vertices[]; };  // slot, three labels
 layout(std430, binding = 5) writeonly buffer Sides { int sides[]; };         // +-1, 0: unsure
-layout(std430, binding = 6) writeonly buffer Places { real places[]; };      // the vertex and its slack, -1 if it is unsure
+layout(std430, binding = 6) writeonly buffer Places { real places[]; };      // the vertex, its slack or -1
 layout(push_constant) uniform Push {
   float residual;
   uint count;

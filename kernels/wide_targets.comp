@@ -8,17 +8,15 @@ layout(std430, binding = 1) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 2) buffer Wide { uint wide[]; };  // per slot: 1 once it is listed
 layout(std430, binding = 3) writeonly buffer Targets { uint targets[]; };
 layout(std430, binding = 4) buffer Counters { uint counters[]; };
-layout(push_constant) uniform Push {
-  uint count;
-  uint room;
-};
-#include "counters.glsl"
+#define PUSH_WIDE_TARGETS
+#include "layout/push.h"
+#include "layout/counters.h"
 
 void main() {
   const uint index = invocation();
-  if (index >= count) return;
+  if (index >= flagged_count) return;
   const uint slot = pairs[flagged[index]].y;
   if (atomicExchange(wide[slot], 1u) != 0) return;
-  const uint at = atomicAdd(counters[kTargetCount], 1u);
-  if (at < room) targets[at] = slot;
+  const uint at = atomicAdd(counters[kWideTargets], 1u);
+  if (at < target_capacity) targets[at] = slot;
 }

@@ -1,0 +1,73 @@
+// What the backends of surfaces and of solids on a device share.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "backend/backend.h"
+#include "host/passes/seed_stage.h"
+
+namespace bisector::host {
+
+// By how much, relative to the whole, rounding may make the sum of all masses miss the domain's, and energies compare
+// wrongly.
+double mass_tolerance_of(bool is_double);
+double energy_noise_of(bool is_double);
+
+// In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs, and more of them
+// for as long as the masses do not add up to `mass`. `refine` does so with a share of the errors that are allowed and
+// returns how many pairs there were; `sum` adds the masses up anew.
+void refine_masses(double mass, const CellMoments& moments, const std::function<std::size_t(float share)>& refine,
+                   const std::function<void()>& sum);
+
+// How a diagram came about: its certification, and the seconds on the host of the search for owners, the pairs of a solid's
+// boundary, and clipping.
+struct DeviceWork {
+  Certification certification;
+  double searched = 0, paired = 0, clipped = 0;
+};
+
+// Base is Backend or SolidBackend, and Cpu the twin on the CPU, which computes what is out of the device's reach.
+template <class Base, class Cpu>
+class DeviceBackend : public Base {
+ public:
+  BackendDescription description() const override { return stage_.description(); }
+  double mass_tolerance() const override { return mass_tolerance_of(stage_.is_double()); }
+  double energy_noise() const override { return energy_noise_of(stage_.is_double()); }
+
+ protected:
+  // `scale` and `box` are the domain's; `cpu` are what Cpu is made of beside the domain and the source.
+  template <class Domain, class... CpuOptions>
+  DeviceBackend(const Domain& domain, std::shared_ptr<Device> device, const Precisions& precisions,
+                NeighbourSource source, double scale, const Box& box, bool in_solid, CpuOptions... cpu)
+      : Base(domain), stage_(std::move(device), precisions, source, scale, box, in_solid),
+        cpu_(domain, source, cpu...) {}
+
+  EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) final {
+    if (!stage_.within_reach(seeds)) {
+      EvaluationReport report = cpu_.evaluate(seeds, want, diagram);
+      report.certification.cpu = report.certification.pairs;
+      return report;
+    }
+    stage_.begin(seeds);
+    const DeviceWork work = compute_on_device(seeds, want, diagram);
+    DiagramSeconds seconds;
+    (stage_.delaunay() ? seconds.delaunay : seconds.neighbours) = stage_.lists_seconds();
+    seconds.neighbours += work.searched;
+    seconds.pairs = work.paired;
+    seconds.clip = work.clipped;
+    seconds.device = stage_.commands.take_seconds();
+    return {work.certification, seconds};
+  }
+  // The seed stage has begun with the seeds.
+  virtual DeviceWork compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
+
+  SeedStage stage_;
+
+ private:
+  Cpu cpu_;
+};
+
+}  // namespace bisector::host

@@ -1,0 +1,27 @@
+// How work is cut up: workgroups, blocks of sums, runs of sorting.
+#ifndef BISECTOR_KERNELS_LAYOUT_SIZES_H
+#define BISECTOR_KERNELS_LAYOUT_SIZES_H
+
+#include "types.h"
+
+LAYOUT_BEGIN
+
+LAYOUT_CONSTANT uint kGroupSize = 64;  // invocations of a workgroup, of every kernel
+
+LAYOUT_CONSTANT uint kScanLane = 16;     // values that one invocation of scan_blocks.comp sums
+LAYOUT_CONSTANT uint kScanBlock = 1024;  // and one workgroup: kGroupSize * kScanLane
+
+// Terms that sum.comp adds in a row, by the CPU's rule of sums (voronoi/fixed_tree_sum.h).
+LAYOUT_CONSTANT uint kSumBlock = 32;
+
+LAYOUT_CONSTANT uint kRadixRun = 64;     // consecutive items that one invocation sorts
+LAYOUT_CONSTANT uint kRadixBits = 4;     // of the key, in one pass
+LAYOUT_CONSTANT uint kRadixDigits = 16;  // 2^kRadixBits
+
+LAYOUT_END
+
+#ifdef __cplusplus
+static_assert(bisector::host::kScanBlock == bisector::host::kGroupSize * bisector::host::kScanLane);
+static_assert(bisector::host::kRadixDigits == 1u << bisector::host::kRadixBits);
+#endif
+#endif
