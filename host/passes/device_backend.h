@@ -22,8 +22,8 @@ double energy_noise_of(bool is_double);
 void refine_masses(double mass, const CellMoments& moments, const std::function<std::size_t(float share)>& refine,
                    const std::function<void()>& sum);
 
-// How a diagram came about: its certification, and the seconds on the host of the search for owners, the pairs of a solid's
-// boundary, and clipping.
+// How a diagram came about: its certification, and the seconds on the host of the search for owners, the pairs of a
+// solid's boundary, and clipping.
 struct DeviceWork {
   Certification certification;
   double searched = 0, paired = 0, clipped = 0;

@@ -15,13 +15,13 @@ namespace host {
 class Device;
 }
 
-// Where a run computes. All backends of a run come from here: the device is chosen and opened once, and stays open for as long as
-// one of them lives. Backends of one device may take turns but not compute at the same time.
+// Where a run computes. All backends of a run come from here: the device is chosen and opened once, and stays open for
+// as long as one of them lives. Backends of one device may take turns but not compute at the same time.
 class Compute {
  public:
-  // Throws Error if the CPU is to compute in single precision. If the request is automatic, a backend whose device fails
-  // is replaced by the CPU: a warning to `context`, whose functions must stay callable, and Backend::description() tell
-  // why.
+  // Throws Error if the CPU is to compute in single precision. If the request is automatic, a backend whose device
+  // fails is replaced by the CPU: a warning to `context`, whose functions must stay callable, and
+  // Backend::description() tell why.
   explicit Compute(const ComputeOptions& options, const Context& context = {});
 
   // A backend for a domain, which must outlive it. Throws DeviceError if an exact request cannot be met.

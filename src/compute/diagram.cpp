@@ -18,7 +18,8 @@ namespace {
 void check_finite(const std::vector<Vec3>& points, const char* kind) {
   for (std::size_t i = 0; i < points.size(); ++i)
     for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(points[i][k])) throw Error(fmt::format("{} {} has a coordinate that is not finite; correct it", kind, i));
+      if (!std::isfinite(points[i][k]))
+        throw Error(fmt::format("{} {} has a coordinate that is not finite; correct it", kind, i));
 }
 
 void check_indices(const TriangleMesh& mesh) {
@@ -54,8 +55,8 @@ Result result_of(const Backend& backend, const EvaluationReport& report, const D
 
 }  // namespace
 
-SurfaceDiagram compute_diagram(const TriangleMesh& mesh, const std::vector<double>& density, const std::vector<Vec3>& seeds,
-                               const DiagramOptions& options, const Context& context) {
+SurfaceDiagram compute_diagram(const TriangleMesh& mesh, const std::vector<double>& density,
+                               const std::vector<Vec3>& seeds, const DiagramOptions& options, const Context& context) {
   check_finite(mesh.vertices, "vertex");
   check_finite(seeds, "seed");
   check_indices(mesh);

@@ -89,8 +89,8 @@ Context collecting(std::vector<std::string>& warnings) {
 
 Vec3 turned(double u, double v) { return {0.8 * u - 0.6 * v, 0.6 * u + 0.8 * v, 0}; }
 
-// Seeds near the unit cube's bottom: few spread ones; a cluster, whose cells need wide lists; squares askew, the corners of which
-// only exact arithmetic tells apart; and squares that are a little off, for double precision.
+// Seeds near the unit cube's bottom: few spread ones; a cluster, whose cells need wide lists; squares askew, the
+// corners of which only exact arithmetic tells apart; and squares that are a little off, for double precision.
 std::vector<Vec3> hard_seeds(const TriangleMesh& mesh, std::size_t spread) {
   SplitMix64 random(31);
   const auto shift = [&](double size) {
@@ -482,7 +482,8 @@ TEST_P(Room, PolygonsWithManyCorners) {
   }
 }
 
-// A cell with twenty thousand neighbours, all of which the clipping has to look at: more steps than some drivers' loops have.
+// A cell with twenty thousand neighbours, all of which the clipping has to look at: more steps than some drivers' loops
+// have.
 TEST_P(Room, CellsWithManyNeighbours) {
   SKIP_WITHOUT_DEVICE(GetParam());
   constexpr int kCount = 20'000;

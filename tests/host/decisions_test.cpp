@@ -1,8 +1,9 @@
-// The error bounds of the kernels against exact arithmetic: no decision that kernels/clipper.glsl holds to be certain is wrong, no
-// corner is farther off than its slack, and arithmetic is what the bounds were derived from. Then what all bounds rest on:
-// that no module lets its arithmetic be fused.
+// The error bounds of the kernels against exact arithmetic: no decision that kernels/clipper.glsl holds to be certain
+// is wrong, no corner is farther off than its slack, and arithmetic is what the bounds were derived from. Then what all
+// bounds rest on: that no module lets its arithmetic be fused.
 //
-// Needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one. BISECTOR_TEST_DECISIONS: how many, 1e7 without it.
+// Needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one. BISECTOR_TEST_DECISIONS: how many, 1e7
+// without it.
 #include <gtest/gtest.h>
 
 #include <algorithm>

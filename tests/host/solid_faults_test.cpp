@@ -1,4 +1,5 @@
-// Failing and poor devices under the backend of solids: a clear error or a counted fallback, never a wrong or partial result.
+// Failing and poor devices under the backend of solids: a clear error or a counted fallback, never a wrong or partial
+// result.
 //
 // Needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one ("vulkan:0") that then must be there.
 #include <gtest/gtest.h>
@@ -54,7 +55,8 @@ std::string message_of(const std::function<void()>& action, Reason reason = Reas
   return {};
 }
 
-// Spread seeds, a cluster, whose cells need wide lists, and a grid, which only exact arithmetic tells from the tetrahedra.
+// Spread seeds, a cluster, whose cells need wide lists, and a grid, which only exact arithmetic tells from the
+// tetrahedra.
 std::vector<Vec3> hard_seeds(const TetMesh& mesh) {
   std::vector<Vec3> seeds = seeds_about(mesh, 60, 0, 61);
   SplitMix64 random(62);
@@ -88,8 +90,8 @@ INSTANTIATE_TEST_SUITE_P(Faults, SolidFaults, testing::Values(Precision::single,
                            return instance.param == Precision::single ? "single" : "double";
                          });
 
-// At a spread of calls, of the making and of an evaluation, the failure leaves as a DeviceError, and behind a fallback the result is
-// the CPU's.
+// At a spread of calls, of the making and of an evaluation, the failure leaves as a DeviceError, and behind a fallback
+// the result is the CPU's.
 TEST_P(SolidFaults, LeaveAsDeviceErrorOrFallBack) {
   SKIP_WITHOUT_DEVICE(processor_of(GetParam()));
   constexpr std::size_t kPoints = 4;

@@ -1,5 +1,5 @@
-// The error bounds of kernels/tet_clipper.glsl against exact arithmetic: no decision that it holds to be certain is wrong, and no
-// vertex is farther off than its slack.
+// The error bounds of kernels/tet_clipper.glsl against exact arithmetic: no decision that it holds to be certain is
+// wrong, and no vertex is farther off than its slack.
 //
 // Needs a Vulkan device or skips what does; BISECTOR_TEST_DEVICE names one.
 #include <gtest/gtest.h>
@@ -246,7 +246,8 @@ TEST_P(TetDecisions, AreRightWhereTheyAreCertain) {
   }
   EXPECT_EQ(wrong, 0u);
   EXPECT_EQ(beyond, 0u);
-  // The test would be void if little were certified, which single precision cannot where all is closer to a tie than its unit.
+  // The test would be void if little were certified, which single precision cannot where all is closer to a tie than
+  // its unit.
   if (is_double || family.grid || family.nearness > 1e-6) {
     EXPECT_GT(certain, kProblems / 8);
   }
