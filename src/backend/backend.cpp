@@ -1,7 +1,6 @@
 #include "backend/backend.h"
 
 #include <stdexcept>
-#include <utility>
 
 #include "bisector/error.h"
 #include "voronoi/dual.h"
@@ -38,34 +37,7 @@ EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Di
   if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
   else diagram.dual = {};
   diagram.has = want | computed;
-  diagram.moments.certification = report.certification;
-  diagram.moments.seconds = report.seconds;
   return report;
-}
-
-void Backend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments) {
-  Diagram diagram;
-  std::swap(diagram.moments, moments);
-  evaluate(seeds, Want::moments, diagram);
-  std::swap(diagram.moments, moments);
-}
-
-void Backend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons) {
-  Diagram diagram;
-  std::swap(diagram.moments, moments);
-  evaluate(seeds, Want::polygons, diagram);
-  std::swap(diagram.moments, moments);
-  polygons = std::move(diagram.polygons);
-}
-
-void Backend::evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons,
-                       ClippedPolyhedra& polyhedra) {
-  Diagram diagram;
-  std::swap(diagram.moments, moments);
-  evaluate(seeds, Want::polygons | Want::polyhedra, diagram);
-  std::swap(diagram.moments, moments);
-  polygons = std::move(diagram.polygons);
-  polyhedra = std::move(diagram.polyhedra);
 }
 
 }  // namespace bisector

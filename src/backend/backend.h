@@ -37,12 +37,6 @@ class Backend {
   // there are no seeds; after a DeviceError neither diagram nor backend are good for anything.
   EvaluationReport evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram);
 
-  // Until every caller holds a Diagram.
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments);
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons);
-  void evaluate(const std::vector<Vec3>& seeds, CellMoments& moments, RestrictedPolygons& polygons,
-                ClippedPolyhedra& polyhedra);
-
  protected:
   explicit Backend(const Surface& surface) : Backend(surface, surface.mass, Want::polygons) {}
   Backend(const Surface& boundary, double mass, Want offers) : surface_(boundary), mass_(mass), offers_(offers) {}

@@ -1,6 +1,5 @@
 #include "check/device_check.h"
 
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -8,6 +7,7 @@
 
 #include "backend/cpu_backend.h"
 #include "compute/compute.h"
+#include "core/stopwatch.h"
 #include "core/random.h"
 #include "cvt/optimise.h"
 #include "mesh/sampling.h"
@@ -192,11 +192,11 @@ std::vector<Vec3> relaxed_points(const TetMesh& mesh, std::size_t count) {
   const Solid solid(mesh);
   CpuSolidBackend cpu(solid, NeighbourSource::nearest);
   std::vector<Vec3> points = random_points(count);
-  CellMoments moments;
+  Diagram diagram;
   for (int step = 0; step < 10; ++step) {
-    cpu.evaluate(points, moments);
+    cpu.evaluate(points, Want::moments, diagram);
     for (std::size_t i = 0; i < count; ++i)
-      if (moments.cells[i].mass > 0) points[i] += (1 / moments.cells[i].mass) * moments.cells[i].first;
+      if (const Moments& cell = diagram.moments.cells[i]; cell.mass > 0) points[i] += (1 / cell.mass) * cell.first;
   }
   return points;
 }
@@ -208,51 +208,37 @@ std::vector<SolidCase> make_solid_cases() {
           {"ring", "grid", ring, grid_points(6)},           {"ring", "vertices", ring, ring.vertices}};
 }
 
-struct Polygons {
-  RestrictedPolygons polygons;
-};
-struct Polyhedra {
-  RestrictedPolygons polygons;
-  ClippedPolyhedra polyhedra;
-};
-
-void evaluate(Backend& backend, const std::vector<Vec3>& seeds, CellMoments& moments, Polygons& cells) {
-  backend.evaluate(seeds, moments, cells.polygons);
-}
-void evaluate(SolidBackend& backend, const std::vector<Vec3>& seeds, CellMoments& moments, Polyhedra& cells) {
-  backend.evaluate(seeds, moments, cells.polygons, cells.polyhedra);
-}
-
-template <class Cells>
 struct Measured {
-  CellMoments moments;
-  Cells cells;
+  Diagram diagram;
+  EvaluationReport report;
   bool repeats = false;
   double seconds = 0;
 };
 
-Parity parity_of(const Measured<Polygons>& a, const Measured<Polygons>& b, const Surface& surface) {
-  return compare(a.moments, a.cells.polygons, b.moments, b.cells.polygons, surface);
+Parity parity_of(const Diagram& a, const Diagram& b, const Surface& surface) {
+  return compare(a.moments, a.polygons, b.moments, b.polygons, surface);
 }
 // The polygons of the boundary count too.
-Parity parity_of(const Measured<Polyhedra>& a, const Measured<Polyhedra>& b, const Solid& solid) {
-  Parity parity = compare(a.moments, a.cells.polyhedra, b.moments, b.cells.polyhedra, solid);
-  parity.same_labels &= a.cells.polygons.labels == b.cells.polygons.labels;
+Parity parity_of(const Diagram& a, const Diagram& b, const Solid& solid) {
+  Parity parity = compare(a.moments, a.polyhedra, b.moments, b.polyhedra, solid);
+  parity.same_labels &= a.polygons.labels == b.polygons.labels;
   return parity;
 }
 
+Want all_parts(const Surface&) { return Want::polygons; }
+Want all_parts(const Solid&) { return Want::polygons | Want::polyhedra; }
+
 // The evaluation that is timed comes after one of fewer seeds, so that neither start-up nor the very same diagram helps
 // it.
-template <class Cells, class Kind>
-Measured<Cells> measure(Kind& backend, const std::vector<Vec3>& seeds) {
-  Measured<Cells> measured;
-  evaluate(backend, seeds, measured.moments, measured.cells);
-  CellMoments other;
-  backend.evaluate({seeds.begin(), seeds.end() - 1}, other);
-  const auto begin = std::chrono::steady_clock::now();
-  backend.evaluate(seeds, other);
-  measured.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  measured.repeats = same_bits(measured.moments, other);
+Measured measure(Backend& backend, const std::vector<Vec3>& seeds, Want parts) {
+  Measured measured;
+  measured.report = backend.evaluate(seeds, parts, measured.diagram);
+  Diagram other;
+  backend.evaluate({seeds.begin(), seeds.end() - 1}, Want::moments, other);
+  const Stopwatch watch;
+  backend.evaluate(seeds, Want::moments, other);
+  measured.seconds = watch.seconds();
+  measured.repeats = same_bits(measured.diagram.moments, other.moments);
   return measured;
 }
 
@@ -281,16 +267,16 @@ struct Check {
   std::vector<Precision> precisions = {};  // known from the first domain on
   std::vector<DeviceCheckRow> rows = {};
 
-  template <class Cells, class Cpu, class Domain, class Problem>
+  template <class Cpu, class Domain, class Problem>
   void run(const Domain& domain, const Problem& problem, std::size_t triangles, std::size_t tets) {
     if (precisions.empty()) precisions = precisions_of(domain, device, asked);
     for (const NeighbourSource source : {NeighbourSource::nearest, NeighbourSource::delaunay}) {
       Cpu cpu(domain, source);
-      const auto expected = measure<Cells>(cpu, problem.seeds);
+      const Measured expected = measure(cpu, problem.seeds, all_parts(domain));
       for (const Precision p : precisions) {
         context.check();
         const auto backend = make_backend(domain, {device, p, source}, context);
-        const auto found = measure<Cells>(*backend, problem.seeds);
+        const Measured found = measure(*backend, problem.seeds, all_parts(domain));
         DeviceCheckRow row{problem.model,
                            problem.seeds_name,
                            source,
@@ -298,8 +284,8 @@ struct Check {
                            triangles,
                            problem.seeds.size(),
                            tets,
-                           parity_of(expected, found, domain),
-                           found.moments.certification,
+                           parity_of(expected.diagram, found.diagram, domain),
+                           found.report.certification,
                            found.repeats,
                            found.seconds,
                            expected.seconds};
@@ -322,11 +308,11 @@ std::vector<DeviceCheckRow> check_device(const DeviceRequest& device, Precision 
   Check check{device, precision, context, done};
   for (Case& test : make_cases()) {
     const Surface surface(std::move(test.mesh));
-    check.run<Polygons, CpuBackend>(surface, test, surface.facets.size(), 0);
+    check.run<CpuBackend>(surface, test, surface.facets.size(), 0);
   }
   for (SolidCase& test : make_solid_cases()) {
     const Solid solid(std::move(test.mesh));
-    check.run<Polyhedra, CpuSolidBackend>(solid, test, solid.boundary.facets.size(), solid.mesh.tets.size());
+    check.run<CpuSolidBackend>(solid, test, solid.boundary.facets.size(), solid.mesh.tets.size());
   }
   return std::move(check.rows);
 }

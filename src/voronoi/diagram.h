@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "bisector/cells.h"
-#include "bisector/device.h"
 #include "core/geometry.h"
 #include "voronoi/moments.h"
 
@@ -20,8 +19,6 @@ struct CellMoments {
   double mass = 0;              // sum over the cells
   double energy = 0;            // sum of the second moments: the CVT energy
   Csr<Index> triangles;         // incident triangles of each cell, of the surface or the solid's boundary, ascending
-  Certification certification;  // as Backend::evaluate() reports it
-  DiagramSeconds seconds;
 };
 
 // How many pairs of a cell and a triangle or tetrahedron there are, and how many took more than the first attempt.

@@ -76,8 +76,8 @@ TEST_F(Compute, CpuOnRequest) {
     EXPECT_EQ(backend->description().fallback, "");
     EXPECT_NE(backend->description().name, "");
     EXPECT_EQ(&backend->surface(), &surface_);
-    const CellMoments moments = evaluate(*backend, seeds_).moments;
-    EXPECT_EQ(moments.certification.cpu, moments.certification.uncertain);
+    const Certification counts = test::evaluated(*backend, seeds_, Want::moments).report.certification;
+    EXPECT_EQ(counts.cpu, counts.uncertain);
   }
   EXPECT_THROW(
       make_backend(surface_, {{.kind = DeviceRequest::Kind::cpu}, Precision::single, NeighbourSource::nearest}), Error);
@@ -167,9 +167,9 @@ TEST_F(Compute, AFailedDeviceIsReplacedOnce) {
   EXPECT_EQ(backend.description().name, "fake");
   EXPECT_TRUE(warnings.empty());
   for (int k = 0; k < 3; ++k) test::expect_same_diagram(evaluate(backend, seeds_), expected);
-  CellMoments moments;
-  backend.evaluate(seeds_, moments);
-  test::expect_same_moments(moments, expected.moments);
+  Diagram last;
+  backend.evaluate(seeds_, Want::moments, last);
+  test::expect_same_moments(last.moments, expected.moments);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find("the device was lost"), std::string::npos) << warnings[0];
   EXPECT_EQ(backend.description().kind, "cpu");
@@ -190,8 +190,8 @@ class BrokenBackend : public CpuBackend {
 TEST_F(Compute, OtherErrorsAreNotTheDevices) {
   FallbackBackend backend(std::make_unique<BrokenBackend>(surface_, NeighbourSource::nearest), NeighbourSource::nearest,
                           {});
-  CellMoments moments;
-  EXPECT_THROW(backend.evaluate(seeds_, moments), Error);
+  Diagram diagram;
+  EXPECT_THROW(backend.evaluate(seeds_, Want::moments, diagram), Error);
   EXPECT_EQ(backend.description().fallback, "");
 }
 

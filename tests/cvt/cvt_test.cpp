@@ -32,9 +32,7 @@ std::vector<double> varied_density(const TriangleMesh& mesh) {
 }
 
 double energy_at(Backend& backend, const std::vector<Vec3>& seeds) {
-  CellMoments moments;
-  backend.evaluate(seeds, moments);
-  return moments.energy;
+  return evaluated(backend, seeds, Want::moments).moments.energy;
 }
 
 double distance_to_surface(const Surface& surface, const Vec3& p) {
@@ -49,8 +47,7 @@ double distance_to_surface(const Surface& surface, const Vec3& p) {
 // Along a direction, central differences converge to the slope with the square of the step.
 void expect_gradient(const Surface& surface, const std::vector<Vec3>& seeds, std::uint64_t random_seed) {
   CpuBackend backend(surface, NeighbourSource::nearest);
-  CellMoments moments;
-  backend.evaluate(seeds, moments);
+  const CellMoments moments = evaluated(backend, seeds, Want::moments).moments;
   SplitMix64 random(random_seed);
   for (int trial = 0; trial < 4; ++trial) {
     std::vector<Vec3> direction(seeds.size());
