@@ -23,16 +23,17 @@ constexpr std::size_t kFewerTriangles = 4;    // triangles of the surface given 
 
 // A solid and what computes its diagrams.
 struct StandIns::Domain {
-  Domain(TetMesh mesh, std::vector<double> density, const ComputeOptions& compute, const Context& context)
-      : solid(std::move(mesh), std::move(density)), backend(make_backend(solid, compute, context)) {}
+  Domain(TetMesh mesh, std::vector<double> density, Compute& compute)
+      : solid(std::move(mesh), std::move(density)), backend(compute.backend(solid)) {}
 
   Solid solid;
   std::unique_ptr<SolidBackend> backend;
 };
 
 StandIns::StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& boundary, const FeatureGraph& features,
-                   const TetOptions& options, const Context& context)
-    : mesh_(mesh), surface_(surface), boundary_(boundary), features_(features), options_(options), context_(context) {}
+                   const TetOptions& options, Compute& compute, const Context& context)
+    : mesh_(mesh), surface_(surface), boundary_(boundary), features_(features), options_(options), compute_(compute),
+      context_(context) {}
 
 StandIns::~StandIns() = default;
 
@@ -57,7 +58,7 @@ std::unique_ptr<StandIns::Domain> StandIns::make_sized(std::size_t count) const 
   target.vertices = count;
   SizedSolid sized = refine_for_sizes(mesh_, surface_, options_.sizing, target);
   std::vector<double> density = sized.volume_density();
-  return std::make_unique<Domain>(std::move(sized.mesh), std::move(density), options_.compute, context_);
+  return std::make_unique<Domain>(std::move(sized.mesh), std::move(density), compute_);
 }
 
 // The inside of a remeshed boundary. There is none where that does not bound a solid, or without TetGen.
@@ -74,7 +75,7 @@ std::unique_ptr<StandIns::Domain> StandIns::make_coarse(std::size_t vertices) co
   const RemeshResult coarse = remesh(boundary_, features_, remeshing, quiet);
   try {
     return std::make_unique<Domain>(tetgen_tets(check_surface(coarse.mesh), {}, quiet).mesh, std::vector<double>{},
-                                    options_.compute, context_);
+                                    compute_);
   } catch (const DeviceError&) {
     throw;
   } catch (const Error&) {

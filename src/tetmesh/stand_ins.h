@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "backend/backend.h"
+#include "compute/compute.h"
 #include "bisector/tetmesh.h"
 
 namespace bisector {
@@ -16,7 +17,7 @@ class StandIns {
   // `mesh` and `surface` are the solid's as given, `boundary` and `features` those of the solid as refined for its
   // sizes. Everything must outlive the object.
   StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& boundary, const FeatureGraph& features,
-           const TetOptions& options, const Context& context);
+           const TetOptions& options, Compute& compute, const Context& context);
   ~StandIns();
 
   // The stand-in for `whole` with `count` of `final_count` sites; null if the solid itself will do. It lasts until the
@@ -34,6 +35,7 @@ class StandIns {
   Backend& boundary_;
   const FeatureGraph& features_;
   const TetOptions& options_;
+  Compute& compute_;
   const Context& context_;
   std::unique_ptr<Domain> domain_;
   bool tried_ = false;  // to make a coarse one

@@ -216,9 +216,10 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   TriangleMesh outside = boundary_of(sized.mesh);
   const Surface boundary(std::move(outside), sized.surface_density());
   const double preparing = watch.seconds();
-  const std::unique_ptr<SolidBackend> backend = make_backend(solid, options.compute, context);
-  const std::unique_ptr<Backend> boundary_backend = make_backend(boundary, options.compute, context);
-  StandIns stand_ins(mesh, surface, *boundary_backend, features, options, context);
+  Compute compute(options.compute, context);
+  const std::unique_ptr<SolidBackend> backend = compute.backend(solid);
+  const std::unique_ptr<Backend> boundary_backend = compute.backend(boundary);
+  StandIns stand_ins(mesh, surface, *boundary_backend, features, options, compute, context);
   const FeatureCurves curves(features, solid.mesh.vertices);
   const std::size_t wanted = options.seeds.empty() ? sized.vertices : options.seeds.size();
   TetRun run{CvtRun(*backend, curves, context), *backend, *boundary_backend, features, sized, options, wanted};
