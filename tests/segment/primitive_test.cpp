@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "bisector/error.h"
@@ -309,7 +310,9 @@ TEST(Classify, QuadricsWithoutPointsAreFinite) {
     const Quadric quadric =
         test::placed(axes, centre, {rank > 0 ? 1.0 : 0.0, rank > 1 ? 0.5 : 0.0, rank > 2 ? 0.3 : 0.0}, 0, c);
     const Primitive found = classify(quadric, centre, 1, 1e-6);
-    for (double x : quadric_of(found)->c) EXPECT_TRUE(std::isfinite(x));
+    const std::optional<Quadric> polynomial = quadric_of(found);
+    ASSERT_TRUE(polynomial.has_value());
+    for (double x : polynomial->c) EXPECT_TRUE(std::isfinite(x));
     for (const Vec3& v :
          {parameters_of(found).centre, parameters_of(found).axis, foot_point(found, random_point(random, 3))})
       EXPECT_TRUE(std::isfinite(norm2(v)));
