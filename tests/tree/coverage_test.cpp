@@ -9,6 +9,7 @@
 #include "bisector/error.h"
 #include "core/parallel.h"
 #include "support/models.h"
+#include "tree/loft.h"
 
 namespace bisector {
 namespace {

@@ -10,6 +10,9 @@
 #include <sstream>
 
 #include "bisector/error.h"
+#include "core/geometry.h"
+#include "tree/bspline.h"
+#include "tree/loft.h"
 
 namespace bisector {
 namespace {

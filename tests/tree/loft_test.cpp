@@ -11,6 +11,7 @@
 #include "core/geometry.h"
 #include "mesh/topology.h"
 #include "support/models.h"
+#include "tree/bspline.h"
 
 namespace bisector {
 namespace {
