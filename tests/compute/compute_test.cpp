@@ -93,9 +93,8 @@ TEST(DeviceWords, AreRequests) {
 }
 
 TEST(DeviceWords, OthersAreErrors) {
-  for (const char* word :
-       {"", "gpu", "CPU", "cpu ", "vulkan:", "vulkan:x", "vulkan:-1", "vulkan:1e3", "vulkan:1 ", "vulkan:1234567890",
-        "vulkann", "vulkan:g0000000-0000-0000-0000-000000000000"}) {
+  for (const char* word : {"", "gpu", "CPU", "cpu ", "vulkan:", "vulkan:x", "vulkan:-1", "vulkan:1e3", "vulkan:1 ",
+                           "vulkan:1234567890", "vulkann", "vulkan:g0000000-0000-0000-0000-000000000000"}) {
     try {
       parse_device(word);
       ADD_FAILURE() << word;
