@@ -7,8 +7,8 @@
 
 #include "backend/cpu_backend.h"
 #include "compute/compute.h"
-#include "core/stopwatch.h"
 #include "core/random.h"
+#include "core/stopwatch.h"
 #include "cvt/optimise.h"
 #include "mesh/sampling.h"
 

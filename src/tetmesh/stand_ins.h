@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "backend/backend.h"
-#include "compute/compute.h"
 #include "bisector/tetmesh.h"
+#include "compute/compute.h"
 
 namespace bisector {
 

@@ -16,9 +16,9 @@ struct CellMoments {
   // The mass, or a quarter of the median mass of the six nearest seeds where that is more: a scale for steps that does
   // not vanish with the cell.
   std::vector<double> step_mass;
-  double mass = 0;              // sum over the cells
-  double energy = 0;            // sum of the second moments: the CVT energy
-  Csr<Index> triangles;         // incident triangles of each cell, of the surface or the solid's boundary, ascending
+  double mass = 0;       // sum over the cells
+  double energy = 0;     // sum of the second moments: the CVT energy
+  Csr<Index> triangles;  // incident triangles of each cell, of the surface or the solid's boundary, ascending
 };
 
 // How many pairs of a cell and a triangle or tetrahedron there are, and how many took more than the first attempt.
