@@ -389,9 +389,9 @@ TEST(WithoutDouble, IsSingleAndUncertainPairsReachTheCpu) {
 
 // --- Too little room ---
 
-class Room : public testing::TestWithParam<Precision> {};
+class Buffers : public testing::TestWithParam<Precision> {};
 
-TEST_P(Room, Grows) {
+TEST_P(Buffers, Grow) {
   SKIP_WITHOUT_DEVICE(GetParam());
   const TriangleMesh mesh = torus(32, 20);
   const Surface surface(mesh);
@@ -421,7 +421,7 @@ TEST_P(Room, Grows) {
   check("all", {100, 16, 16, 16});
 }
 
-TEST_P(Room, FacetsComeInChunks) {
+TEST_P(Buffers, FacetsComeInChunks) {
   SKIP_WITHOUT_DEVICE(GetParam());
   constexpr std::size_t kRange = std::size_t{9} << 19, kFacets = kRange / 192;
   const TriangleMesh mesh = torus(180, 140);
@@ -437,7 +437,7 @@ TEST_P(Room, FacetsComeInChunks) {
   for (int round = 0; round < 2; ++round) expect_parity(surface, reference, diagram_of(*backend, seeds), GetParam());
 }
 
-TEST_P(Room, EndsAtWhatTheDeviceBinds) {
+TEST_P(Buffers, EndAtWhatTheDeviceBinds) {
   SKIP_WITHOUT_DEVICE(GetParam());
   const TriangleMesh mesh = torus(32, 20);
   const Surface surface(mesh);
@@ -457,7 +457,7 @@ TEST_P(Room, EndsAtWhatTheDeviceBinds) {
 }
 
 // A cell with very many sides in one facet.
-TEST_P(Room, PolygonsWithManyCorners) {
+TEST_P(Buffers, PolygonsWithManyCorners) {
   SKIP_WITHOUT_DEVICE(GetParam());
   const Surface surface(single_triangle());
   for (const int sides : {16, 17, 48, 49, 300}) {
@@ -484,7 +484,7 @@ TEST_P(Room, PolygonsWithManyCorners) {
 
 // A cell with twenty thousand neighbours, all of which the clipping has to look at: more steps than some drivers' loops
 // have.
-TEST_P(Room, CellsWithManyNeighbours) {
+TEST_P(Buffers, CellsWithManyNeighbours) {
   SKIP_WITHOUT_DEVICE(GetParam());
   constexpr int kCount = 20'000;
   SplitMix64 random(36);
@@ -510,7 +510,7 @@ TEST_P(Room, CellsWithManyNeighbours) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Faults, Room, testing::Values(Precision::single, Precision::double_),
+INSTANTIATE_TEST_SUITE_P(Faults, Buffers, testing::Values(Precision::single, Precision::double_),
                          [](const auto& instance) {
                            return instance.param == Precision::single ? "single" : "double";
                          });

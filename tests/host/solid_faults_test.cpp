@@ -131,7 +131,7 @@ TEST_P(SolidFaults, LeaveAsDeviceErrorOrFallBack) {
   }
 }
 
-TEST_P(SolidFaults, RoomGrows) {
+TEST_P(SolidFaults, BuffersGrow) {
   SKIP_WITHOUT_DEVICE(processor_of(GetParam()));
   const host::Capacities plenty;
   const std::vector<host::Capacities> each{{plenty.batch_pairs, 64, plenty.proposals, 0},
@@ -155,7 +155,7 @@ TEST_P(SolidFaults, RoomGrows) {
   }
 }
 
-TEST_P(SolidFaults, RoomEndsAtWhatTheDeviceBinds) {
+TEST_P(SolidFaults, BuffersEndAtWhatTheDeviceBinds) {
   SKIP_WITHOUT_DEVICE(processor_of(GetParam()));
   for (const std::size_t range : {std::size_t{8} << 10, std::size_t{20} << 10}) {
     SCOPED_TRACE(range);
