@@ -52,6 +52,13 @@ enum class Energy {
   restricted,   // seeds may leave the surface (RCVT), but for those on features
 };
 
+// What happens where features are finer than the edges can show.
+enum class DetailMode {
+  budget,  // details as fine as the number of vertices can pay for get smaller edges; finer ones are merged or let go
+  all,     // all details get smaller edges, and the mesh the vertices that it takes
+  off,     // edges are as long there as elsewhere
+};
+
 struct RemeshOptions {
   // One of these three. Counts are at least 4; edge_length is the wanted mean, in the mesh's unit.
   std::size_t vertices = 0;
@@ -60,6 +67,7 @@ struct RemeshOptions {
 
   SizingOptions sizing;
   FeatureOptions features;
+  DetailMode detail = DetailMode::budget;
   std::uint64_t random_seed = 1;
   int iterations = 100;     // at most, per level; fewer on the coarsest and the finest of several
   double tolerance = 1e-6;  // a level ends when the energy falls by less than this share per step
@@ -107,6 +115,15 @@ struct RemeshSeconds {
   DiagramSeconds diagrams;  // of the optimiser, summed over its evaluations
 };
 
+// What became of the input's features where they are fine (remesh/detail.h).
+struct DetailResult {
+  double width = 0;          // details of at least this width are resolved; 0: all are
+  std::size_t resolved = 0;  // curves that were kept
+  std::size_t merged = 0;    // curves that a neighbour stands for
+  std::size_t let_go = 0;    // curves that nothing stands for
+  std::size_t vertices = 0;  // that would resolve all of them; 0 if these do, or if it would be far too many
+};
+
 struct FeatureResult {
   std::size_t curves = 0, corners = 0;  // of the input
   std::size_t broken = 0;               // curves that are not chains of edges of the result
@@ -126,6 +143,7 @@ struct RemeshResult {
   std::size_t divided = 0;        // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
   std::vector<TopologyFault> faults;  // where it fails; indices are those of mesh's vertices, kNone if none
   FeatureResult features;
+  DetailResult detail;
   bool noisy = false;      // the input's normals were taken for noise
   WeldResult welded;       // without the mesh
   std::size_t wanted = 0;  // vertices

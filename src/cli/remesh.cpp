@@ -65,6 +65,11 @@ void add_options(CLI::App* app, RemeshCommand& command) {
                "dihedral deviation of so many degrees. Borders and\n"
                "non-manifold edges are always kept, edges between face\n"
                "labels unless none");
+  add_words(app, "--detail", command.options.detail, kDetailWords,
+            "what is finer than the edges: auto (smaller edges where\n"
+            "the vertices suffice, else merged; default), all (as many\n"
+            "vertices as it takes) or off")
+      ->group("Features");
   add_feature_file(app, command.feature_file);
   add_file(app, "--feature-output", command.feature_output, "FILE",
            "write the result's feature edges likewise; .ply and .obj\n"

@@ -20,6 +20,9 @@ inline constexpr auto kNeighbourWords = word_table<NeighbourSource>({{NeighbourS
 inline constexpr auto kTopologyWords = word_table<TopologyControl>(
     {{TopologyControl::enforce, "enforce"}, {TopologyControl::check, "check"}, {TopologyControl::off, "off"}});
 
+inline constexpr auto kDetailWords =
+    word_table<DetailMode>({{DetailMode::budget, "auto"}, {DetailMode::all, "all"}, {DetailMode::off, "off"}});
+
 inline constexpr auto kEnergyWords =
     word_table<Energy>({{Energy::automatic, "auto"}, {Energy::restricted, "rcvt"}, {Energy::constrained, "ccvt"}});
 

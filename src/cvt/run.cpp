@@ -4,8 +4,27 @@
 #include <utility>
 
 #include "voronoi/dual.h"
+#include "voronoi/localise.h"
 
 namespace bisector {
+namespace {
+
+void remove_strays(const Surface& surface, DiagramOfSeeds& known) {
+  known.strays = 0;
+  Diagram& diagram = known.diagram;
+  if (!includes(diagram.has, Want::polygons)) return;
+  known.strays = localise_cells(surface, known.positions, diagram.polygons);
+  if (known.strays > 0 && includes(diagram.has, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
+}
+
+}  // namespace
+
+void CvtRun::localise(bool on) {
+  if (localised_ == on) return;
+  localised_ = on;
+  if (on && !diagram_.positions.empty()) remove_strays(surface(), diagram_);
+  if (!on && diagram_.strays > 0) diagram_ = {};
+}
 
 void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& known) {
   const bool known_seeds = known.positions == positions;
@@ -18,6 +37,7 @@ void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSe
   known.positions.clear();
   known.report = backend_->evaluate(positions, want, known.diagram);
   known.positions = positions;
+  if (localised_) remove_strays(surface(), known);
   ++totals.evaluations;
   totals.seconds += known.report.seconds;
 }

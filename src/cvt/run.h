@@ -22,6 +22,7 @@ struct DiagramOfSeeds {
   Diagram diagram;
   EvaluationReport report;
   std::vector<Vec3> positions;  // empty: there is no diagram yet
+  std::size_t strays = 0;       // pieces of cells that localise_cells has given to others
 };
 
 class CvtRun {
@@ -48,6 +49,8 @@ class CvtRun {
   // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other
   // positions, or lacks something. The reference is good until the next call that computes one.
   const Diagram& diagram(Want want = Want::moments);
+  // Whether polygons and dual are those of cells without stray parts (voronoi/localise.h). Moments are not.
+  void localise(bool on);
   // How the last diagram of the run's seeds was certified.
   const Certification& certification() const { return diagram_.report.certification; }
   // The diagram of the seeds as they are, to be kept beside a copy of them.
@@ -69,6 +72,7 @@ class CvtRun {
   const FeatureCurves& curves_;
   const Context& context_;
   DiagramOfSeeds diagram_;
+  bool localised_ = false;
   // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.
   std::vector<Vec3> normals_;
 };

@@ -37,7 +37,9 @@ FeatureGraph split_features(const FeatureGraph& graph, const EdgeSplits& splits)
     if (!curve.closed) finer.vertices.push_back(curve.vertices.back());
     refined.curves.push_back(std::move(finer));
   }
+  // Curves may share edges (features/simplify.h).
   std::sort(refined.edges.begin(), refined.edges.end());
+  refined.edges.erase(std::unique(refined.edges.begin(), refined.edges.end()), refined.edges.end());
   return refined;
 }
 

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/improve_patch.h"
+#include "spatial/kd_tree.h"
 #include "voronoi/dual.h"
 
 namespace bisector {
@@ -164,6 +165,8 @@ class Improver {
                     std::vector<std::vector<Index>>& seeds_of) const;
   bool holds(const Snapshot& next, const Change& change, const std::vector<Index>& index,
              const std::vector<Index>& seeds) const;
+  void drop_nearest_to_damage(const Snapshot& next, const std::vector<Change>& changes, const std::vector<Index>& index,
+                              std::vector<char>& on) const;
   // Makes those of the changes that hold; `on` tells which.
   void make(const std::vector<Change>& changes, std::vector<char>& on);
   void drop_idle();
@@ -516,6 +519,28 @@ bool Improver::holds(const Snapshot& next, const Change& change, const std::vect
   return std::none_of(change.curves.begin(), change.curves.end(), [&](Index c) { return newly_broken(next, c); });
 }
 
+// Of cells across a thin wall the seeds that moved are no neighbours: the change that spoils their stars is
+// taken to be the nearest.
+void Improver::drop_nearest_to_damage(const Snapshot& next, const std::vector<Change>& changes,
+                                      const std::vector<Index>& index, std::vector<char>& on) const {
+  for (Index v = 0; v < index.size(); ++v) {
+    if (index[v] == kNone) continue;
+    if (next.kinds[index[v]] == now_.kinds[v] && worst_excess(next, index[v]).within(now_.worst)) continue;
+    const Vec3& x = now_.seeds.position(v);
+    std::size_t nearest = changes.size();
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t c = 0; c < changes.size(); ++c) {
+      if (!on[c]) continue;
+      for (const Index w : changes[c].footprint)
+        if (const double d = norm2(now_.seeds.position(w) - x); d < least) {
+          least = d;
+          nearest = c;
+        }
+    }
+    if (nearest < changes.size()) on[nearest] = 0;
+  }
+}
+
 void Improver::make(const std::vector<Change>& changes, std::vector<char>& on) {
   for (int round = 0; round < kReverts && std::find(on.begin(), on.end(), 1) != on.end(); ++round) {
     std::vector<Index> index;
@@ -525,6 +550,7 @@ void Improver::make(const std::vector<Change>& changes, std::vector<char>& on) {
     std::vector<char> held = on;
     for (std::size_t c = 0; c < changes.size(); ++c)
       if (on[c] && !holds(next, changes[c], index, seeds_of[c])) held[c] = 0;
+    if (held == on && !as_good(next)) drop_nearest_to_damage(next, changes, index, held);
     if (held != on) {
       on = std::move(held);
       continue;
@@ -570,6 +596,16 @@ void Improver::smooth() {
           seeds.size(), [&](std::size_t k) { all.relax(seeds[k], kTether); }, 256);
   }
 
+  const PointSet points{now_.seeds.positions()};
+  const KdTree tree(3, points);
+  const auto seeds_within = [&](const Vec3& x, double squared) {
+    std::vector<std::pair<Index, double>> found;
+    const double q[3] = {x.x, x.y, x.z};
+    tree.radiusSearch(q, squared, found, nanoflann::SearchParams());
+    std::vector<Index> seeds;
+    for (const auto& [seed, distance] : found) seeds.push_back(seed);
+    return seeds;
+  };
   std::vector<char> back(n, 0);
   for (int round = 0; round < kReverts; ++round) {
     Snapshot next;
@@ -595,6 +631,12 @@ void Improver::smooth() {
       put_back(v);
       for (const Snapshot* s : {static_cast<const Snapshot*>(&now_), static_cast<const Snapshot*>(&next)})
         std::for_each(s->rings.begin(v), s->rings.end(v), put_back);
+      // The seed that spoilt the star may be one across a thin wall, which is no neighbour.
+      if (next.kinds[v] == now_.kinds[v]) continue;
+      double reach = 0;
+      for (const Index* j = now_.rings.begin(v); j != now_.rings.end(v); ++j)
+        reach = std::max(reach, norm2(now_.seeds.position(*j) - now_.seeds.position(v)));
+      for (const Index w : seeds_within(now_.seeds.position(v), reach)) put_back(w);
     }
     if (changed) continue;
     if (as_good(next) && next.average < now_.average) now_ = std::move(next);

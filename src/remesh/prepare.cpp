@@ -10,6 +10,7 @@
 #include "bisector/repair.h"
 #include "features/normals.h"
 #include "mesh/topology.h"
+#include "remesh/detail.h"
 #include "remesh/sizing.h"
 
 namespace bisector {
@@ -101,7 +102,7 @@ PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, c
     // What noise folds is no feature.
     if (prepared.noisy && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
   }
-  const FeatureGraph graph = detect_features(welded, features);
+  FeatureGraph graph = detect_features(welded, features);
 
   SizingOptions sizing = options.sizing;
   if (!sizing.attribute.empty()) {
@@ -114,6 +115,17 @@ PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, c
   }
   sizing.sharp = graph.edges;
   SizedMesh sized = refine_for_density(welded, sizing, target);
+  if (options.seeds.empty() && options.detail != DetailMode::off && !graph.curves.empty()) {
+    std::vector<double> lengths(welded.vertices.size());
+    for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(sized.sizing, v);
+    DetailPlan plan = plan_details(welded, graph, lengths, sized.sizing.vertices, options.detail);
+    graph = std::move(plan.features);
+    prepared.detail = plan.result;
+    if (!plan.points.empty()) {
+      const SizeField bound(plan.points, plan.lengths, kDetailGradation);
+      sized = refine_for_density(welded, sizing, target, &bound);
+    }
+  }
   if (sized.sizing.vertices > kMostVertices && options.seeds.empty())
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
                             options.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));

@@ -15,7 +15,8 @@ struct PreparedInput {
   double unit_edge = 0;         // edge length where the density is 1
   std::size_t vertices = 0;     // wanted of the result
   WeldResult welded;            // without its mesh
-  bool noisy = false;           // normals are noise, and Energy::automatic means restricted
+  DetailResult detail;
+  bool noisy = false;  // normals are noise, and Energy::automatic means restricted
 };
 
 // The input with its borders joined: within `tolerance`, or, without one, at the same point, if that closes borders and

@@ -214,6 +214,7 @@ void Pipeline::mend_features() {
 
 // Mending one may break the other, so they take turns.
 void Pipeline::mend_features_and_topology() {
+  if (plan_.topology != TopologyControl::off) run_.localise(true);
   for (int round = 0; round < kMendingRounds; ++round) {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
@@ -275,8 +276,10 @@ void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
 
 void Pipeline::extract() {
   const Stopwatch watch;
+  run_.localise(false);
+  result_.untiled = count_untiled(surface_, run_.diagram(Want::polygons).polygons);
+  run_.localise(plan_.topology != TopologyControl::off);
   const Diagram& diagram = run_.diagram(Want::polygons | Want::dual);
-  result_.untiled = count_untiled(surface_, diagram.polygons);
   if (run_.has_features()) features_ = check_features(trace_, curves_, run_.seeds.places(), diagram);
   const Divided divided = divide_sheets();
   const Dual dual = divided.polygons ? extract_dual(*divided.polygons) : diagram.dual;
@@ -366,6 +369,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   RemeshResult result = remesh(*backend, prepared.features, plan, context);
   result.welded = std::move(prepared.welded);
   result.edge_length = prepared.unit_edge;
+  result.detail = prepared.detail;
   result.noisy = prepared.noisy;
   result.seconds.prepare = preparing;
   result.seconds.total = watch.seconds();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <queue>
 #include <tuple>
@@ -30,6 +31,7 @@ constexpr double kShortest = 0.5;            // edge length by h below which it 
 constexpr std::size_t kTriangles = 400'000;  // refinement stops there
 constexpr double kMostVertices = 1e8;        // that an edge length may ask for
 constexpr int kRounds = 8;                   // of refinement and calibration
+constexpr double kMostFactor = 2;            // of lengths beside bounds, in lengths without
 constexpr double kSettled = 1e-3;            // relative error of the calibration
 
 double fourth_root(double x) { return std::sqrt(std::sqrt(x)); }
@@ -169,7 +171,10 @@ void smooth_logarithms(const TriangleMesh& mesh, std::vector<double>& values) {
 class Field {
  public:
   // For a result that would have so many vertices and edges of that length if it were uniform.
-  Field(const TriangleMesh& mesh, const SizingOptions& options, double vertices, double uniform) : kind_(options.kind) {
+  Field(const TriangleMesh& mesh, const SizingOptions& options, double vertices, double uniform,
+        const SizeField* bound = nullptr)
+      : kind_(options.kind), bound_(bound) {
+    if (bound) bounds_ = bound->at(mesh.vertices, nearest_);
     const double diagonal = bounding_box(mesh.vertices).diagonal();
     unit_ = diagonal;
     least_ = std::min(kSmallestFeature * uniform / diagonal, 1.0);
@@ -190,14 +195,19 @@ class Field {
       for (double& x : values_) x = std::pow(x, exponent_);
     } else if (kind_ == DensityKind::attribute) {
       values_ = options.attribute;
+    } else {
+      values_.assign(mesh.vertices.size(), 1.0);
     }
   }
 
   const std::vector<double>& values() const { return values_; }
+  // Upper bounds of the edge length; empty if there are none.
+  const std::vector<double>& bounds() const { return bounds_; }
 
   // A vertex in the middle of two.
   void add(const Vec3& p, Index a, Index b) {
     values_.push_back(kind_ == DensityKind::lfs ? from_size(p) : 0.5 * (values_[a] + values_[b]));
+    if (bound_) bounds_.push_back((*bound_)(p));
   }
 
  private:
@@ -207,6 +217,9 @@ class Field {
   double unit_ = 1, least_ = 0, exponent_ = 1;
   std::unique_ptr<LocalFeatureSize> size_;
   std::vector<double> values_;
+  const SizeField* bound_;
+  std::vector<double> bounds_;
+  std::vector<Index> nearest_;
 };
 
 // The lengths of a calibrated field, and the factor that led to them.
@@ -220,30 +233,30 @@ class Calibrator {
   Calibrator(const SizingOptions& options, const SizingTarget& target) : options_(options), target_(target) {}
 
   // `guess`: a factor to start from, or 0.
-  Calibration run(const Domain& domain, const std::vector<Vec3>& points, const std::vector<double>& rho,
-                  double guess) const {
+  Calibration run(const Domain& domain, const std::vector<Vec3>& points, const Field& field, double guess) const {
+    const std::vector<double>& rho = field.values();
     std::vector<double> raw(rho.size());
     parallel_each(raw.size(), [&](std::size_t v) { raw[v] = 1 / fourth_root(rho[v]); });
     const auto excess = [&](Calibration& c) {
-      c.lengths = lengths(points, raw, c.factor);
+      c.lengths = lengths(points, raw, field.bounds(), c.factor);
       const MeshEstimate e = estimate(domain, c.lengths);
       return target_.vertices ? 0.5 * std::log(static_cast<double>(target_.vertices) / e.vertices)
                               : std::log(e.mean_edge / target_.edge_length);
     };
     // Without gradation and bounds, the excess is what the factor's logarithm is off by.
     Calibration c;
-    if (guess > 0) {
-      c.factor = guess;
-    } else {
-      const MeshEstimate e = estimate(domain, raw);
-      c.factor = target_.vertices ? std::sqrt(e.vertices / static_cast<double>(target_.vertices))
-                                  : target_.edge_length / e.mean_edge;
-    }
+    const MeshEstimate e = estimate(domain, raw);
+    const double unbounded = target_.vertices ? std::sqrt(e.vertices / static_cast<double>(target_.vertices))
+                                              : target_.edge_length / e.mean_edge;
+    c.factor = guess > 0 ? guess : unbounded;
+    // Where bounds ask for more vertices than are wanted, whatever the factor, it stays below the one without bounds by
+    // this much.
+    const double most = field.bounds().empty() ? std::numeric_limits<double>::infinity() : kMostFactor * unbounded;
     double low = 0, high = 0, low_excess = 0, high_excess = 0;  // factors on either side
     double last = c.factor, last_off = 0;
     for (int i = 0; i < 60; ++i) {
       const double off = excess(c);
-      if (std::abs(off) < kSettled) break;
+      if (std::abs(off) < kSettled || (off < 0 && c.factor == most)) break;
       (off < 0 ? low : high) = c.factor;
       (off < 0 ? low_excess : high_excess) = off;
       if (low > 0 && high > 0) {
@@ -259,15 +272,19 @@ class Calibrator {
         last_off = off;
         c.factor *= std::exp(-off / slope * std::max(1, i - 4));
       }
+      c.factor = std::min(c.factor, most);
     }
     return c;
   }
 
  private:
-  std::vector<double> lengths(const std::vector<Vec3>& points, const std::vector<double>& raw, double factor) const {
+  std::vector<double> lengths(const std::vector<Vec3>& points, const std::vector<double>& raw,
+                              const std::vector<double>& bounds, double factor) const {
     std::vector<double> h(raw.size());
     for (std::size_t v = 0; v < h.size(); ++v) h[v] = factor * raw[v];
-    if (options_.gradation > 0) h = limit_gradation(points, h, options_.gradation);
+    if (options_.gradation > 0 && options_.kind != DensityKind::uniform)
+      h = limit_gradation(points, h, options_.gradation);
+    for (std::size_t v = 0; v < bounds.size(); ++v) h[v] = std::min(h[v], bounds[v]);
     for (double& x : h) {
       x = std::max(x, options_.min_edge);
       if (options_.max_edge > 0) x = std::min(x, options_.max_edge);
@@ -377,7 +394,9 @@ class Refiner {
   }
 
   double raw_length(Index v) const {
-    const double h = std::max(factor_ / fourth_root(field_.values()[v]), options_.min_edge);
+    double h = factor_ / fourth_root(field_.values()[v]);
+    if (!field_.bounds().empty()) h = std::min(h, field_.bounds()[v]);
+    h = std::max(h, options_.min_edge);
     return options_.max_edge > 0 ? std::min(h, options_.max_edge) : h;
   }
 
@@ -453,7 +472,7 @@ Sizing compute_sizing(const TriangleMesh& mesh, const SizingOptions& options, co
   if (options.kind == DensityKind::uniform) return uniform_sizing(domain, target);
   const double uniform = uniform_length(domain, target);
   const Field field(mesh, options, uniform_count(domain, uniform), uniform);
-  const Calibration calibration = Calibrator(options, target).run(domain, mesh.vertices, field.values(), 0);
+  const Calibration calibration = Calibrator(options, target).run(domain, mesh.vertices, field, 0);
   return to_sizing(domain, calibration.lengths, target);
 }
 
@@ -469,7 +488,8 @@ double target_edge_length(const Sizing& sizing, const TriangleMesh& mesh, Index 
   return sizing.unit_edge / fourth_root(density);
 }
 
-SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target) {
+SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target,
+                             const SizeField* bound) {
   check(mesh, options, target);
   SizedMesh sized;
   sized.mesh = mesh;
@@ -477,16 +497,16 @@ SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& opti
   for (Index t = 0; t < sized.parent.size(); ++t) sized.parent[t] = t;
   auto domain = std::make_unique<Domain>(sized.mesh);
   check_bounds(*domain, options, target);
-  if (options.kind == DensityKind::uniform) {
+  if (options.kind == DensityKind::uniform && !bound) {
     sized.sizing = uniform_sizing(*domain, target);
     return sized;
   }
   const double uniform = uniform_length(*domain, target);
-  Field field(mesh, options, uniform_count(*domain, uniform), uniform);
+  Field field(mesh, options, uniform_count(*domain, uniform), uniform, bound);
   const Calibrator calibrator(options, target);
   Calibration calibration;
   for (int round = 0;; ++round) {
-    calibration = calibrator.run(*domain, sized.mesh.vertices, field.values(), calibration.factor);
+    calibration = calibrator.run(*domain, sized.mesh.vertices, field, calibration.factor);
     if (round == kRounds || !Refiner(sized, field, calibration.lengths, calibration.factor, options).run()) break;
     domain = std::make_unique<Domain>(sized.mesh);
   }

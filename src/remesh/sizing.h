@@ -10,6 +10,7 @@
 #include "bisector/remesh.h"
 #include "core/geometry.h"
 #include "features/edge_splits.h"
+#include "features/size_field.h"
 
 namespace bisector {
 
@@ -60,6 +61,9 @@ struct SizedMesh {
 // edge are bisected with it, so no T-junction and no ever thinner triangle appears. New vertices are middles as
 // rounded; lfs is measured there, other fields are linear. Stops at 400,000 triangles or the input's number, if that is
 // larger; a uniform density bisects nothing. Throws as compute_sizing.
-SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target);
+//
+// `bound`, if there is one, is an upper bound of h beside those of the options. It is not scaled with the field.
+SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target,
+                             const SizeField* bound = nullptr);
 
 }  // namespace bisector

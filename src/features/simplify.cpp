@@ -1,0 +1,446 @@
+#include "features/simplify.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <queue>
+#include <unordered_map>
+#include <utility>
+
+#include "core/grouping.h"
+#include "features/curve_network.h"
+#include "features/curves.h"
+#include "mesh/topology.h"
+
+namespace bisector {
+namespace {
+
+// Creases go if more than this part of them runs beside others.
+constexpr double kBeside = 0.5;
+// Edges that a closed curve has at least, so that it looks round.
+constexpr double kLoopEdges = 4;
+// A curve that comes back to its corner is one if it is longer than so many widths.
+constexpr double kLoopWidths = 3;
+// Two curves at a corner where no other ends are one if they turn by less than this, in radians.
+constexpr double kStraight = 50 * std::numbers::pi / 180;
+
+bool is_crease(const FeatureCurve& curve) { return curve.kind == FeatureKind::crease; }
+
+// The corners as nodes of a graph, the open curves as its edges.
+class CornerGraph {
+ public:
+  CornerGraph(const FeatureCurves& curves, const std::vector<double>& weights)
+      : curves_(curves), weights_(weights), at_(group_into_rows<Arm>(curves.graph().corners.size(), [&](auto put) {
+          for (Index c = 0; c < curves.size(); ++c) {
+            if (curves.closed(c)) continue;
+            const auto [first, last] = curves.ends(c);
+            put(first, Arm{c, last, 0});
+            put(last, Arm{c, first, 1});
+          }
+        })) {}
+
+  // For each corner the curve by which the way to its representative leaves it; kNone of representatives.
+  struct Forest {
+    std::vector<Index> curve, next;  // and the corner at that curve's other end
+  };
+  Forest merge(double width) const {
+    const std::size_t count = at_.rows();
+    std::vector<Index> order(count);
+    std::iota(order.begin(), order.end(), Index{0});
+    std::vector<std::array<double, 2>> rank(count);
+    for (Index v = 0; v < count; ++v) rank[v] = rank_of(v);
+    std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return rank[a] > rank[b]; });
+    std::vector<double> way(count, std::numeric_limits<double>::infinity());
+    Forest forest{std::vector<Index>(count, kNone), std::vector<Index>(count, kNone)};
+    for (const Index v : order) {
+      if (way[v] < width && !is_branching_of_others(v)) continue;
+      way[v] = 0;
+      forest.curve[v] = forest.next[v] = kNone;
+      spread(v, width, way, forest);
+    }
+    return forest;
+  }
+
+ private:
+  struct Arm {
+    Index curve, other;
+    int end;  // of the curve, at the corner
+  };
+
+  // Branchings first, then ends, then turns; among these the corner of the most important curves.
+  std::array<double, 2> rank_of(Index corner) const {
+    double weight = 0;
+    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm) weight += weights_[arm->curve];
+    const std::size_t arms = at_.size(corner);
+    return {arms > 2 ? 2.0 : arms == 2 ? 0.0 : 1.0, weight};
+  }
+
+  // Whether three or more curves meet that are not all creases.
+  bool is_branching_of_others(Index corner) const {
+    bool others = false;
+    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm)
+      others |= !is_crease(curves_.graph().curves[arm->curve]);
+    return others && at_.size(corner) > 2;
+  }
+
+  void spread(Index from, double width, std::vector<double>& way, Forest& forest) const {
+    using Way = std::pair<double, Index>;
+    std::priority_queue<Way, std::vector<Way>, std::greater<>> ways;
+    ways.push({0, from});
+    while (!ways.empty()) {
+      const auto [length, v] = ways.top();
+      ways.pop();
+      if (length > way[v]) continue;
+      for (const Arm* arm = at_.begin(v); arm != at_.end(v); ++arm) {
+        const double onwards = length + curves_.length(arm->curve);
+        if (onwards >= width || onwards >= way[arm->other]) continue;
+        way[arm->other] = onwards;
+        forest.curve[arm->other] = arm->curve;
+        forest.next[arm->other] = v;
+        ways.push({onwards, arm->other});
+      }
+    }
+  }
+
+  const FeatureCurves& curves_;
+  const std::vector<double>& weights_;
+  Csr<Arm> at_;
+};
+
+// A curve between corners that remain.
+struct Candidate {
+  FeatureCurve curve;
+  double weight = 0;
+  double length = 0;
+};
+
+std::vector<Index> reversed_vertices(std::vector<Index> vertices) {
+  std::reverse(vertices.begin(), vertices.end());
+  return vertices;
+}
+
+// The vertices of the way from a corner to its representative, both included.
+std::vector<Index> way_of(const FeatureGraph& graph, const CornerGraph::Forest& forest, Index corner) {
+  std::vector<Index> way{graph.corners[corner]};
+  while (forest.curve[corner] != kNone) {
+    std::vector<Index> part = graph.curves[forest.curve[corner]].vertices;
+    if (part.front() != way.back()) part = reversed_vertices(std::move(part));
+    way.insert(way.end(), part.begin() + 1, part.end());
+    corner = forest.next[corner];
+  }
+  return way;
+}
+
+double length_of(const std::vector<Index>& chain, bool closed, const std::vector<Vec3>& vertices) {
+  double length = 0;
+  for (std::size_t k = 1; k < chain.size(); ++k) length += norm(vertices[chain[k]] - vertices[chain[k - 1]]);
+  return closed ? length + norm(vertices[chain.front()] - vertices[chain.back()]) : length;
+}
+
+std::vector<Candidate> led_to_representatives(const FeatureCurves& curves, const std::vector<Vec3>& vertices,
+                                              const std::vector<double>& weights, const CornerGraph::Forest& forest,
+                                              double width, SimplifiedFeatures& result) {
+  const FeatureGraph& graph = curves.graph();
+  std::vector<char> between(curves.size(), 0);
+  for (const Index c : forest.curve)
+    if (c != kNone) between[c] = 1;
+  std::vector<Candidate> candidates;
+  for (Index c = 0; c < curves.size(); ++c) {
+    Candidate candidate{graph.curves[c], weights[c], curves.length(c)};
+    if (curves.closed(c)) {
+      if (is_crease(candidate.curve) && candidate.length < kLoopEdges * width) ++result.let_go;
+      else candidates.push_back(std::move(candidate));
+      continue;
+    }
+    if (between[c]) {
+      ++result.merged;
+      continue;
+    }
+    const auto [first, last] = curves.ends(c);
+    std::vector<Index> chain = reversed_vertices(way_of(graph, forest, first));
+    chain.insert(chain.end(), candidate.curve.vertices.begin() + 1, candidate.curve.vertices.end());
+    const std::vector<Index> onwards = way_of(graph, forest, last);
+    chain.insert(chain.end(), onwards.begin() + 1, onwards.end());
+    candidate.curve.vertices = std::move(chain);
+    candidate.length = length_of(candidate.curve.vertices, false, vertices);
+    const bool loop = candidate.curve.vertices.front() == candidate.curve.vertices.back();
+    if (loop && is_crease(candidate.curve) && candidate.length < kLoopWidths * width) {
+      ++result.merged;
+      continue;
+    }
+    candidates.push_back(std::move(candidate));
+  }
+  return candidates;
+}
+
+// The curves that stay, as points at small distances in a grid, and how far it is along them.
+class Kept {
+ public:
+  Kept(const std::vector<Vec3>& vertices, double width) : vertices_(vertices), width_(width) {}
+
+  // The share of a curve that runs within the width of others.
+  double beside(const Candidate& candidate) const {
+    const std::vector<Sample> samples = sampled(candidate);
+    const bool closed = candidate.curve.closed;
+    const Ways from_start = closed ? Ways{} : ways(candidate.curve.vertices.front());
+    const Ways from_end = closed ? Ways{} : ways(candidate.curve.vertices.back());
+    std::size_t near = 0;
+    for (const Sample& sample : samples) near += is_beside(sample, candidate.length, from_start, from_end);
+    return static_cast<double>(near) / static_cast<double>(samples.size());
+  }
+
+  void add(const Candidate& candidate) {
+    const auto index = static_cast<Index>(curves_.size());
+    const std::vector<Index>& chain = candidate.curve.vertices;
+    curves_.push_back({chain.front(), chain.back(), candidate.length, candidate.curve.closed});
+    if (!candidate.curve.closed)
+      for (const Index v : {chain.front(), chain.back()}) at_[v].push_back(index);
+    for (const Sample& sample : sampled(candidate))
+      grid_[cell(sample.point)].push_back({sample.point, index, sample.at});
+  }
+
+  bool is_near(const Vec3& p) const {
+    bool near = false;
+    each_near(p, [&](const Point&, double) { near = true; });
+    return near;
+  }
+
+ private:
+  struct Sample {
+    Vec3 point;
+    double at;  // arc length
+  };
+  struct Point {
+    Vec3 point;
+    Index curve;
+    double at;
+  };
+  struct Curve {
+    Index first, last;
+    double length;
+    bool closed;
+  };
+  using Ways = std::unordered_map<Index, double>;  // lengths of ways to corners
+  using Cell = std::array<long long, 3>;
+
+  // At most a quarter of the width apart, so that no other curve slips through.
+  std::vector<Sample> sampled(const Candidate& candidate) const {
+    const double step = 0.5 * width_;
+    std::vector<Sample> samples;
+    const std::vector<Index>& chain = candidate.curve.vertices;
+    double at = 0, next = 0.5 * step;
+    const std::size_t segments = chain.size() - (candidate.curve.closed ? 0 : 1);
+    for (std::size_t k = 0; k < segments; ++k) {
+      const Vec3 &a = vertices_[chain[k]], &b = vertices_[chain[(k + 1) % chain.size()]];
+      const double length = norm(b - a);
+      for (; next < at + length; next += step) samples.push_back({a + ((next - at) / length) * (b - a), next});
+      at += length;
+    }
+    if (samples.empty()) samples.push_back({0.5 * (vertices_[chain.front()] + vertices_[chain.back()]), 0.5 * at});
+    return samples;
+  }
+
+  Cell cell(const Vec3& p) const {
+    return {std::llround(p.x / width_), std::llround(p.y / width_), std::llround(p.z / width_)};
+  }
+
+  // Calls body(point, distance) for kept points within the width.
+  template <class Body>
+  void each_near(const Vec3& p, const Body& body) const {
+    const Cell at = cell(p);
+    for (long long dx = -1; dx <= 1; ++dx)
+      for (long long dy = -1; dy <= 1; ++dy)
+        for (long long dz = -1; dz <= 1; ++dz) {
+          const auto found = grid_.find({at[0] + dx, at[1] + dy, at[2] + dz});
+          if (found == grid_.end()) continue;
+          for (const Point& point : found->second)
+            if (const double distance = norm(point.point - p); distance < width_) body(point, distance);
+        }
+  }
+
+  // From a corner to others along kept curves, as far as a detour matters.
+  Ways ways(Index corner) const {
+    const double reach = kDetour * width_;
+    using Way = std::pair<double, Index>;
+    std::priority_queue<Way, std::vector<Way>, std::greater<>> queue;
+    Ways shortest{{corner, 0.0}};
+    queue.push({0, corner});
+    while (!queue.empty()) {
+      const auto [length, v] = queue.top();
+      queue.pop();
+      const auto arms = at_.find(v);
+      if (length > shortest[v] || arms == at_.end()) continue;
+      for (const Index c : arms->second) {
+        const Index other = curves_[c].first == v ? curves_[c].last : curves_[c].first;
+        const double onwards = length + curves_[c].length;
+        if (onwards > reach) continue;
+        const auto [known, fresh] = shortest.try_emplace(other, onwards);
+        if (!fresh && known->second <= onwards) continue;
+        known->second = onwards;
+        queue.push({onwards, other});
+      }
+    }
+    return shortest;
+  }
+
+  double way_to(const Point& point, const Ways& ways) const {
+    double least = std::numeric_limits<double>::infinity();
+    const Curve& curve = curves_[point.curve];
+    if (curve.closed) return least;
+    if (const auto first = ways.find(curve.first); first != ways.end()) least = first->second + point.at;
+    if (const auto last = ways.find(curve.last); last != ways.end())
+      least = std::min(least, last->second + curve.length - point.at);
+    return least;
+  }
+
+  bool is_beside(const Sample& sample, double length, const Ways& from_start, const Ways& from_end) const {
+    bool beside = false;
+    each_near(sample.point, [&](const Point& point, double distance) {
+      const double way = std::min(sample.at + way_to(point, from_start), length - sample.at + way_to(point, from_end));
+      beside |= way > kDetour * distance;
+    });
+    return beside;
+  }
+
+  const std::vector<Vec3>& vertices_;
+  double width_;
+  std::vector<Curve> curves_;
+  std::map<Index, std::vector<Index>> at_;  // curves that end at a corner
+  std::map<Cell, std::vector<Point>> grid_;
+};
+
+// The direction in which a curve leaves the corner at one of its ends, over a length of about `width`.
+Vec3 leaving(const FeatureCurve& curve, bool from_start, const std::vector<Vec3>& vertices, double width) {
+  const std::size_t count = curve.vertices.size();
+  const auto at = [&](std::size_t k) { return vertices[curve.vertices[from_start ? k : count - 1 - k]]; };
+  double length = 0;
+  for (std::size_t k = 1; k < count; ++k) {
+    length += norm(at(k) - at(k - 1));
+    if (length >= width) return at(k) - at(0);
+  }
+  return at(count - 1) - at(0);
+}
+
+// Joins curves where just two end and they run on.
+void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices, double width) {
+  std::map<Index, std::vector<std::size_t>> at;
+  for (std::size_t c = 0; c < curves.size(); ++c)
+    if (!curves[c].closed)
+      for (const Index v : {curves[c].vertices.front(), curves[c].vertices.back()}) at[v].push_back(c);
+  std::vector<char> gone(curves.size(), 0);
+  for (auto& [corner, ends] : at) {
+    if (ends.size() != 2) continue;
+    std::size_t a = ends[0], b = ends[1];
+    if (a == b || curves[a].kind != curves[b].kind) continue;
+    const bool a_starts = curves[a].vertices.front() == corner, b_starts = curves[b].vertices.front() == corner;
+    const Vec3 u = leaving(curves[a], a_starts, vertices, width), v = leaving(curves[b], b_starts, vertices, width);
+    if (-dot(u, v) < std::cos(kStraight) * norm(u) * norm(v)) continue;
+    std::vector<Index> first = curves[a].vertices, second = curves[b].vertices;
+    if (a_starts) first = reversed_vertices(std::move(first));
+    if (!b_starts) second = reversed_vertices(std::move(second));
+    first.insert(first.end(), second.begin() + 1, second.end());
+    curves[a].vertices = std::move(first);
+    gone[b] = 1;
+    const Index far = curves[a].vertices.back();
+    if (far == curves[a].vertices.front()) continue;
+    for (std::size_t& c : at[far])
+      if (c == b) c = a;
+  }
+  std::size_t kept = 0;
+  for (std::size_t c = 0; c < curves.size(); ++c)
+    if (!gone[c]) {
+      if (kept != c) curves[kept] = std::move(curves[c]);
+      ++kept;
+    }
+  curves.resize(kept);
+}
+
+}  // namespace
+
+std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
+                                  const std::vector<Vec3>& vertices) {
+  const EdgeTable table = edge_table(triangles, vertices.size());
+  std::vector<double> weights;
+  for (const FeatureCurve& curve : graph.curves) {
+    double weight = 0;
+    const std::size_t count = curve.vertices.size(), segments = count - (curve.closed ? 0 : 1);
+    for (std::size_t k = 0; k < segments; ++k) {
+      const Index a = curve.vertices[k], b = curve.vertices[(k + 1) % count];
+      const std::array<Index, 2> edge{std::min(a, b), std::max(a, b)};
+      const auto found = std::lower_bound(table.edges.begin(), table.edges.end(), edge);
+      if (found == table.edges.end() || *found != edge) continue;
+      const auto e = static_cast<std::size_t>(found - table.edges.begin());
+      double angle = std::numbers::pi;
+      if (table.half_edges.size(e) == 2) {
+        const auto normal = [&](std::size_t half_edge) {
+          const Triangle& t = triangles[half_edge / 3];
+          const Vec3 n = cross(vertices[t[1]] - vertices[t[0]], vertices[t[2]] - vertices[t[0]]);
+          const double length = norm(n);
+          return length > 0 ? (1 / length) * n : Vec3{};
+        };
+        angle = std::acos(
+            std::clamp(dot(normal(table.half_edges.begin(e)[0]), normal(table.half_edges.begin(e)[1])), -1.0, 1.0));
+      }
+      weight += norm(vertices[b] - vertices[a]) * angle;
+    }
+    weights.push_back(weight);
+  }
+  return weights;
+}
+
+SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
+                                     const std::vector<double>& weights, double width) {
+  SimplifiedFeatures result;
+  if (!(width > 0)) {
+    result.graph = graph;
+    return result;
+  }
+  const FeatureCurves curves(graph, vertices);
+  const CornerGraph::Forest forest = CornerGraph(curves, weights).merge(width);
+  std::vector<Candidate> candidates = led_to_representatives(curves, vertices, weights, forest, width, result);
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return is_crease(a.curve) != is_crease(b.curve) ? !is_crease(a.curve) : a.weight > b.weight;
+  });
+  Kept kept(vertices, width);
+  std::vector<FeatureCurve> left;
+  for (Candidate& candidate : candidates) {
+    if (is_crease(candidate.curve) && kept.beside(candidate) > kBeside) {
+      ++result.merged;
+      continue;
+    }
+    kept.add(candidate);
+    left.push_back(std::move(candidate.curve));
+  }
+  // Corners on no curve, such as the tips of cones.
+  std::vector<char> on_curve(graph.corners.size(), 0);
+  for (Index c = 0; c < curves.size(); ++c)
+    if (!curves.closed(c))
+      for (const Index end : curves.ends(c)) on_curve[end] = 1;
+  for (Index k = 0; k < graph.corners.size(); ++k)
+    if (!on_curve[k] && !kept.is_near(vertices[graph.corners[k]])) result.graph.corners.push_back(graph.corners[k]);
+
+  join_straight(left, vertices, width);
+  for (FeatureCurve& curve : left) {
+    const std::size_t count = curve.vertices.size();
+    for (std::size_t k = 0; k + (curve.closed ? 0 : 1) < count; ++k) {
+      const Index a = curve.vertices[k], b = curve.vertices[(k + 1) % count];
+      result.graph.edges.push_back({std::min(a, b), std::max(a, b)});
+    }
+    if (!curve.closed)
+      for (const Index v : {curve.vertices.front(), curve.vertices.back()}) result.graph.corners.push_back(v);
+  }
+  std::sort(result.graph.corners.begin(), result.graph.corners.end());
+  result.graph.corners.erase(std::unique(result.graph.corners.begin(), result.graph.corners.end()),
+                             result.graph.corners.end());
+  std::sort(result.graph.edges.begin(), result.graph.edges.end());
+  result.graph.edges.erase(std::unique(result.graph.edges.begin(), result.graph.edges.end()), result.graph.edges.end());
+  result.graph.curves = std::move(left);
+  return result;
+}
+
+}  // namespace bisector

@@ -1,0 +1,33 @@
+// What is left of feature curves for a mesh that cannot show details below some width.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "bisector/features.h"
+#include "core/geometry.h"
+
+namespace bisector {
+
+struct SimplifiedFeatures {
+  FeatureGraph graph;
+  std::size_t merged = 0;  // curves that another one stands for
+  std::size_t let_go = 0;  // curves that nothing stands for
+};
+
+// How much a curve counts beside others: its length times the mean angle between the surface's normals on either side,
+// one value per curve. `triangles` and `vertices` are the mesh that the graph is of.
+std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
+                                  const std::vector<Vec3>& vertices);
+
+// Leaves corners, and creases beside each other, at least `width` apart where that goes:
+//   - Of corners that are nearer to each other along the curves one remains, those of many curves before turns; the
+//     curves of the others are led there, along what lies between.
+//   - Creases go by ascending weight if they run within `width` of others for more than half of their length, though
+//     they are not led there by a corner (curve_gaps). So the two curves of a chamfer become one.
+//   - Closed creases shorter than 4 `width` go.
+// Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing.
+SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
+                                     const std::vector<double>& weights, double width);
+
+}  // namespace bisector

@@ -1,0 +1,183 @@
+#include "remesh/detail.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "core/degenerate.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+#include "features/curve_network.h"
+#include "features/curves.h"
+#include "features/simplify.h"
+
+namespace bisector {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// What details may make of the edges of plain faces, in lengths without details.
+constexpr double kCoarsening = 1.5;
+// Edge lengths in a gap, and along a closed curve: equilateral triangles have 1.15 times their height as edges.
+constexpr double kPerGap = 1.15, kPerLoop = 0.25;
+// Of the mean edge length: what is never resolved, and what is let go at most.
+constexpr double kFinest = 1.0 / 16, kCoarsest = 4;
+// Where curves run beside each other for a short while only, edges may be shorter than the width by this.
+constexpr double kBelowWidth = 0.5;
+constexpr int kBisections = 7;
+constexpr std::size_t kMostPoints = 100'000;  // of the curves
+// Triangles are divided until they are no longer than so many edges, for integrals.
+constexpr double kPiece = 1.5;
+constexpr int kDepth = 12;
+// Vertices, in those wanted, beyond which nobody needs to know how many it would be.
+constexpr double kFarTooMany = 50;
+
+class Planner {
+ public:
+  Planner(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
+          std::size_t vertices)
+      : mesh_(mesh), features_(features), edge_length_(edge_length), vertices_(static_cast<double>(vertices)),
+        weights_(curve_weights(features, mesh.triangles, mesh.vertices)) {
+    double sum = 0;
+    for (const double h : edge_length) sum += h;
+    mean_ = sum / static_cast<double>(edge_length.size());
+  }
+
+  struct Trial {
+    double width = 0;
+    SimplifiedFeatures simplified;
+    std::vector<Vec3> points;
+    std::vector<double> lengths;
+    double vertices = 0;  // that it takes
+  };
+
+  Trial trial(double width, double coarsening) const {
+    Trial t;
+    t.width = width;
+    t.simplified = simplify_features(features_, mesh_.vertices, weights_, width);
+    find_sizes(t, coarsening);
+    t.vertices = count(t, coarsening);
+    return t;
+  }
+
+  Trial best() const {
+    double fine = kFinest * mean_, coarse = kCoarsest * mean_;
+    Trial finest = trial(fine, kCoarsening);
+    if (finest.vertices <= vertices_) return finest;
+    Trial best = trial(coarse, kCoarsening);
+    for (int k = 0; k < kBisections; ++k) {
+      const double middle = std::sqrt(fine * coarse);
+      Trial t = trial(middle, kCoarsening);
+      if (t.vertices <= vertices_) {
+        coarse = middle;
+        best = std::move(t);
+      } else {
+        fine = middle;
+      }
+    }
+    return best;
+  }
+
+  double mean() const { return mean_; }
+
+ private:
+  // The edge length without details, at the nearest vertex of a curve.
+  double length_at(const FeatureCurves& curves, Index curve, double position) const {
+    return edge_length_[curves.graph().curves[curve].vertices[curves.segment_at(curve, position)]];
+  }
+
+  void find_sizes(Trial& t, double coarsening) const {
+    const FeatureCurves curves(t.simplified.graph, mesh_.vertices);
+    double total = 0;
+    for (Index c = 0; c < curves.size(); ++c) total += curves.length(c);
+    const double spacing = std::max(0.5 * t.width, total / static_cast<double>(kMostPoints));
+    const CurveNetwork network(curves, spacing);
+    const std::size_t corners = curves.graph().corners.size();
+    std::vector<double> plain(network.points().size(), kInfinity), bound(network.points().size(), kInfinity);
+    for (Index p = 0; p < corners; ++p) plain[p] = coarsening * edge_length_[curves.graph().corners[p]];
+    for (auto p = static_cast<Index>(corners); p < plain.size(); ++p) {
+      const Index c = network.curve(p);
+      plain[p] = coarsening * length_at(curves, c, network.position(p));
+      bound[p] = curves.closed(c) ? kPerLoop * curves.length(c) : curves.length(c);
+    }
+    for (Index c = 0; c < curves.size(); ++c)
+      for (const Index end : curves.ends(c))
+        if (end != kNone) bound[end] = std::min(bound[end], curves.length(c));
+    std::vector<double> reach(plain.size());
+    for (std::size_t p = 0; p < reach.size(); ++p) reach[p] = plain[p] / kPerGap;
+    const std::vector<double> gaps = curve_gaps(network, reach);
+    for (std::size_t p = 0; p < plain.size(); ++p) {
+      const double length = std::max(std::min(bound[p], kPerGap * gaps[p]), kBelowWidth * t.width);
+      if (length >= plain[p]) continue;
+      t.points.push_back(network.points()[p]);
+      t.lengths.push_back(length);
+    }
+  }
+
+  // The vertices of equilateral triangles of the lengths wanted, as in estimate_mesh.
+  double count(const Trial& t, double coarsening) const {
+    std::optional<SizeField> field;
+    if (!t.points.empty()) field.emplace(t.points, t.lengths, kDetailGradation);
+    const double most = kFarTooMany * vertices_;
+    constexpr std::size_t kChunk = 256;
+    std::vector<double> sums((mesh_.triangles.size() + kChunk - 1) / kChunk, 0);
+    parallel_chunks(mesh_.triangles.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end && sums[chunk] < most; ++k) {
+        const Triangle& v = mesh_.triangles[k];
+        const double plain = coarsening * (edge_length_[v[0]] + edge_length_[v[1]] + edge_length_[v[2]]) / 3;
+        add_piece({mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]}, plain, field, 0, most,
+                  sums[chunk]);
+      }
+    });
+    double sum = 0;
+    for (const double s : sums) sum += s;
+    return sum;
+  }
+
+  static void add_piece(const std::array<Vec3, 3>& p, double plain, const std::optional<SizeField>& field, int depth,
+                        double most, double& sum) {
+    if (sum > most) return;
+    const Vec3 middle = (1.0 / 3) * (p[0] + p[1] + p[2]);
+    const double bound = field ? (*field)(middle) : kInfinity, h = std::min(plain, bound);
+    const double longest = std::sqrt(std::max({norm2(p[1] - p[0]), norm2(p[2] - p[1]), norm2(p[0] - p[2])}));
+    if (depth < kDepth && longest > kPiece * h && bound - kDetailGradation * longest < plain) {
+      const std::array<Vec3, 3> m{0.5 * (p[1] + p[2]), 0.5 * (p[2] + p[0]), 0.5 * (p[0] + p[1])};
+      for (int k = 0; k < 3; ++k) add_piece({p[k], m[(k + 2) % 3], m[(k + 1) % 3]}, plain, field, depth + 1, most, sum);
+      add_piece(m, plain, field, depth + 1, most, sum);
+      return;
+    }
+    sum += 2 / std::sqrt(3.0) * triangle_area(p[0], p[1], p[2]) / (h * h);
+  }
+
+  const TriangleMesh& mesh_;
+  const FeatureGraph& features_;
+  const std::vector<double>& edge_length_;
+  double vertices_;
+  double mean_ = 0;
+  std::vector<double> weights_;
+};
+
+}  // namespace
+
+DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
+                        std::size_t vertices, DetailMode mode) {
+  DetailPlan plan;
+  plan.features = features;
+  plan.result.resolved = features.curves.size();
+  if (mode == DetailMode::off || features.curves.empty()) return plan;
+  const Planner planner(mesh, features, edge_length, vertices);
+  Planner::Trial best = planner.best();
+  plan.features = std::move(best.simplified.graph);
+  plan.points = std::move(best.points);
+  plan.lengths = std::move(best.lengths);
+  plan.result.resolved = plan.features.curves.size();
+  plan.result.merged = best.simplified.merged;
+  plan.result.let_go = best.simplified.let_go;
+  plan.result.width = best.width;
+  return plan;
+}
+
+}  // namespace bisector

@@ -1,0 +1,34 @@
+// A budget for detail: which features a mesh of so many vertices can show with good triangles, and how small these must
+// be beside them.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "bisector/remesh.h"
+#include "features/size_field.h"
+
+namespace bisector {
+
+struct DetailPlan {
+  FeatureGraph features;  // what is left of the input's
+  // Edges at these points should not be longer than these lengths, in the mesh's unit; empty if none are shorter than
+  // the edges are anyway.
+  std::vector<Vec3> points;
+  std::vector<double> lengths;
+  DetailResult result;
+};
+
+// Edge lengths grow away from details by at most this per length.
+inline constexpr double kDetailGradation = 0.35;
+
+// A strip between two curves of the length l at a distance w takes about 2 l / w vertices at good angles, and more
+// where sizes grow from there to those of the plain faces. The least width is looked for from which on all details can
+// be resolved with so many vertices, if the plain faces' edges become at most half as long again as in a mesh without
+// details; details below it are merged or let go (features/simplify.h). Details are the gaps between curves
+// (curve_gaps), the lengths of curves, and quarters of the lengths of closed ones. `edge_length` is the length aimed at
+// without details, one value per vertex.
+DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
+                        std::size_t vertices, DetailMode mode);
+
+}  // namespace bisector

@@ -1,0 +1,286 @@
+#include "voronoi/localise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "voronoi/ball_property.h"
+
+namespace bisector {
+namespace {
+
+constexpr int kRounds = 4;  // pieces that lie among other pieces wait for these
+
+// A piece of a cell apart from its seed.
+struct Piece {
+  std::vector<std::size_t> polygons;
+  double area = 0;
+  Index to = kNone;  // the cell that it goes to
+};
+
+// A polygon while its triangle is put together anew.
+struct Polygon {
+  Index cell;
+  std::vector<Index> labels;
+  std::vector<Vec3> vertices;
+};
+
+class Localiser {
+ public:
+  Localiser(const Surface& surface, const std::vector<Vec3>& seeds, RestrictedPolygons& polygons)
+      : surface_(surface), seeds_(seeds), polygons_(polygons) {}
+
+  // How many pieces changed hands.
+  std::size_t run() {
+    const BallReport report = check_ball_property(surface_, polygons_);
+    find_pieces(report);
+    if (pieces_.empty()) return 0;
+    measure();
+    for (std::size_t k = 0; k < pieces_.size(); ++k) choose(k);
+    while (cancel_impossible()) {
+    }
+    const auto moved = std::count_if(pieces_.begin(), pieces_.end(), [](const Piece& p) { return p.to != kNone; });
+    if (moved > 0) rebuild();
+    return static_cast<std::size_t>(moved);
+  }
+
+ private:
+  static constexpr std::size_t kOwn = static_cast<std::size_t>(-1);
+
+  double squared_distance(std::size_t polygon, const Vec3& p) const {
+    double least = std::numeric_limits<double>::infinity();
+    const std::size_t first = polygons_.offsets[polygon], end = polygons_.offsets[polygon + 1];
+    for (std::size_t e = first + 1; e + 1 < end; ++e) {
+      const Vec3 q =
+          nearest_on_triangle(p, polygons_.vertices[first], polygons_.vertices[e], polygons_.vertices[e + 1]);
+      least = std::min(least, norm2(q - p));
+    }
+    return least;
+  }
+
+  double area(std::size_t polygon) const {
+    const Vec3& normal = surface_.facets[surface_.facet_of[polygons_.pairs[polygon].triangle]].normal;
+    const std::size_t first = polygons_.offsets[polygon], end = polygons_.offsets[polygon + 1];
+    Vec3 sum;
+    for (std::size_t e = first + 1; e + 1 < end; ++e)
+      sum += cross(polygons_.vertices[e] - polygons_.vertices[first],
+                   polygons_.vertices[e + 1] - polygons_.vertices[first]);
+    return std::abs(0.5 * dot(normal, sum));
+  }
+
+  void find_pieces(const BallReport& report) {
+    piece_.assign(polygons_.pairs.size(), kOwn);
+    for (const BallReport::Cell& cell : report.cells) {
+      if (cell.parts.size() < 2) continue;
+      std::size_t own = 0;
+      double least = std::numeric_limits<double>::infinity();
+      for (std::size_t k = 0; k < cell.parts.size(); ++k)
+        for (const std::size_t p : cell.parts[k])
+          if (const double d = squared_distance(p, seeds_[cell.seed]); d < least) {
+            least = d;
+            own = k;
+          }
+      for (std::size_t k = 0; k < cell.parts.size(); ++k) {
+        if (k == own || cell.parts[k].empty()) continue;
+        for (const std::size_t p : cell.parts[k]) piece_[p] = pieces_.size();
+        pieces_.push_back({cell.parts[k]});
+      }
+    }
+  }
+
+  void measure() {
+    own_area_.assign(seeds_.size(), 0);
+    for (std::size_t p = 0; p < polygons_.pairs.size(); ++p)
+      (piece_[p] == kOwn ? own_area_[polygons_.pairs[p].cell] : pieces_[piece_[p]].area) += area(p);
+  }
+
+  // The polygon of a cell on the triangle of another polygon.
+  std::size_t beside(std::size_t polygon, Index cell) const {
+    const auto& pairs = polygons_.pairs;
+    const Index triangle = pairs[polygon].triangle;
+    for (std::size_t p = polygon; p-- > 0 && pairs[p].triangle == triangle;)
+      if (pairs[p].cell == cell) return p;
+    for (std::size_t p = polygon + 1; p < pairs.size() && pairs[p].triangle == triangle; ++p)
+      if (pairs[p].cell == cell) return p;
+    return kOwn;
+  }
+
+  bool has_label(std::size_t polygon, Index label) const {
+    const auto begin = polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[polygon]);
+    const auto end = polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[polygon + 1]);
+    return std::find(begin, end, label) != end;
+  }
+
+  void choose(std::size_t index) {
+    Piece& piece = pieces_[index];
+    std::map<Index, double> border;
+    for (const std::size_t p : piece.polygons) {
+      const std::size_t first = polygons_.offsets[p], size = polygons_.offsets[p + 1] - first;
+      for (std::size_t e = 0; e < size; ++e) {
+        const Index label = polygons_.labels[first + e];
+        if (is_edge(label)) continue;
+        const std::size_t other = beside(p, label);
+        if (other == kOwn || piece_[other] != kOwn) continue;
+        border[label] += norm(polygons_.vertices[first + (e + 1) % size] - polygons_.vertices[first + e]);
+      }
+    }
+    double longest = -1;
+    for (const auto& [cell, length] : border) {
+      if (length <= longest || piece.area > own_area_[cell]) continue;
+      const bool apart = std::any_of(piece.polygons.begin(), piece.polygons.end(),
+                                     [&](std::size_t p) { return beside(p, cell) != kOwn && !has_label(p, cell); });
+      if (apart) continue;
+      longest = length;
+      piece.to = cell;
+    }
+  }
+
+  Index new_cell(std::size_t polygon) const {
+    const std::size_t k = piece_[polygon];
+    return k == kOwn || pieces_[k].to == kNone ? polygons_.pairs[polygon].cell : pieces_[k].to;
+  }
+
+  std::size_t end_of_triangle(std::size_t begin) const {
+    std::size_t end = begin;
+    while (end < polygons_.pairs.size() && polygons_.pairs[end].triangle == polygons_.pairs[begin].triangle) ++end;
+    return end;
+  }
+
+  // Makes one polygon of two that share an edge, each having its own cell as the label there.
+  static bool join(Polygon& a, const Polygon& b) {
+    const auto own = [](const Polygon& p) {
+      return static_cast<std::size_t>(std::find(p.labels.begin(), p.labels.end(), p.cell) - p.labels.begin());
+    };
+    const std::size_t e = own(a), f = own(b);
+    if (e == a.labels.size() || f == b.labels.size()) return false;
+    Polygon joined{a.cell, {}, {}};
+    for (const auto& [polygon, shared] : {std::pair<const Polygon*, std::size_t>{&a, e}, {&b, f}})
+      for (std::size_t k = 1; k < polygon->labels.size(); ++k) {
+        const std::size_t at = (shared + k) % polygon->labels.size();
+        joined.labels.push_back(polygon->labels[at]);
+        joined.vertices.push_back(polygon->vertices[at]);
+      }
+    a = std::move(joined);
+    return true;
+  }
+
+  // Leaves out corners between edges of the same label.
+  static void simplify(Polygon& polygon) {
+    Polygon left{polygon.cell, {}, {}};
+    const std::size_t size = polygon.labels.size();
+    for (std::size_t k = 0; k < size; ++k) {
+      if (polygon.labels[k] == polygon.labels[(k + size - 1) % size]) continue;
+      left.labels.push_back(polygon.labels[k]);
+      left.vertices.push_back(polygon.vertices[k]);
+    }
+    if (!left.labels.empty()) polygon = std::move(left);
+  }
+
+  // The polygons of a triangle after its pieces have changed hands, by ascending cell; none if they cannot.
+  std::optional<std::vector<Polygon>> changed(std::size_t begin, std::size_t end) const {
+    std::map<Index, Index> renamed;
+    for (std::size_t p = begin; p < end; ++p) renamed[polygons_.pairs[p].cell] = new_cell(p);
+    std::vector<Polygon> left;
+    for (std::size_t p = begin; p < end; ++p) {
+      Polygon polygon{new_cell(p), {}, {}};
+      for (std::size_t e = polygons_.offsets[p]; e < polygons_.offsets[p + 1]; ++e) {
+        const Index label = polygons_.labels[e];
+        const auto other = is_edge(label) ? renamed.end() : renamed.find(label);
+        polygon.labels.push_back(other == renamed.end() ? label : other->second);
+        polygon.vertices.push_back(polygons_.vertices[e]);
+      }
+      simplify(polygon);
+      left.push_back(std::move(polygon));
+    }
+    for (bool joined = true; joined;) {
+      joined = false;
+      for (std::size_t a = 0; a < left.size() && !joined; ++a)
+        for (std::size_t b = a + 1; b < left.size() && !joined; ++b) {
+          if (left[a].cell != left[b].cell || !join(left[a], left[b])) continue;
+          simplify(left[a]);
+          left.erase(left.begin() + static_cast<std::ptrdiff_t>(b));
+          joined = true;
+        }
+    }
+    std::sort(left.begin(), left.end(), [](const Polygon& a, const Polygon& b) { return a.cell < b.cell; });
+    for (std::size_t k = 0; k < left.size(); ++k) {
+      if (k > 0 && left[k].cell == left[k - 1].cell) return std::nullopt;
+      if (std::find(left[k].labels.begin(), left[k].labels.end(), left[k].cell) != left[k].labels.end())
+        return std::nullopt;
+    }
+    return left;
+  }
+
+  bool is_touched(std::size_t begin, std::size_t end) const {
+    for (std::size_t p = begin; p < end; ++p)
+      if (new_cell(p) != polygons_.pairs[p].cell) return true;
+    return false;
+  }
+
+  // Leaves pieces where they are that would not make one polygon with their new cell's on some triangle.
+  bool cancel_impossible() {
+    bool any = false;
+    for (std::size_t begin = 0, end = 0; begin < polygons_.pairs.size(); begin = end) {
+      end = end_of_triangle(begin);
+      if (!is_touched(begin, end) || changed(begin, end)) continue;
+      for (std::size_t p = begin; p < end; ++p)
+        if (piece_[p] != kOwn) pieces_[piece_[p]].to = kNone;
+      any = true;
+    }
+    return any;
+  }
+
+  void rebuild() {
+    RestrictedPolygons built;
+    built.offsets = {0};
+    const auto close = [&](Index triangle, Index cell) {
+      built.pairs.push_back({triangle, cell});
+      built.offsets.push_back(built.labels.size());
+    };
+    for (std::size_t begin = 0, end = 0; begin < polygons_.pairs.size(); begin = end) {
+      end = end_of_triangle(begin);
+      if (is_touched(begin, end)) {
+        const std::vector<Polygon> anew = changed(begin, end).value();
+        for (const Polygon& polygon : anew) {
+          built.labels.insert(built.labels.end(), polygon.labels.begin(), polygon.labels.end());
+          built.vertices.insert(built.vertices.end(), polygon.vertices.begin(), polygon.vertices.end());
+          close(polygons_.pairs[begin].triangle, polygon.cell);
+        }
+        continue;
+      }
+      for (std::size_t p = begin; p < end; ++p) {
+        const auto first = static_cast<std::ptrdiff_t>(polygons_.offsets[p]);
+        const auto last = static_cast<std::ptrdiff_t>(polygons_.offsets[p + 1]);
+        built.labels.insert(built.labels.end(), polygons_.labels.begin() + first, polygons_.labels.begin() + last);
+        built.vertices.insert(built.vertices.end(), polygons_.vertices.begin() + first,
+                              polygons_.vertices.begin() + last);
+        close(polygons_.pairs[p].triangle, polygons_.pairs[p].cell);
+      }
+    }
+    polygons_ = std::move(built);
+  }
+
+  const Surface& surface_;
+  const std::vector<Vec3>& seeds_;
+  RestrictedPolygons& polygons_;
+  std::vector<Piece> pieces_;
+  std::vector<std::size_t> piece_;  // of each polygon; kOwn if it is part of the cell around the seed
+  std::vector<double> own_area_;    // of each cell
+};
+
+}  // namespace
+
+std::size_t localise_cells(const Surface& surface, const std::vector<Vec3>& seeds, RestrictedPolygons& polygons) {
+  std::size_t all = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::size_t moved = Localiser(surface, seeds, polygons).run();
+    all += moved;
+    if (moved == 0) break;
+  }
+  return all;
+}
+
+}  // namespace bisector
