@@ -117,11 +117,11 @@ struct RemeshSeconds {
 
 // What became of the input's features where they are fine (remesh/detail.h).
 struct DetailResult {
-  double width = 0;          // details of at least this width are resolved; 0: all are
-  std::size_t resolved = 0;  // curves that were kept
+  double width = 0;          // details below it were merged or let go; 0: there are none
+  std::size_t resolved = 0;  // curves that are left
   std::size_t merged = 0;    // curves that a neighbour stands for
   std::size_t let_go = 0;    // curves that nothing stands for
-  std::size_t vertices = 0;  // that would resolve all of them; 0 if these do, or if it would be far too many
+  std::size_t vertices = 0;  // that would resolve all; 0: far more than were asked for
 };
 
 struct FeatureResult {
@@ -139,7 +139,7 @@ struct RemeshResult {
   MeshTopology topology;          // of mesh
   MeshTopology input_topology;    // after welding and orienting
   bool topology_matches = false;  // manifold, oriented, closed and of Euler characteristic and components as the input
-  bool ball_property = false;     // of the final diagram
+  bool ball_property = false;     // of the final diagram, without stray parts of cells
   std::size_t divided = 0;        // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
   std::vector<TopologyFault> faults;  // where it fails; indices are those of mesh's vertices, kNone if none
   FeatureResult features;

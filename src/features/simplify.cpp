@@ -75,8 +75,11 @@ class CornerGraph {
   // Branchings first, then ends, then turns; among these the corner of the most important curves.
   std::array<double, 2> rank_of(Index corner) const {
     double weight = 0;
-    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm) weight += weights_[arm->curve];
-    const std::size_t arms = at_.size(corner);
+    std::size_t arms = 0;  // but for links, which weigh nothing
+    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm) {
+      weight += weights_[arm->curve];
+      arms += weights_[arm->curve] > 0;
+    }
     return {arms > 2 ? 2.0 : arms == 2 ? 0.0 : 1.0, weight};
   }
 
@@ -142,15 +145,17 @@ double length_of(const std::vector<Index>& chain, bool closed, const std::vector
   return closed ? length + norm(vertices[chain.front()] - vertices[chain.back()]) : length;
 }
 
-std::vector<Candidate> led_to_representatives(const FeatureCurves& curves, const std::vector<Vec3>& vertices,
-                                              const std::vector<double>& weights, const CornerGraph::Forest& forest,
-                                              double width, SimplifiedFeatures& result) {
+// Of the first `count` curves; the others are links.
+std::vector<Candidate> led_to_representatives(const FeatureCurves& curves, std::size_t count,
+                                              const std::vector<Vec3>& vertices, const std::vector<double>& weights,
+                                              const CornerGraph::Forest& forest, double width,
+                                              SimplifiedFeatures& result) {
   const FeatureGraph& graph = curves.graph();
   std::vector<char> between(curves.size(), 0);
   for (const Index c : forest.curve)
     if (c != kNone) between[c] = 1;
   std::vector<Candidate> candidates;
-  for (Index c = 0; c < curves.size(); ++c) {
+  for (Index c = 0; c < count; ++c) {
     Candidate candidate{graph.curves[c], weights[c], curves.length(c)};
     if (curves.closed(c)) {
       if (is_crease(candidate.curve) && candidate.length < kLoopEdges * width) ++result.let_go;
@@ -393,16 +398,42 @@ std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<T
   return weights;
 }
 
+std::vector<std::array<Index, 2>> corner_links(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
+                                               std::size_t vertex_count) {
+  std::vector<char> is_corner(vertex_count, 0);
+  for (const Index v : graph.corners) is_corner[v] = 1;
+  std::vector<std::array<Index, 2>> links;
+  for (const Triangle& t : triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
+      if (a != b && is_corner[a] && is_corner[b]) links.push_back({a, b});
+    }
+  std::sort(links.begin(), links.end());
+  links.erase(std::unique(links.begin(), links.end()), links.end());
+  std::erase_if(links, [&](const std::array<Index, 2>& link) {
+    return std::binary_search(graph.edges.begin(), graph.edges.end(), link);
+  });
+  return links;
+}
+
 SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
-                                     const std::vector<double>& weights, double width) {
+                                     const std::vector<double>& given_weights, double width,
+                                     const std::vector<std::array<Index, 2>>& links) {
   SimplifiedFeatures result;
   if (!(width > 0)) {
     result.graph = graph;
     return result;
   }
-  const FeatureCurves curves(graph, vertices);
+  FeatureGraph linked = graph;
+  std::vector<double> weights = given_weights;
+  for (const auto& [a, b] : links) {
+    linked.curves.push_back({{a, b}, false, FeatureKind::crease});
+    weights.push_back(0);
+  }
+  const FeatureCurves curves(linked, vertices);
   const CornerGraph::Forest forest = CornerGraph(curves, weights).merge(width);
-  std::vector<Candidate> candidates = led_to_representatives(curves, vertices, weights, forest, width, result);
+  std::vector<Candidate> candidates =
+      led_to_representatives(curves, graph.curves.size(), vertices, weights, forest, width, result);
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return is_crease(a.curve) != is_crease(b.curve) ? !is_crease(a.curve) : a.weight > b.weight;
   });
@@ -418,7 +449,7 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   }
   // Corners on no curve, such as the tips of cones.
   std::vector<char> on_curve(graph.corners.size(), 0);
-  for (Index c = 0; c < curves.size(); ++c)
+  for (Index c = 0; c < graph.curves.size(); ++c)
     if (!curves.closed(c))
       for (const Index end : curves.ends(c)) on_curve[end] = 1;
   for (Index k = 0; k < graph.corners.size(); ++k)

@@ -1,6 +1,7 @@
 // What is left of feature curves for a mesh that cannot show details below some width.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -26,8 +27,13 @@ std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<T
 //   - Creases go by ascending weight if they run within `width` of others for more than half of their length, though
 //     they are not led there by a corner (curve_gaps). So the two curves of a chamfer become one.
 //   - Closed creases shorter than 4 `width` go.
-// Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing.
+// Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing. `links` are edges of the
+// mesh between two corners that are no features: corners may be led along them, too (corner_links).
 SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
-                                     const std::vector<double>& weights, double width);
+                                     const std::vector<double>& weights, double width,
+                                     const std::vector<std::array<Index, 2>>& links = {});
+
+std::vector<std::array<Index, 2>> corner_links(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
+                                               std::size_t vertex_count);
 
 }  // namespace bisector

@@ -1,5 +1,7 @@
 #include "remesh/detail.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "bisector/error.h"
 #include "core/degenerate.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
@@ -40,7 +43,8 @@ class Planner {
   Planner(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
           std::size_t vertices)
       : mesh_(mesh), features_(features), edge_length_(edge_length), vertices_(static_cast<double>(vertices)),
-        weights_(curve_weights(features, mesh.triangles, mesh.vertices)) {
+        weights_(curve_weights(features, mesh.triangles, mesh.vertices)),
+        links_(corner_links(features, mesh.triangles, mesh.vertices.size())) {
     double sum = 0;
     for (const double h : edge_length) sum += h;
     mean_ = sum / static_cast<double>(edge_length.size());
@@ -57,16 +61,19 @@ class Planner {
   Trial trial(double width, double coarsening) const {
     Trial t;
     t.width = width;
-    t.simplified = simplify_features(features_, mesh_.vertices, weights_, width);
+    t.simplified = simplify_features(features_, mesh_.vertices, weights_, width, links_);
     find_sizes(t, coarsening);
     t.vertices = count(t, coarsening);
     return t;
   }
 
-  Trial best() const {
+  // What resolves all details.
+  Trial finest(double coarsening) const { return trial(kFinest * mean_, coarsening); }
+
+  // The least width that there are vertices for. `all` is what resolves all details.
+  Trial within_budget(Trial all) const {
+    if (all.vertices <= vertices_) return all;
     double fine = kFinest * mean_, coarse = kCoarsest * mean_;
-    Trial finest = trial(fine, kCoarsening);
-    if (finest.vertices <= vertices_) return finest;
     Trial best = trial(coarse, kCoarsening);
     for (int k = 0; k < kBisections; ++k) {
       const double middle = std::sqrt(fine * coarse);
@@ -80,8 +87,6 @@ class Planner {
     }
     return best;
   }
-
-  double mean() const { return mean_; }
 
  private:
   // The edge length without details, at the nearest vertex of a curve.
@@ -158,6 +163,7 @@ class Planner {
   double vertices_;
   double mean_ = 0;
   std::vector<double> weights_;
+  std::vector<std::array<Index, 2>> links_;
 };
 
 }  // namespace
@@ -169,14 +175,23 @@ DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, 
   plan.result.resolved = features.curves.size();
   if (mode == DetailMode::off || features.curves.empty()) return plan;
   const Planner planner(mesh, features, edge_length, vertices);
-  Planner::Trial best = planner.best();
+  const bool all = mode == DetailMode::all;
+  Planner::Trial best = planner.finest(all ? 1 : kCoarsening);
+  const double needed = best.vertices;
+  if (!all) best = planner.within_budget(std::move(best));
+  else if (needed > kFarTooMany * static_cast<double>(vertices))
+    throw Error(
+        fmt::format("all details take more than {:.0f} times the vertices asked for; ask for more of them, or "
+                    "let finer details go",
+                    kFarTooMany));
   plan.features = std::move(best.simplified.graph);
   plan.points = std::move(best.points);
   plan.lengths = std::move(best.lengths);
   plan.result.resolved = plan.features.curves.size();
   plan.result.merged = best.simplified.merged;
   plan.result.let_go = best.simplified.let_go;
-  plan.result.width = best.width;
+  if (plan.result.merged + plan.result.let_go > 0) plan.result.width = best.width;
+  if (needed < kFarTooMany * static_cast<double>(vertices)) plan.result.vertices = static_cast<std::size_t>(needed);
   return plan;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "bisector/error.h"
@@ -79,13 +80,12 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   return useful ? welded : keep_apart(input, topology.boundary_edges);
 }
 
-PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
-  PreparedInput prepared;
-  prepared.welded = join_borders(input, options.weld);
-  TriangleMesh welded = std::exchange(prepared.welded.mesh, {});
-  const std::vector<Index>& vertex_of = prepared.welded.vertex_of;
-  warn_of_weld(prepared.welded, options, context);
-  orient_with_warning(welded, context);
+Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options, const Context& context)
+    : welded_(join_borders(input, options.weld)), mesh_(std::exchange(welded_.mesh, {})), sizing_(options.sizing),
+      target_(target_of(options)), given_seeds_(options.seeds.size()), energy_(options.energy) {
+  const std::vector<Index>& vertex_of = welded_.vertex_of;
+  warn_of_weld(welded_, options, context);
+  orient_with_warning(mesh_, context);
 
   FeatureOptions features = options.features;
   for (auto& [a, b] : features.given) {
@@ -95,51 +95,65 @@ PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, c
     b = vertex_of[b];
   }
   std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
-  const SizingTarget target = target_of(options);
-  if (options.energy == Energy::automatic) {
-    const std::size_t count = target.vertices ? target.vertices : compute_sizing(welded, {}, target).vertices;
-    prepared.noisy = has_noisy_normals(welded, std::max<std::size_t>(count, 4));
-    // What noise folds is no feature.
-    if (prepared.noisy && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
-  }
-  FeatureGraph graph = detect_features(welded, features);
+  if (energy_ == Energy::automatic) find_noise(features);
+  features_ = detect_features(mesh_, features);
 
-  SizingOptions sizing = options.sizing;
-  if (!sizing.attribute.empty()) {
-    if (sizing.attribute.size() != input.vertices.size())
-      throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex", sizing.attribute.size(),
-                              input.vertices.size()));
-    std::vector<double> values(welded.vertices.size());
-    for (std::size_t v = input.vertices.size(); v-- > 0;) values[vertex_of[v]] = sizing.attribute[v];
-    sizing.attribute = std::move(values);
+  if (!sizing_.attribute.empty()) {
+    if (sizing_.attribute.size() != input.vertices.size())
+      throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex",
+                              sizing_.attribute.size(), input.vertices.size()));
+    std::vector<double> values(mesh_.vertices.size());
+    for (std::size_t v = input.vertices.size(); v-- > 0;) values[vertex_of[v]] = sizing_.attribute[v];
+    sizing_.attribute = std::move(values);
   }
-  sizing.sharp = graph.edges;
-  SizedMesh sized = refine_for_density(welded, sizing, target);
-  if (options.seeds.empty() && options.detail != DetailMode::off && !graph.curves.empty()) {
-    std::vector<double> lengths(welded.vertices.size());
-    for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(sized.sizing, v);
-    DetailPlan plan = plan_details(welded, graph, lengths, sized.sizing.vertices, options.detail);
-    graph = std::move(plan.features);
-    prepared.detail = plan.result;
-    if (!plan.points.empty()) {
-      const SizeField bound(plan.points, plan.lengths, kDetailGradation);
-      sized = refine_for_density(welded, sizing, target, &bound);
-    }
-  }
-  if (sized.sizing.vertices > kMostVertices && options.seeds.empty())
+  sizing_.sharp = features_.edges;
+  if (given_seeds_ == 0 && options.detail != DetailMode::off && !features_.curves.empty()) plan(options);
+}
+
+// What noise folds is no feature.
+void Preparation::find_noise(FeatureOptions& features) {
+  const std::size_t count = target_.vertices ? target_.vertices : compute_sizing(mesh_, {}, target_).vertices;
+  noisy_ = has_noisy_normals(mesh_, std::max<std::size_t>(count, 4));
+  if (noisy_ && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
+}
+
+void Preparation::plan(const RemeshOptions& options) {
+  const Sizing plain = refine_for_density(mesh_, sizing_, target_).sizing;
+  std::vector<double> lengths(mesh_.vertices.size());
+  for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(plain, v);
+  DetailPlan plan = plan_details(mesh_, features_, lengths, plain.vertices, options.detail);
+  features_ = std::move(plan.features);
+  detail_ = plan.result;
+  bound(plan.points, plan.lengths);
+  if (options.detail == DetailMode::all && detail_.vertices > plain.vertices) target_ = {detail_.vertices, 0};
+}
+
+void Preparation::bound(const std::vector<Vec3>& points, const std::vector<double>& lengths) {
+  bounded_points_.insert(bounded_points_.end(), points.begin(), points.end());
+  bounded_lengths_.insert(bounded_lengths_.end(), lengths.begin(), lengths.end());
+}
+
+PreparedInput Preparation::lay_down() const {
+  std::optional<SizeField> field;
+  if (!bounded_points_.empty()) field.emplace(bounded_points_, bounded_lengths_, kDetailGradation);
+  SizedMesh sized = refine_for_density(mesh_, sizing_, target_, field ? &*field : nullptr);
+  if (sized.sizing.vertices > kMostVertices && given_seeds_ == 0)
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
-                            options.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));
-  prepared.features = split_features(graph, sized.splits);
+                            target_.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));
+  PreparedInput prepared;
+  prepared.detail = detail_;
+  prepared.noisy = noisy_;
+  prepared.features = split_features(features_, sized.splits);
   prepared.mesh = std::move(sized.mesh);
   prepared.mesh.feature_edges.clear();
   prepared.mesh.labels.clear();
-  if (!welded.labels.empty())
-    for (Index t : sized.parent) prepared.mesh.labels.push_back(welded.labels[t]);
+  if (!mesh_.labels.empty())
+    for (Index t : sized.parent) prepared.mesh.labels.push_back(mesh_.labels[t]);
   prepared.density = std::move(sized.sizing.density);
   prepared.unit_edge = sized.sizing.unit_edge;
-  prepared.vertices = options.seeds.empty() ? sized.sizing.vertices : options.seeds.size();
+  prepared.vertices = given_seeds_ == 0 ? sized.sizing.vertices : given_seeds_;
   if (prepared.vertices < 4)
-    throw Error(fmt::format("edges of {} make {} vertices, fewer than 4; ask for shorter ones", options.edge_length,
+    throw Error(fmt::format("edges of {} make {} vertices, fewer than 4; ask for shorter ones", target_.edge_length,
                             prepared.vertices));
   return prepared;
 }

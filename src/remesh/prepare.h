@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "remesh/remesh.h"
+#include "remesh/sizing.h"
 
 namespace bisector {
 
@@ -14,7 +15,6 @@ struct PreparedInput {
   std::vector<double> density;  // for Surface
   double unit_edge = 0;         // edge length where the density is 1
   std::size_t vertices = 0;     // wanted of the result
-  WeldResult welded;            // without its mesh
   DetailResult detail;
   bool noisy = false;  // normals are noise, and Energy::automatic means restricted
 };
@@ -23,7 +23,33 @@ struct PreparedInput {
 // makes no edge non-manifold.
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
 
-// Throws Error as remesh does.
-PreparedInput prepare(const TriangleMesh& input, const RemeshOptions& options, const Context& context);
+// What is done to an input before seeds are placed.
+class Preparation {
+ public:
+  // Welds and orients the input, finds its features and plans their details. Throws Error as remesh does.
+  Preparation(const TriangleMesh& input, const RemeshOptions& options, const Context& context);
+
+  // Edges at these points must not be longer than these lengths.
+  void bound(const std::vector<Vec3>& points, const std::vector<double>& lengths);
+  // The domain with its density as it stands.
+  PreparedInput lay_down() const;
+  const WeldResult& welded() const { return welded_; }
+
+ private:
+  void find_noise(FeatureOptions& features);
+  void plan(const RemeshOptions& options);
+
+  WeldResult welded_;  // without its mesh
+  TriangleMesh mesh_;
+  FeatureGraph features_;
+  SizingOptions sizing_;
+  SizingTarget target_;
+  std::size_t given_seeds_;
+  Energy energy_;
+  DetailResult detail_;
+  bool noisy_ = false;
+  std::vector<Vec3> bounded_points_;
+  std::vector<double> bounded_lengths_;
+};
 
 }  // namespace bisector

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
@@ -32,6 +33,10 @@ namespace {
 // seeds that are put on the surface move little.
 constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0.05;
 constexpr int kMendingRounds = 3;  // of features and topology
+// Runs that start again with edges shorter by this where cells were no disks; not if more than one cell in so many was.
+constexpr int kAttempts = 2;
+constexpr double kShorter = 0.6;
+constexpr std::size_t kTooManyFailures = 4;
 constexpr int kFreedSteps = 20;
 constexpr double kFitQuality = 0.7;  // what fitting may bring better triangles down to
 constexpr double kMaxAngle = 91;     // degrees; goal of the final pass
@@ -70,7 +75,20 @@ class Pipeline {
     step_.share = 0;
   }
 
-  RemeshResult run();
+  // Places seeds and optimises them.
+  void place();
+  // Where cells are still no disks then, and how long edges should be there. Empty if topology is not enforced, or if
+  // so many cells fail that the seeds are too few.
+  struct Crowded {
+    std::vector<Vec3> points;
+    std::vector<double> lengths;
+  };
+  Crowded crowded();
+  const RunTotals& totals() const { return run_.totals; }
+  // Counts what was done before in vain.
+  void count(const RunTotals& totals) { run_.totals = totals; }
+  // Mends and improves what place() left.
+  RemeshResult finish();
 
  private:
   // The final diagram, with the cells of several sheets divided as topology control found it necessary.
@@ -95,6 +113,7 @@ class Pipeline {
   void extract();
   void extract_features(const std::vector<Index>& vertex_of);
   void fit();
+  double density_at(const BallReport::Groups& parts, const RestrictedPolygons& polygons) const;
 
   const Surface& surface_;
   const RemeshPlan& plan_;
@@ -315,11 +334,53 @@ void Pipeline::fit() {
   result_.seconds.fit = watch.seconds();
 }
 
-RemeshResult Pipeline::run() {
-  const Stopwatch watch;
+void Pipeline::place() {
   result_.wanted = wanted_;
   result_.input_topology = analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size());
   optimise_levels();
+}
+
+Pipeline::Crowded Pipeline::crowded() {
+  Crowded found;
+  const MeshTopology& input = result_.input_topology;
+  if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !input.manifold || !input.oriented)
+    return found;
+  run_.localise(true);
+  const RestrictedPolygons& polygons = run_.diagram(Want::polygons).polygons;
+  const BallReport report = check_ball_property(surface_, polygons);
+  if (report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
+  for (const BallReport::Cell& cell : report.cells) {
+    // The edges of a cell of this mass, as of the hexagons of a regular mesh.
+    const double mass = run_.diagram().moments.cells[cell.seed].mass;
+    const double length = kShorter * std::sqrt(2 / std::numbers::sqrt3 * mass / density_at(cell.parts, polygons));
+    if (!(length > 0) || !std::isfinite(length)) continue;
+    found.points.push_back(run_.seeds.position(cell.seed));
+    found.lengths.push_back(length);
+    for (const auto& part : cell.parts)
+      for (const std::size_t p : part)
+        for (std::size_t e = polygons.offsets[p]; e < polygons.offsets[p + 1]; ++e) {
+          found.points.push_back(polygons.vertices[e]);
+          found.lengths.push_back(length);
+        }
+  }
+  return found;
+}
+
+// The mean density of a cell's parts.
+double Pipeline::density_at(const BallReport::Groups& parts, const RestrictedPolygons& polygons) const {
+  if (surface_.density.empty()) return 1;
+  double sum = 0;
+  std::size_t count = 0;
+  for (const auto& part : parts)
+    for (const std::size_t p : part)
+      for (const Index v : surface_.mesh.triangles[polygons.pairs[p].triangle]) {
+        sum += surface_.density[v];
+        ++count;
+      }
+  return count > 0 ? sum / static_cast<double>(count) : 1;
+}
+
+RemeshResult Pipeline::finish() {
   mend_features_and_topology();
   if (run_.has_features()) complete(run_, plan_.constrained);
   if (plan_.min_angle > 0 && plan_.constrained) improve_quality();
@@ -331,7 +392,6 @@ RemeshResult Pipeline::run() {
   result_.gradient_norm = run_.gradient_norm;
   result_.certification = run_.certification();
   result_.device = run_.backend().description();
-  result_.seconds.total = watch.seconds();
   result_.seconds.lbfgs = run_.totals.seconds_lbfgs;
   result_.seconds.diagrams = run_.totals.seconds;
   return std::move(result_);
@@ -359,26 +419,49 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   check_options(options);
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
-  PreparedInput prepared = prepare(input, options, context);
-  RemeshPlan plan = plan_of(options);
-  plan.vertices = prepared.vertices;
-  if (prepared.noisy) plan.constrained = false;
-  const Surface surface(std::move(prepared.mesh), std::move(prepared.density));
-  const double preparing = watch.seconds();
-  const std::unique_ptr<Backend> backend = make_backend(surface, options.compute, context);
-  RemeshResult result = remesh(*backend, prepared.features, plan, context);
-  result.welded = std::move(prepared.welded);
-  result.edge_length = prepared.unit_edge;
-  result.detail = prepared.detail;
-  result.noisy = prepared.noisy;
-  result.seconds.prepare = preparing;
-  result.seconds.total = watch.seconds();
-  return result;
+  Preparation preparation(input, options, context);
+  Compute compute(options.compute, context);
+  double preparing = watch.seconds();
+  RunTotals totals;
+  for (int attempt = 0;; ++attempt) {
+    const Stopwatch laying_down;
+    const PreparedInput prepared = preparation.lay_down();
+    RemeshPlan plan = plan_of(options);
+    plan.vertices = prepared.vertices;
+    if (prepared.noisy) plan.constrained = false;
+    const Surface surface(prepared.mesh, prepared.density);
+    preparing += laying_down.seconds();
+    const std::unique_ptr<Backend> backend = compute.backend(surface);
+    Pipeline pipeline(*backend, prepared.features, plan, context);
+    pipeline.count(totals);
+    pipeline.place();
+    if (attempt < kAttempts && options.seeds.empty() && options.detail != DetailMode::off) {
+      const Pipeline::Crowded crowded = pipeline.crowded();
+      if (!crowded.points.empty()) {
+        preparation.bound(crowded.points, crowded.lengths);
+        totals = pipeline.totals();
+        continue;
+      }
+    }
+    RemeshResult result = pipeline.finish();
+    result.welded = preparation.welded();
+    result.edge_length = prepared.unit_edge;
+    result.noisy = prepared.noisy;
+    result.detail = prepared.detail;
+    result.seconds.prepare = preparing;
+    result.seconds.total = watch.seconds();
+    return result;
+  }
 }
 
 RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context) {
   check_plan(plan);
-  return Pipeline(backend, features, plan, context).run();
+  const Stopwatch watch;
+  Pipeline pipeline(backend, features, plan, context);
+  pipeline.place();
+  RemeshResult result = pipeline.finish();
+  result.seconds.total = watch.seconds();
+  return result;
 }
 
 }  // namespace bisector

@@ -22,6 +22,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Rounds of inserting seeds: with an optimisation of so many steps after each (thesis 4.4.4), while more than one cell
 // in kTooFew fails; then without. Every kFarRounds-th round of the latter inserts far points.
 constexpr int kGrowingRounds = 12, kGrowingSteps = 30, kRefiningRounds = 80, kFarRounds = 3;
+// Refining ends if so many rounds in a row have not led to fewer failures.
+constexpr int kPatience = 12;
 constexpr std::size_t kTooFew = 8;
 // Refining has no end if there are so many times the failures of the beginning, and kMostAdded more.
 constexpr std::size_t kDivergence = 2;
@@ -312,11 +314,16 @@ class Control {
 
   // Where sheets cross there is no end to refining: more and more cells fail.
   bool refine() {
-    const std::size_t hopeless = kDivergence * outcome_.ball.failures() + kMostAdded;
-    for (int round = 0; round < kRefiningRounds && !outcome_.ball.holds; ++round) {
+    std::size_t least = outcome_.ball.failures();
+    const std::size_t hopeless = kDivergence * least + kMostAdded;
+    for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !outcome_.ball.holds;
+         ++round, ++idle) {
       if (outcome_.ball.failures() > hopeless || !insert(round % kFarRounds == kFarRounds - 1)) break;
       check();
       keep_best();
+      if (outcome_.ball.failures() >= least) continue;
+      least = outcome_.ball.failures();
+      idle = 0;
     }
     return outcome_.ball.holds;
   }

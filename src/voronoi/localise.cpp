@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <optional>
 #include <utility>
 
 #include "voronoi/ball_property.h"
@@ -18,7 +17,8 @@ constexpr int kRounds = 4;  // pieces that lie among other pieces wait for these
 struct Piece {
   std::vector<std::size_t> polygons;
   double area = 0;
-  Index to = kNone;  // the cell that it goes to
+  std::vector<Index> choices;  // cells that it could go to, the best last
+  Index to() const { return choices.empty() ? kNone : choices.back(); }
 };
 
 // A polygon while its triangle is put together anew.
@@ -42,7 +42,7 @@ class Localiser {
     for (std::size_t k = 0; k < pieces_.size(); ++k) choose(k);
     while (cancel_impossible()) {
     }
-    const auto moved = std::count_if(pieces_.begin(), pieces_.end(), [](const Piece& p) { return p.to != kNone; });
+    const auto moved = std::count_if(pieces_.begin(), pieces_.end(), [](const Piece& p) { return p.to() != kNone; });
     if (moved > 0) rebuild();
     return static_cast<std::size_t>(moved);
   }
@@ -86,7 +86,7 @@ class Localiser {
       for (std::size_t k = 0; k < cell.parts.size(); ++k) {
         if (k == own || cell.parts[k].empty()) continue;
         for (const std::size_t p : cell.parts[k]) piece_[p] = pieces_.size();
-        pieces_.push_back({cell.parts[k]});
+        pieces_.push_back({cell.parts[k], 0, {}});
       }
     }
   }
@@ -127,20 +127,19 @@ class Localiser {
         border[label] += norm(polygons_.vertices[first + (e + 1) % size] - polygons_.vertices[first + e]);
       }
     }
-    double longest = -1;
+    std::vector<std::pair<double, Index>> order;
     for (const auto& [cell, length] : border) {
-      if (length <= longest || piece.area > own_area_[cell]) continue;
       const bool apart = std::any_of(piece.polygons.begin(), piece.polygons.end(),
-                                     [&](std::size_t p) { return beside(p, cell) != kOwn && !has_label(p, cell); });
-      if (apart) continue;
-      longest = length;
-      piece.to = cell;
+                                     [&, c = cell](std::size_t p) { return beside(p, c) != kOwn && !has_label(p, c); });
+      if (!apart && piece.area <= own_area_[cell]) order.push_back({length, cell});
     }
+    std::sort(order.begin(), order.end());
+    for (const auto& [length, cell] : order) piece.choices.push_back(cell);
   }
 
   Index new_cell(std::size_t polygon) const {
     const std::size_t k = piece_[polygon];
-    return k == kOwn || pieces_[k].to == kNone ? polygons_.pairs[polygon].cell : pieces_[k].to;
+    return k == kOwn || pieces_[k].to() == kNone ? polygons_.pairs[polygon].cell : pieces_[k].to();
   }
 
   std::size_t end_of_triangle(std::size_t begin) const {
@@ -179,11 +178,25 @@ class Localiser {
     if (!left.labels.empty()) polygon = std::move(left);
   }
 
-  // The polygons of a triangle after its pieces have changed hands, by ascending cell; none if they cannot.
-  std::optional<std::vector<Polygon>> changed(std::size_t begin, std::size_t end) const {
+  // Two cells share one edge on a triangle at most, or corners could not be told apart by their labels.
+  static void add_repeated(const Polygon& polygon, std::vector<Index>& spoilt) {
+    std::vector<Index> labels = polygon.labels;
+    labels.push_back(polygon.cell);
+    std::sort(labels.begin(), labels.end());
+    for (std::size_t k = 1; k < labels.size(); ++k)
+      if (labels[k] == labels[k - 1]) spoilt.insert(spoilt.end(), {polygon.cell, labels[k]});
+  }
+
+  struct Changed {
+    std::vector<Polygon> polygons;  // by ascending cell
+    std::vector<Index> spoilt;      // cells that are in several polygons, or share several edges with another
+  };
+  // A triangle after its pieces have changed hands.
+  Changed changed(std::size_t begin, std::size_t end) const {
     std::map<Index, Index> renamed;
     for (std::size_t p = begin; p < end; ++p) renamed[polygons_.pairs[p].cell] = new_cell(p);
-    std::vector<Polygon> left;
+    Changed result;
+    std::vector<Polygon>& left = result.polygons;
     for (std::size_t p = begin; p < end; ++p) {
       Polygon polygon{new_cell(p), {}, {}};
       for (std::size_t e = polygons_.offsets[p]; e < polygons_.offsets[p + 1]; ++e) {
@@ -207,11 +220,10 @@ class Localiser {
     }
     std::sort(left.begin(), left.end(), [](const Polygon& a, const Polygon& b) { return a.cell < b.cell; });
     for (std::size_t k = 0; k < left.size(); ++k) {
-      if (k > 0 && left[k].cell == left[k - 1].cell) return std::nullopt;
-      if (std::find(left[k].labels.begin(), left[k].labels.end(), left[k].cell) != left[k].labels.end())
-        return std::nullopt;
+      if (k > 0 && left[k].cell == left[k - 1].cell) result.spoilt.push_back(left[k].cell);
+      add_repeated(left[k], result.spoilt);
     }
-    return left;
+    return result;
   }
 
   bool is_touched(std::size_t begin, std::size_t end) const {
@@ -220,14 +232,29 @@ class Localiser {
     return false;
   }
 
-  // Leaves pieces where they are that would not make one polygon with their new cell's on some triangle.
+  // Where a piece would not make one polygon with its new cell's on some triangle, it goes to the next best cell.
   bool cancel_impossible() {
     bool any = false;
     for (std::size_t begin = 0, end = 0; begin < polygons_.pairs.size(); begin = end) {
       end = end_of_triangle(begin);
-      if (!is_touched(begin, end) || changed(begin, end)) continue;
-      for (std::size_t p = begin; p < end; ++p)
-        if (piece_[p] != kOwn) pieces_[piece_[p]].to = kNone;
+      if (!is_touched(begin, end)) continue;
+      const std::vector<Index> spoilt = changed(begin, end).spoilt;
+      if (spoilt.empty()) continue;
+      any = true;
+      if (!pass_on(begin, end,
+                   [&](Index cell) { return std::find(spoilt.begin(), spoilt.end(), cell) != spoilt.end(); }))
+        pass_on(begin, end, [](Index) { return true; });
+    }
+    return any;
+  }
+
+  // Has the pieces of a triangle that go to some cells go elsewhere; false if there are none.
+  template <class Some>
+  bool pass_on(std::size_t begin, std::size_t end, const Some& some) {
+    bool any = false;
+    for (std::size_t p = begin; p < end; ++p) {
+      if (piece_[p] == kOwn || pieces_[piece_[p]].choices.empty() || !some(pieces_[piece_[p]].to())) continue;
+      pieces_[piece_[p]].choices.pop_back();
       any = true;
     }
     return any;
@@ -243,7 +270,7 @@ class Localiser {
     for (std::size_t begin = 0, end = 0; begin < polygons_.pairs.size(); begin = end) {
       end = end_of_triangle(begin);
       if (is_touched(begin, end)) {
-        const std::vector<Polygon> anew = changed(begin, end).value();
+        const std::vector<Polygon> anew = changed(begin, end).polygons;
         for (const Polygon& polygon : anew) {
           built.labels.insert(built.labels.end(), polygon.labels.begin(), polygon.labels.end());
           built.vertices.insert(built.vertices.end(), polygon.vertices.begin(), polygon.vertices.end());

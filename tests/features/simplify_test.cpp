@@ -1,0 +1,196 @@
+// Gaps between feature curves, and what is left of the curves at a given width.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "features/curve_network.h"
+#include "features/curves.h"
+#include "features/simplify.h"
+#include "mesh/topology.h"
+#include "support/featured.h"
+
+namespace bisector::test {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Open curves between corners, as chains of points.
+struct Chains {
+  std::vector<Vec3> points;
+  FeatureGraph graph;
+
+  Index corner(const Vec3& p) {
+    points.push_back(p);
+    graph.corners.push_back(static_cast<Index>(points.size() - 1));
+    return graph.corners.back();
+  }
+  void curve(Index a, Index b, FeatureKind kind = FeatureKind::crease) {
+    graph.curves.push_back({{a, b}, false, kind});
+    graph.edges.push_back({std::min(a, b), std::max(a, b)});
+    std::sort(graph.edges.begin(), graph.edges.end());
+  }
+};
+
+std::vector<double> gaps_of(const CurveNetwork& network, double reach) {
+  return curve_gaps(network, std::vector<double>(network.points().size(), reach));
+}
+
+TEST(CurveGaps, BetweenParallelLinesAreTheirDistance) {
+  for (const double distance : {0.1, 0.3}) {
+    Chains lines;
+    lines.curve(lines.corner({0, 0, 0}), lines.corner({4, 0, 0}));
+    lines.curve(lines.corner({0, distance, 0}), lines.corner({4, distance, 0}));
+    const CurveNetwork network(FeatureCurves(lines.graph, lines.points), 0.01);
+    for (const double gap : gaps_of(network, 1)) EXPECT_NEAR(gap, distance, 1e-12);
+    for (const double gap : gaps_of(network, 0.05)) EXPECT_EQ(gap, kInfinity);
+  }
+}
+
+TEST(CurveGaps, AreNoneAroundACircleOrAtARightAngle) {
+  std::vector<Vec3> points;
+  FeatureGraph circle;
+  circle.curves.push_back({{}, true});
+  for (Index k = 0; k < 200; ++k) {
+    const double angle = 2 * std::numbers::pi * k / 200;
+    points.push_back({std::cos(angle), std::sin(angle), 0});
+    circle.curves[0].vertices.push_back(k);
+  }
+  for (const double gap : gaps_of(CurveNetwork(FeatureCurves(circle, points), 0.05), 3)) EXPECT_EQ(gap, kInfinity);
+
+  Chains corner;
+  const Index middle = corner.corner({0, 0, 0});
+  corner.curve(middle, corner.corner({1, 0, 0}));
+  corner.curve(middle, corner.corner({0, 1, 0}));
+  for (const double gap : gaps_of(CurveNetwork(FeatureCurves(corner.graph, corner.points), 0.05), 3))
+    EXPECT_EQ(gap, kInfinity);
+}
+
+TEST(CurveGaps, AtAnAcuteAngleGrowWithTheDistanceFromTheCorner) {
+  Chains corner;
+  const Index tip = corner.corner({0, 0, 0});
+  const double angle = 0.2;
+  corner.curve(tip, corner.corner({1, 0, 0}));
+  corner.curve(tip, corner.corner({std::cos(angle), std::sin(angle), 0}));
+  const CurveNetwork network(FeatureCurves(corner.graph, corner.points), 0.005);
+  const std::vector<double> gaps = gaps_of(network, 1);
+  for (Index p = 0; p < gaps.size(); ++p) {
+    const double along = norm(network.points()[p]);
+    if (along > 0.1) {
+      EXPECT_NEAR(gaps[p], along * std::sin(angle), 0.02);
+    }
+  }
+}
+
+// Every curve runs along edges of the input's features, its ends are corners, and corners are apart.
+void expect_sound(const FeatureGraph& left, const FeatureGraph& input) {
+  for (const std::array<Index, 2>& edge : left.edges)
+    EXPECT_TRUE(std::binary_search(input.edges.begin(), input.edges.end(), edge));
+  std::set<std::array<Index, 2>> used;
+  for (const FeatureCurve& curve : left.curves) {
+    const std::size_t count = curve.vertices.size();
+    for (std::size_t k = 0; k + (curve.closed ? 0 : 1) < count; ++k) {
+      const Index a = curve.vertices[k], b = curve.vertices[(k + 1) % count];
+      used.insert({std::min(a, b), std::max(a, b)});
+    }
+    if (curve.closed) continue;
+    for (const Index end : {curve.vertices.front(), curve.vertices.back()})
+      EXPECT_TRUE(std::binary_search(left.corners.begin(), left.corners.end(), end));
+  }
+  EXPECT_EQ(std::vector(used.begin(), used.end()), left.edges);
+}
+
+SimplifiedFeatures simplified(const TriangleMesh& mesh, const FeatureGraph& graph, double width) {
+  return simplify_features(graph, mesh.vertices, curve_weights(graph, mesh.triangles, mesh.vertices), width);
+}
+
+TEST(SimplifiedFeatures, AreTheInputsWhereNothingIsNarrow) {
+  for (const FeaturedModel& model : featured_models()) {
+    const FeatureGraph graph = sharp_graph(model.mesh);
+    const SimplifiedFeatures none = simplified(model.mesh, graph, 0);
+    EXPECT_EQ(none.graph.edges, graph.edges);
+    EXPECT_EQ(none.graph.corners, graph.corners);
+    const SimplifiedFeatures fine = simplified(model.mesh, graph, 0.004);
+    EXPECT_EQ(fine.graph.edges, graph.edges) << model.name;
+    EXPECT_EQ(fine.merged + fine.let_go, 0u) << model.name;
+  }
+}
+
+// A slab has two narrow walls along its whole length: twice two curves, of which one remains each.
+TEST(SimplifiedFeatures, OfANarrowWallIsOneCurve) {
+  const TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}});
+  FeatureGraph graph = sharp_graph(slab);
+  for (FeatureCurve& curve : graph.curves) curve.kind = FeatureKind::crease;
+  ASSERT_EQ(graph.curves.size(), 12u);
+  const SimplifiedFeatures left = simplified(slab, graph, 0.1);
+  expect_sound(left.graph, graph);
+  EXPECT_EQ(left.graph.corners.size(), 4u);
+  EXPECT_EQ(left.graph.curves.size(), 4u);
+  EXPECT_EQ(left.merged, 8u);
+  EXPECT_EQ(left.let_go, 0u);
+  for (Index a = 0; a < 4; ++a)
+    for (Index b = 0; b < a; ++b)
+      EXPECT_GT(norm(slab.vertices[left.graph.corners[a]] - slab.vertices[left.graph.corners[b]]), 0.9);
+}
+
+TEST(SimplifiedFeatures, KeepCurvesThatAreNoCreases) {
+  for (const FeatureKind kind :
+       {FeatureKind::border, FeatureKind::label, FeatureKind::given, FeatureKind::non_manifold}) {
+    Chains lines;
+    lines.curve(lines.corner({0, 0, 0}), lines.corner({4, 0, 0}), kind);
+    lines.curve(lines.corner({0, 0.1, 0}), lines.corner({4, 0.1, 0}), kind);
+    const SimplifiedFeatures left = simplify_features(lines.graph, lines.points, {1, 1}, 0.5);
+    EXPECT_EQ(left.graph.edges, lines.graph.edges);
+    EXPECT_EQ(left.merged + left.let_go, 0u);
+  }
+}
+
+TEST(SimplifiedFeatures, OfParallelCreasesTheHeavierStays) {
+  for (const int heavier : {0, 1}) {
+    Chains lines;
+    lines.curve(lines.corner({0, 0, 0}), lines.corner({4, 0, 0}));
+    lines.curve(lines.corner({0, 0.1, 0}), lines.corner({4, 0.1, 0}));
+    const SimplifiedFeatures left =
+        simplify_features(lines.graph, lines.points, {heavier == 0 ? 2.0 : 1.0, heavier == 0 ? 1.0 : 2.0}, 0.5);
+    ASSERT_EQ(left.graph.curves.size(), 1u);
+    EXPECT_EQ(lines.points[left.graph.curves[0].vertices[0]].y, heavier == 0 ? 0 : 0.1);
+    EXPECT_EQ(left.merged, 1u);
+  }
+}
+
+// A curve that ends on one side of a narrow strip is led to the corner that remains.
+TEST(SimplifiedFeatures, LeadCurvesToTheCornerThatRemains) {
+  Chains net;
+  const Index a = net.corner({0, 0, 0}), b = net.corner({0, 0.1, 0});
+  const Index left = net.corner({-3, 0, 0}), right = net.corner({3, 0, 0}), up = net.corner({0, 3, 0}),
+              side = net.corner({1, 3, 0});
+  net.curve(a, b);
+  net.curve(left, a);
+  net.curve(a, right);
+  net.curve(b, up);
+  net.curve(b, side);
+  const SimplifiedFeatures merged = simplify_features(net.graph, net.points, {0.1, 3, 3, 3, 3}, 0.5);
+  expect_sound(merged.graph, net.graph);
+  EXPECT_EQ(merged.merged, 1u);
+  EXPECT_EQ(merged.graph.corners.size(), 5u);
+  std::set<Index> inner;
+  for (const FeatureCurve& curve : merged.graph.curves)
+    for (const Index v : {curve.vertices.front(), curve.vertices.back()})
+      if (v == a || v == b) inner.insert(v);
+  EXPECT_EQ(inner.size(), 1u);
+  EXPECT_EQ(merged.graph.curves.size(), 4u);
+}
+
+TEST(SimplifiedFeatures, DoNotDependOnWhichWayCurvesRun) {
+  const TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}});
+  const FeatureGraph graph = sharp_graph(slab);
+  FeatureGraph turned = graph;
+  for (FeatureCurve& curve : turned.curves) std::reverse(curve.vertices.begin(), curve.vertices.end());
+  EXPECT_EQ(simplified(slab, graph, 0.1).graph.edges, simplified(slab, turned, 0.1).graph.edges);
+}
+
+}  // namespace
+}  // namespace bisector::test

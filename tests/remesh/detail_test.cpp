@@ -1,0 +1,98 @@
+// The budget for detail: what is resolved grows with the number of vertices, and what is resolved has good triangles.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+#include "remesh/detail.h"
+#include "remesh/sizing.h"
+#include "support/featured.h"
+
+namespace bisector::test {
+namespace {
+
+// A box of 4 by 3 by 1, one of whose edges of length 1 is cut off by a chamfer of the given width.
+TriangleMesh chamfered(double width) {
+  const double cut = width / std::sqrt(2);
+  return prism({{0, 0}, {4, 0}, {4, 3 - cut}, {4 - cut, 3}, {0, 3}});
+}
+
+DetailPlan plan_for(const TriangleMesh& mesh, std::size_t vertices, DetailMode mode = DetailMode::budget) {
+  SizingTarget target;
+  target.vertices = vertices;
+  const double h = compute_sizing(mesh, {}, target).unit_edge;
+  return plan_details(mesh, sharp_graph(mesh), std::vector<double>(mesh.vertices.size(), h), vertices, mode);
+}
+
+TEST(Detail, OffIsTheInput) {
+  const TriangleMesh mesh = chamfered(0.1);
+  const DetailPlan plan = plan_for(mesh, 500, DetailMode::off);
+  EXPECT_EQ(plan.features.edges, sharp_graph(mesh).edges);
+  EXPECT_TRUE(plan.points.empty());
+}
+
+TEST(Detail, WhereNothingIsFineEdgesAreAsTheyWere) {
+  for (const char* name : {"box", "cylinder"})
+    for (const FeaturedModel& model : featured_models()) {
+      if (model.name != std::string(name)) continue;
+      const DetailPlan plan = plan_for(model.mesh, 2000);
+      EXPECT_EQ(plan.features.edges, sharp_graph(model.mesh).edges) << name;
+      EXPECT_TRUE(plan.lengths.empty()) << name;
+    }
+}
+
+TEST(Detail, MoreVerticesResolveMore) {
+  const TriangleMesh mesh = chamfered(0.05);
+  double width = 1e9;
+  std::size_t curves = 0;
+  for (const std::size_t vertices : {100, 400, 2000, 20000}) {
+    const DetailPlan plan = plan_for(mesh, vertices);
+    EXPECT_LE(plan.result.width, width);
+    EXPECT_GE(plan.features.curves.size(), curves);
+    width = plan.result.width;
+    curves = plan.features.curves.size();
+  }
+  EXPECT_EQ(curves, sharp_graph(mesh).curves.size());
+}
+
+TEST(Detail, LengthsAreThoseOfTheGaps) {
+  const double width = 0.2;
+  const TriangleMesh mesh = chamfered(width);
+  const DetailPlan plan = plan_for(mesh, 500);
+  ASSERT_FALSE(plan.points.empty());
+  for (const double length : plan.lengths) EXPECT_GE(length, 0.9 * width);
+  EXPECT_NEAR(*std::min_element(plan.lengths.begin(), plan.lengths.end()), width, 1e-9);
+}
+
+// A slab thinner than its edges: one row of slivers around it without the budget.
+TEST(Detail, ThinWallsHaveGoodTriangles) {
+  const TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.1}, {0, 0.1}});
+  RemeshOptions options;
+  options.compute.device = DeviceRequest{.kind = DeviceRequest::Kind::cpu};
+  for (const std::size_t vertices : {400, 1500}) {
+    options.vertices = vertices;
+    const RemeshResult result = remesh(slab, options);
+    const QualityReport quality = measure_quality(result.mesh);
+    EXPECT_TRUE(result.topology_matches);
+    EXPECT_EQ(result.features.broken, 0u);
+    EXPECT_EQ(result.mesh.vertices.size(), vertices);
+    EXPECT_GT(quality.theta_min, 25);
+  }
+}
+
+TEST(Detail, IsTheSameWithAnyNumberOfThreads) {
+  const TriangleMesh mesh = chamfered(0.05);
+  const DetailPlan all = plan_for(mesh, 600);
+  const ThreadLimit limit(1);
+  const DetailPlan one = plan_for(mesh, 600);
+  EXPECT_EQ(all.features.edges, one.features.edges);
+  EXPECT_EQ(all.lengths, one.lengths);
+  EXPECT_EQ(all.result.width, one.result.width);
+}
+
+}  // namespace
+}  // namespace bisector::test
