@@ -20,6 +20,7 @@
 #include "support/setups.h"
 #include "voronoi/ball_property.h"
 #include "voronoi/dual.h"
+#include "voronoi/localise.h"
 
 namespace bisector::test {
 namespace {
@@ -84,7 +85,7 @@ struct PreparedCase {
     options.vertices = problem.vertices;
     options.sizing.kind = problem.density;
     if (problem.density == DensityKind::attribute) options.sizing.attribute = graded_density(problem.mesh);
-    return prepare(problem.mesh, options, {});
+    return Preparation(problem.mesh, options, {}).lay_down();
   }
 };
 
@@ -198,7 +199,8 @@ TEST_P(RemeshRuns, AreTheCpus) {
     expect_same_diagram_of(problem, setup, *backend, reference.mesh.vertices);
   }
   SCOPED_TRACE("the backend's own seeds");
-  const Diagram diagram = expect_same_diagram_of(problem, setup, *backend, found.mesh.vertices);
+  Diagram diagram = expect_same_diagram_of(problem, setup, *backend, found.mesh.vertices);
+  localise_cells(problem.surface, found.mesh.vertices, diagram.polygons);
   const TriangleMesh dual = dual_mesh(found.mesh.vertices, extract_dual(diagram.polygons));
   EXPECT_TRUE(dual.triangles == found.mesh.triangles) << "not the dual of its vertices";
 }

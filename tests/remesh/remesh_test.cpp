@@ -169,8 +169,8 @@ TEST(RemeshHard, FewVerticesGiveWhatTheyCan) {
       options.topology = TopologyControl::check;
       const RemeshResult checked = remesh(mesh, options);
       EXPECT_EQ(checked.untiled, 0u);
-      // Corners are vertices however few were asked for.
-      EXPECT_LE(checked.mesh.vertices.size(), std::max(vertices, checked.features.corners));
+      // Corners are vertices however few were asked for; of the box's eight some may have been merged.
+      EXPECT_LE(checked.mesh.vertices.size(), std::max<std::size_t>(vertices, 8));
     }
   const RemeshResult tetrahedron = remesh(icosphere(3), options_for(4));
   EXPECT_TRUE(tetrahedron.topology_matches);
