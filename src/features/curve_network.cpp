@@ -51,27 +51,34 @@ CurveNetwork::CurveNetwork(const FeatureCurves& curves, double spacing) {
   });
 }
 
-std::vector<std::pair<Index, double>> CurveNetwork::within(Index from, double reach) const {
-  using Way = std::pair<double, Index>;
-  std::priority_queue<Way, std::vector<Way>, std::greater<>> ways;
-  std::unordered_map<Index, double> shortest{{from, 0.0}};
-  ways.push({0, from});
-  while (!ways.empty()) {
-    const auto [length, at] = ways.top();
-    ways.pop();
-    if (length > shortest[at]) continue;
+std::vector<CurveNetwork::Way> CurveNetwork::within(Index from, double reach) const {
+  using Step = std::pair<double, Index>;
+  struct Found {
+    double length;
+    Index corners;
+  };
+  std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
+  std::unordered_map<Index, Found> shortest{{from, {0.0, 0}}};
+  steps.push({0, from});
+  while (!steps.empty()) {
+    const auto [length, at] = steps.top();
+    steps.pop();
+    const Found here = shortest[at];
+    if (length > here.length) continue;
+    const Index corners = here.corners + (curve_[at] == kNone && at != from ? 1 : 0);
     for (const Link* link = links_.begin(at); link != links_.end(at); ++link) {
       const double onwards = length + link->length;
       if (onwards > reach) continue;
-      const auto [known, fresh] = shortest.try_emplace(link->to, onwards);
-      if (!fresh && known->second <= onwards) continue;
-      known->second = onwards;
-      ways.push({onwards, link->to});
+      const auto [known, fresh] = shortest.try_emplace(link->to, Found{onwards, corners});
+      if (!fresh && known->second.length <= onwards) continue;
+      known->second = {onwards, corners};
+      steps.push({onwards, link->to});
     }
   }
-  std::vector<std::pair<Index, double>> found(shortest.begin(), shortest.end());
-  std::sort(found.begin(), found.end());
-  return found;
+  std::vector<Way> ways;
+  for (const auto& [to, found] : shortest) ways.push_back({to, found.length, found.corners});
+  std::sort(ways.begin(), ways.end(), [](const Way& a, const Way& b) { return a.to < b.to; });
+  return ways;
 }
 
 std::vector<double> curve_gaps(const CurveNetwork& network, const std::vector<double>& reach) {
@@ -88,11 +95,12 @@ std::vector<double> curve_gaps(const CurveNetwork& network, const std::vector<do
       const double q[3] = {p.x, p.y, p.z};
       tree.radiusSearch(q, reach[i] * reach[i], near, nanoflann::SearchParams());
       if (near.size() < 2) continue;
-      const auto ways = network.within(static_cast<Index>(i), kDetour * std::sqrt(near.back().second));
+      const std::vector<CurveNetwork::Way> ways = network.within(static_cast<Index>(i), kDetour * reach[i]);
       for (const auto& [other, squared] : near) {
         const double distance = std::sqrt(squared);
-        const auto way = std::lower_bound(ways.begin(), ways.end(), std::pair<Index, double>{other, 0});
-        if (way != ways.end() && way->first == other && way->second <= kDetour * distance) continue;
+        const auto way = std::lower_bound(ways.begin(), ways.end(), other,
+                                          [](const CurveNetwork::Way& w, Index to) { return w.to < to; });
+        if (way != ways.end() && way->to == other && (way->length <= kDetour * distance || way->corners == 1)) continue;
         if (other == i) continue;
         gaps[i] = distance;
         break;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <utility>
 #include <vector>
 
 #include "core/geometry.h"
@@ -19,9 +18,13 @@ class CurveNetwork {
   // The curve that a point lies on; kNone of a corner.
   Index curve(Index point) const { return curve_[point]; }
   double position(Index point) const { return position_[point]; }  // arc length along that curve
-  // Points within `reach` of a point along the curves, with the lengths of the shortest ways to them, by ascending
-  // point.
-  std::vector<std::pair<Index, double>> within(Index from, double reach) const;
+  struct Way {
+    Index to;
+    double length;
+    Index corners;  // on the way, without its ends
+  };
+  // The shortest ways along the curves from a point to all within `reach`, by ascending point.
+  std::vector<Way> within(Index from, double reach) const;
 
  private:
   struct Link {
@@ -37,7 +40,8 @@ class CurveNetwork {
 // How far each point of a network is from other curves, or other parts of its own: the distance to the nearest point
 // that is farther along the curves than kDetour times the distance; infinity if that is more than `reach`, one value
 // per point. Curves that part at an angle of more than about 47 degrees (2 asin(1 / kDetour)) are no gap, nor is a
-// circle.
+// circle. Between curves that part at less there is none as far as the way around their corner is shorter than kDetour
+// times the reach: what is acute stays so at any size.
 inline constexpr double kDetour = 2.5;
 std::vector<double> curve_gaps(const CurveNetwork& network, const std::vector<double>& reach);
 

@@ -20,8 +20,6 @@ using Kind = SeedPlace::Kind;
 // optimisation, of kFirstSteps in the first to kLastSteps in the last; kInsertingRounds follow in which nothing moves.
 constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
 constexpr int kFirstSteps = 20, kLastSteps = 4;
-// Inserting ends if so many rounds in a row have not led to fewer faults.
-constexpr int kPatience = 5;
 // Rounds of clearing curves at the end of a level, and steps after each.
 constexpr int kClearingRounds = 4, kClearingSteps = 15;
 // Seeds that recovery may add, beside a quarter of those there are.
@@ -376,18 +374,16 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   protect_acute_corners(curves, measure, c, run.seeds);
   PlacedSeeds best;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (int round = 0, idle = 0;; ++round, ++idle) {
+  for (int round = 0;; ++round) {
     run.context().check();
     const Found found = find_faults(trace, curves, run.seeds.places(), run.diagram(kChains));
     if (found.faults.empty()) return found.report;
     if (found.faults.size() < fewest) {
       fewest = found.faults.size();
       best = run.seeds;
-      idle = 0;
     }
     const bool last = round >= kMovingRounds;
-    if (round == kMovingRounds) idle = 0;
-    if (round == kMovingRounds + kInsertingRounds || (last && idle == kPatience) || run.seeds.size() > most ||
+    if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most ||
         !mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, run.seeds))
       break;
     if (last) continue;

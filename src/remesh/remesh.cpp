@@ -121,6 +121,8 @@ class Pipeline {
   const CurveMeasure measure_;
   const FeatureTrace trace_;
   const std::size_t wanted_;
+  // Not where seeds were given, which are the start of as many as the surface needs.
+  bool localises_ = false;
   CvtRun run_;
   OptimiseOptions step_;
   FeatureReport features_;
@@ -233,7 +235,7 @@ void Pipeline::mend_features() {
 
 // Mending one may break the other, so they take turns.
 void Pipeline::mend_features_and_topology() {
-  if (plan_.topology != TopologyControl::off) run_.localise(true);
+  run_.localise(localises_);
   for (int round = 0; round < kMendingRounds; ++round) {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
@@ -297,7 +299,7 @@ void Pipeline::extract() {
   const Stopwatch watch;
   run_.localise(false);
   result_.untiled = count_untiled(surface_, run_.diagram(Want::polygons).polygons);
-  run_.localise(plan_.topology != TopologyControl::off);
+  run_.localise(localises_);
   const Diagram& diagram = run_.diagram(Want::polygons | Want::dual);
   if (run_.has_features()) features_ = check_features(trace_, curves_, run_.seeds.places(), diagram);
   const Divided divided = divide_sheets();
@@ -337,6 +339,7 @@ void Pipeline::fit() {
 void Pipeline::place() {
   result_.wanted = wanted_;
   result_.input_topology = analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size());
+  localises_ = plan_.topology != TopologyControl::off && plan_.seeds.empty();
   optimise_levels();
 }
 

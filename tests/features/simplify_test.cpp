@@ -69,18 +69,23 @@ TEST(CurveGaps, AreNoneAroundACircleOrAtARightAngle) {
     EXPECT_EQ(gap, kInfinity);
 }
 
-TEST(CurveGaps, AtAnAcuteAngleGrowWithTheDistanceFromTheCorner) {
+// Of the other curve only what is far along it counts near the corner; beyond, the gap grows with the distance.
+TEST(CurveGaps, AtAnAcuteAngleBeginAwayFromTheCorner) {
   Chains corner;
   const Index tip = corner.corner({0, 0, 0});
-  const double angle = 0.2;
-  corner.curve(tip, corner.corner({1, 0, 0}));
-  corner.curve(tip, corner.corner({std::cos(angle), std::sin(angle), 0}));
+  const double angle = 0.2, reach = 0.3;
+  corner.curve(tip, corner.corner({2, 0, 0}));
+  corner.curve(tip, corner.corner({2 * std::cos(angle), 2 * std::sin(angle), 0}));
   const CurveNetwork network(FeatureCurves(corner.graph, corner.points), 0.005);
-  const std::vector<double> gaps = gaps_of(network, 1);
+  const std::vector<double> gaps = gaps_of(network, reach);
   for (Index p = 0; p < gaps.size(); ++p) {
     const double along = norm(network.points()[p]);
-    if (along > 0.1) {
-      EXPECT_NEAR(gaps[p], along * std::sin(angle), 0.02);
+    const double other = std::max(along * std::cos(angle), kDetour * reach - along);
+    const double gap = std::hypot(other * std::cos(angle) - along, other * std::sin(angle));
+    if (gap > 1.05 * reach) {
+      EXPECT_EQ(gaps[p], kInfinity);
+    } else if (gap < 0.95 * reach && along < 1.8) {
+      EXPECT_NEAR(gaps[p], gap, 0.01);
     }
   }
 }
