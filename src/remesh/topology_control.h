@@ -31,13 +31,12 @@ struct TopologyOutcome {
 };
 
 // Inserts seeds until the topological ball property holds:
-// - While an eighth of the cells fail there are too few seeds, and the optimisation runs again after each round
-// (thesis 4.4.4).
+// - While an eighth of the cells fail there are too few seeds, and the optimisation runs again after each round (thesis
+//   4.4.4).
 // - Then without optimising, for a density that makes cells larger than the surface is thick would draw the new seeds
-// away.
+//   away; it ends if a dozen rounds in a row have not led to fewer failures.
 // - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are
-// optimised as
-//   far as the property goes on holding.
+//   optimised as far as the property goes on holding.
 // Cells of sheets that cross or nearly touch are divided (sheets.h): the report then names the sheets in
 // TopologyOutcome::sheets by indices after those of the seeds.
 //

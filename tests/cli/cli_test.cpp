@@ -32,6 +32,7 @@
 #include "core/geometry.h"
 #include "mesh/tet_topology.h"
 #include "mesh/topology.h"
+#include "support/featured.h"
 #include "support/models.h"
 #include "support/solids.h"
 #include "support/tree_model.h"
@@ -177,6 +178,7 @@ TEST_F(Cli, HelpListsAllWords) {
   expect_words("check", "--precision", cli::kPrecisionWords.list());
   expect_words("remesh", "--topology", cli::kTopologyWords.list());
   expect_words("remesh", "--energy", cli::kEnergyWords.list());
+  expect_words("remesh", "--detail", cli::kDetailWords.list());
   expect_words("segment", "--surfaces", cli::kSurfaceWords.list());
   expect_words("segment", "--start", cli::kStartWords.list());
   expect_words("tree", "--components", cli::kComponentWords.list());
@@ -527,6 +529,24 @@ class CliRemesh : public Cli {
 
   TriangleMesh output(const std::string& name = "out.ply") const { return read_mesh(in(name)); }
 };
+
+// A plate too thin for its edges: its walls' curves are merged, or have the vertices that they take, or are left.
+TEST_F(CliRemesh, DetailsAreMergedOrResolved) {
+  write_mesh(in("plate.off"), test::prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}}));
+  const auto remeshed = [&](const char* detail) { return remesh("plate.off", {"-n", "400", "--detail", detail}); };
+  const Json merged = remeshed("auto"), all = remeshed("all"), off = remeshed("off");
+  EXPECT_GT(merged["detail"]["merged"], 0);
+  EXPECT_LT(merged["detail"]["resolved"], 12);
+  EXPECT_GT(merged["detail"]["width"], 0.02);
+  EXPECT_GT(merged["detail"]["vertices"], 400);
+  EXPECT_EQ(merged["output"]["vertices"], 400);
+  EXPECT_EQ(all["detail"]["merged"], 0);
+  EXPECT_EQ(all["features"]["curves"], 12);
+  EXPECT_GT(all["output"]["vertices"], 400);
+  EXPECT_EQ(off["features"]["curves"], 12);
+  EXPECT_EQ(off["detail"]["width"], 0);
+  EXPECT_GT(merged["quality"]["theta_min"], off["quality"]["theta_min"]);
+}
 
 double length(const TriangleMesh& mesh, const std::array<Index, 2>& e) {
   return norm(mesh.vertices[e[1]] - mesh.vertices[e[0]]);
