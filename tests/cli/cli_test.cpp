@@ -545,7 +545,7 @@ TEST_F(CliRemesh, DetailsAreMergedOrResolved) {
   EXPECT_GT(all["output"]["vertices"], 400);
   EXPECT_EQ(off["features"]["curves"], 12);
   EXPECT_EQ(off["detail"]["width"], 0);
-  EXPECT_GT(merged["quality"]["theta_min"], off["quality"]["theta_min"]);
+  EXPECT_LT(merged["quality"]["theta_below_30"], 0.5 * off["quality"]["theta_below_30"].get<double>());
 }
 
 double length(const TriangleMesh& mesh, const std::array<Index, 2>& e) {

@@ -175,8 +175,7 @@ std::vector<Model> models() {
   add("far_torus", 400, [] { return transformed(torus(32, 20), {1, 1, 1}, {1e6, -2e6, 3e6}); });
   add("tiny_torus", 400, [] { return transformed(torus(32, 20), {1e-6, 1e-6, 1e-6}, {}); });
   add("huge_torus", 400, [] { return transformed(torus(32, 20), {1e6, 1e6, 1e6}, {}); });
-  for (const char* name : {"anchor.off", "beetle.obj", "bunny.off", "camel.off", "elephant.off", "face.obj",
-                           "fandisk.off", "homer.obj", "igea.ply"})
+  for (const char* name : {"anchor.off", "beetle.obj", "bunny.off", "fandisk.off"})
     all.push_back({name,
                    [name] {
                      const std::string path = shared_model(name);
@@ -306,7 +305,7 @@ INSTANTIATE_TEST_SUITE_P(Parity, Parities, testing::ValuesIn(setups()),
 // Where nearly every decision is a tie.
 TEST_P(Parities, DegenerateDiagramsAreTheCpus) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
-  constexpr std::uint64_t kIntegerCases = 40;
+  constexpr std::uint64_t kIntegerCases = 20;
   std::vector<SmallCase> cases = small_cases();
   for (std::uint64_t k = 0; k < kIntegerCases; ++k) cases.push_back(integer_case(k));
   for (const auto& [name, mesh, seeds] : cases) {
