@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <queue>
 #include <unordered_map>
 
 #include "core/grouping.h"
 #include "core/parallel.h"
+#include "core/shortest_ways.h"
 #include "spatial/kd_tree.h"
 
 namespace bisector {
@@ -52,31 +51,18 @@ CurveNetwork::CurveNetwork(const FeatureCurves& curves, double spacing) {
 }
 
 std::vector<CurveNetwork::Way> CurveNetwork::within(Index from, double reach) const {
-  using Step = std::pair<double, Index>;
-  struct Found {
-    double length;
-    Index corners;
-  };
-  std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
-  std::unordered_map<Index, Found> shortest{{from, {0.0, 0}}};
-  steps.push({0, from});
-  while (!steps.empty()) {
-    const auto [length, at] = steps.top();
-    steps.pop();
-    const Found here = shortest[at];
-    if (length > here.length) continue;
-    const Index corners = here.corners + (curve_[at] == kNone && at != from ? 1 : 0);
-    for (const Link* link = links_.begin(at); link != links_.end(at); ++link) {
-      const double onwards = length + link->length;
-      if (onwards > reach) continue;
-      const auto [known, fresh] = shortest.try_emplace(link->to, Found{onwards, corners});
-      if (!fresh && known->second.length <= onwards) continue;
-      known->second = {onwards, corners};
-      steps.push({onwards, link->to});
-    }
-  }
+  std::unordered_map<Index, Index> corners;  // on the ways to the points that were reached
   std::vector<Way> ways;
-  for (const auto& [to, found] : shortest) ways.push_back({to, found.length, found.corners});
+  const auto links = [&](Index at, const auto& visit) {
+    for (const Link* link = links_.begin(at); link != links_.end(at); ++link) visit(link->to, link->length, kNone);
+  };
+  shortest_ways(from, reach, links, [&](Index at, double length, Index before, Index) {
+    const bool by_corner = before != kNone && before != from && curve_[before] == kNone;
+    const Index count = before == kNone ? 0 : corners.at(before) + (by_corner ? 1 : 0);
+    if (!corners.try_emplace(at, count).second) return false;
+    ways.push_back({at, length, count});
+    return true;
+  });
   std::sort(ways.begin(), ways.end(), [](const Way& a, const Way& b) { return a.to < b.to; });
   return ways;
 }

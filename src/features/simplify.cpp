@@ -3,19 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
-#include <queue>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 
 #include "core/grouping.h"
+#include "core/shortest_ways.h"
 #include "features/curve_network.h"
 #include "features/curves.h"
 #include "mesh/topology.h"
+#include "spatial/kd_tree.h"
 
 namespace bisector {
 namespace {
@@ -27,7 +28,7 @@ constexpr double kLoopEdges = 4;
 // A curve that comes back to its corner is one if it is longer than so many widths.
 constexpr double kLoopWidths = 3;
 // Two curves at a corner where no other ends are one if they turn by less than this, in radians.
-constexpr double kStraight = 50 * std::numbers::pi / 180;
+constexpr double kStraight = 50 * kRadiansPerDegree;
 
 bool is_crease(const FeatureCurve& curve) { return curve.kind == FeatureKind::crease; }
 
@@ -39,8 +40,8 @@ class CornerGraph {
           for (Index c = 0; c < curves.size(); ++c) {
             if (curves.closed(c)) continue;
             const auto [first, last] = curves.ends(c);
-            put(first, Arm{c, last, 0});
-            put(last, Arm{c, first, 1});
+            put(first, Arm{c, last});
+            put(last, Arm{c, first});
           }
         })) {}
 
@@ -57,11 +58,19 @@ class CornerGraph {
     std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return rank[a] > rank[b]; });
     std::vector<double> way(count, std::numeric_limits<double>::infinity());
     Forest forest{std::vector<Index>(count, kNone), std::vector<Index>(count, kNone)};
+    const auto links = [&](Index at, const auto& visit) {
+      for (const Arm* arm = at_.begin(at); arm != at_.end(at); ++arm)
+        visit(arm->other, curves_.length(arm->curve), arm->curve);
+    };
     for (const Index v : order) {
       if (way[v] < width && !is_branching_of_others(v)) continue;
-      way[v] = 0;
-      forest.curve[v] = forest.next[v] = kNone;
-      spread(v, width, way, forest);
+      shortest_ways(v, width, links, [&](Index at, double length, Index before, Index curve) {
+        if (before != kNone && (length >= width || length >= way[at])) return false;
+        way[at] = length;
+        forest.curve[at] = curve;
+        forest.next[at] = before;
+        return true;
+      });
     }
     return forest;
   }
@@ -69,7 +78,6 @@ class CornerGraph {
  private:
   struct Arm {
     Index curve, other;
-    int end;  // of the curve, at the corner
   };
 
   // Branchings first, then ends, then turns; among these the corner of the most important curves.
@@ -89,25 +97,6 @@ class CornerGraph {
     for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm)
       others |= !is_crease(curves_.graph().curves[arm->curve]);
     return others && at_.size(corner) > 2;
-  }
-
-  void spread(Index from, double width, std::vector<double>& way, Forest& forest) const {
-    using Way = std::pair<double, Index>;
-    std::priority_queue<Way, std::vector<Way>, std::greater<>> ways;
-    ways.push({0, from});
-    while (!ways.empty()) {
-      const auto [length, v] = ways.top();
-      ways.pop();
-      if (length > way[v]) continue;
-      for (const Arm* arm = at_.begin(v); arm != at_.end(v); ++arm) {
-        const double onwards = length + curves_.length(arm->curve);
-        if (onwards >= width || onwards >= way[arm->other]) continue;
-        way[arm->other] = onwards;
-        forest.curve[arm->other] = arm->curve;
-        forest.next[arm->other] = v;
-        ways.push({onwards, arm->other});
-      }
-    }
   }
 
   const FeatureCurves& curves_;
@@ -183,140 +172,125 @@ std::vector<Candidate> led_to_representatives(const FeatureCurves& curves, std::
   return candidates;
 }
 
-// The curves that stay, as points at small distances in a grid, and how far it is along them.
+// Which candidates stay, as points at small distances, and how far it is along them.
 class Kept {
  public:
-  Kept(const std::vector<Vec3>& vertices, double width) : vertices_(vertices), width_(width) {}
+  Kept(const std::vector<Candidate>& candidates, const std::vector<Vec3>& vertices, double width)
+      : candidates_(candidates), width_(width), kept_(candidates.size(), 0) {
+    for (Index c = 0; c < candidates.size(); ++c) {
+      first_.push_back(points_.size());
+      sample(c, vertices);
+    }
+    first_.push_back(points_.size());
+    if (!points_.empty()) tree_.emplace(3, set_);
+  }
+  Kept(const Kept&) = delete;
 
-  // The share of a curve that runs within the width of others.
-  double beside(const Candidate& candidate) const {
-    const std::vector<Sample> samples = sampled(candidate);
-    const bool closed = candidate.curve.closed;
-    const Ways from_start = closed ? Ways{} : ways(candidate.curve.vertices.front());
-    const Ways from_end = closed ? Ways{} : ways(candidate.curve.vertices.back());
+  // The share of a candidate that runs within the width of those that stay.
+  double beside(Index c) const {
+    const std::vector<Index>& chain = candidates_[c].curve.vertices;
+    const bool closed = candidates_[c].curve.closed;
+    const Ways from_start = closed ? Ways{} : ways(chain.front()), from_end = closed ? Ways{} : ways(chain.back());
     std::size_t near = 0;
-    for (const Sample& sample : samples) near += is_beside(sample, candidate.length, from_start, from_end);
-    return static_cast<double>(near) / static_cast<double>(samples.size());
+    for (std::size_t p = first_[c]; p < first_[c + 1]; ++p) near += is_beside(p, from_start, from_end);
+    return static_cast<double>(near) / static_cast<double>(first_[c + 1] - first_[c]);
   }
 
-  void add(const Candidate& candidate) {
-    const auto index = static_cast<Index>(curves_.size());
-    const std::vector<Index>& chain = candidate.curve.vertices;
-    curves_.push_back({chain.front(), chain.back(), candidate.length, candidate.curve.closed});
-    if (!candidate.curve.closed)
-      for (const Index v : {chain.front(), chain.back()}) at_[v].push_back(index);
-    for (const Sample& sample : sampled(candidate))
-      grid_[cell(sample.point)].push_back({sample.point, index, sample.at});
+  void keep(Index c) {
+    kept_[c] = 1;
+    if (candidates_[c].curve.closed) return;
+    const std::vector<Index>& chain = candidates_[c].curve.vertices;
+    at_[chain.front()].push_back(c);
+    at_[chain.back()].push_back(c);
   }
 
   bool is_near(const Vec3& p) const {
     bool near = false;
-    each_near(p, [&](const Point&, double) { near = true; });
+    each_near(p, [&](std::size_t, double) { near = true; });
     return near;
   }
 
  private:
-  struct Sample {
-    Vec3 point;
-    double at;  // arc length
-  };
-  struct Point {
-    Vec3 point;
-    Index curve;
-    double at;
-  };
-  struct Curve {
-    Index first, last;
-    double length;
-    bool closed;
-  };
   using Ways = std::unordered_map<Index, double>;  // lengths of ways to corners
-  using Cell = std::array<long long, 3>;
 
-  // At most a quarter of the width apart, so that no other curve slips through.
-  std::vector<Sample> sampled(const Candidate& candidate) const {
+  // At most half the width apart, so that no other curve slips through.
+  void sample(Index c, const std::vector<Vec3>& vertices) {
+    const std::vector<Index>& chain = candidates_[c].curve.vertices;
     const double step = 0.5 * width_;
-    std::vector<Sample> samples;
-    const std::vector<Index>& chain = candidate.curve.vertices;
+    const auto put = [&](const Vec3& p, double at) {
+      points_.push_back(p);
+      positions_.push_back(at);
+      curve_.push_back(c);
+    };
     double at = 0, next = 0.5 * step;
-    const std::size_t segments = chain.size() - (candidate.curve.closed ? 0 : 1);
+    const std::size_t segments = chain.size() - (candidates_[c].curve.closed ? 0 : 1);
     for (std::size_t k = 0; k < segments; ++k) {
-      const Vec3 &a = vertices_[chain[k]], &b = vertices_[chain[(k + 1) % chain.size()]];
+      const Vec3 &a = vertices[chain[k]], &b = vertices[chain[(k + 1) % chain.size()]];
       const double length = norm(b - a);
-      for (; next < at + length; next += step) samples.push_back({a + ((next - at) / length) * (b - a), next});
+      for (; next < at + length; next += step) put(a + ((next - at) / length) * (b - a), next);
       at += length;
     }
-    if (samples.empty()) samples.push_back({0.5 * (vertices_[chain.front()] + vertices_[chain.back()]), 0.5 * at});
-    return samples;
+    if (first_[c] == points_.size()) put(0.5 * (vertices[chain.front()] + vertices[chain.back()]), 0.5 * at);
   }
 
-  Cell cell(const Vec3& p) const {
-    return {std::llround(p.x / width_), std::llround(p.y / width_), std::llround(p.z / width_)};
-  }
-
-  // Calls body(point, distance) for kept points within the width.
+  // Calls body(point, distance) for the points of what stays within the width.
   template <class Body>
   void each_near(const Vec3& p, const Body& body) const {
-    const Cell at = cell(p);
-    for (long long dx = -1; dx <= 1; ++dx)
-      for (long long dy = -1; dy <= 1; ++dy)
-        for (long long dz = -1; dz <= 1; ++dz) {
-          const auto found = grid_.find({at[0] + dx, at[1] + dy, at[2] + dz});
-          if (found == grid_.end()) continue;
-          for (const Point& point : found->second)
-            if (const double distance = norm(point.point - p); distance < width_) body(point, distance);
-        }
+    if (!tree_) return;
+    const double q[3] = {p.x, p.y, p.z};
+    std::vector<std::pair<Index, double>> found;
+    tree_->radiusSearch(q, width_ * width_, found, nanoflann::SearchParams(32, 0, false));
+    for (const auto& [point, squared] : found)
+      if (kept_[curve_[point]]) body(point, std::sqrt(squared));
   }
 
-  // From a corner to others along kept curves, as far as a detour matters.
+  // From a corner to others along what stays, as far as a detour matters.
   Ways ways(Index corner) const {
-    const double reach = kDetour * width_;
-    using Way = std::pair<double, Index>;
-    std::priority_queue<Way, std::vector<Way>, std::greater<>> queue;
-    Ways shortest{{corner, 0.0}};
-    queue.push({0, corner});
-    while (!queue.empty()) {
-      const auto [length, v] = queue.top();
-      queue.pop();
+    Ways shortest;
+    const auto links = [&](Index v, const auto& visit) {
       const auto arms = at_.find(v);
-      if (length > shortest[v] || arms == at_.end()) continue;
+      if (arms == at_.end()) return;
       for (const Index c : arms->second) {
-        const Index other = curves_[c].first == v ? curves_[c].last : curves_[c].first;
-        const double onwards = length + curves_[c].length;
-        if (onwards > reach) continue;
-        const auto [known, fresh] = shortest.try_emplace(other, onwards);
-        if (!fresh && known->second <= onwards) continue;
-        known->second = onwards;
-        queue.push({onwards, other});
+        const std::vector<Index>& chain = candidates_[c].curve.vertices;
+        visit(chain.front() == v ? chain.back() : chain.front(), candidates_[c].length, c);
       }
-    }
+    };
+    shortest_ways(corner, kDetour * width_, links,
+                  [&](Index v, double length, Index, Index) { return shortest.try_emplace(v, length).second; });
     return shortest;
   }
 
-  double way_to(const Point& point, const Ways& ways) const {
+  double way_to(std::size_t point, const Ways& ways) const {
     double least = std::numeric_limits<double>::infinity();
-    const Curve& curve = curves_[point.curve];
-    if (curve.closed) return least;
-    if (const auto first = ways.find(curve.first); first != ways.end()) least = first->second + point.at;
-    if (const auto last = ways.find(curve.last); last != ways.end())
-      least = std::min(least, last->second + curve.length - point.at);
+    const Candidate& candidate = candidates_[curve_[point]];
+    if (candidate.curve.closed) return least;
+    if (const auto first = ways.find(candidate.curve.vertices.front()); first != ways.end())
+      least = first->second + positions_[point];
+    if (const auto last = ways.find(candidate.curve.vertices.back()); last != ways.end())
+      least = std::min(least, last->second + candidate.length - positions_[point]);
     return least;
   }
 
-  bool is_beside(const Sample& sample, double length, const Ways& from_start, const Ways& from_end) const {
+  bool is_beside(std::size_t point, const Ways& from_start, const Ways& from_end) const {
+    const double at = positions_[point], length = candidates_[curve_[point]].length;
     bool beside = false;
-    each_near(sample.point, [&](const Point& point, double distance) {
-      const double way = std::min(sample.at + way_to(point, from_start), length - sample.at + way_to(point, from_end));
+    each_near(points_[point], [&](std::size_t other, double distance) {
+      const double way = std::min(at + way_to(other, from_start), length - at + way_to(other, from_end));
       beside |= way > kDetour * distance;
     });
     return beside;
   }
 
-  const std::vector<Vec3>& vertices_;
+  const std::vector<Candidate>& candidates_;
   double width_;
-  std::vector<Curve> curves_;
-  std::map<Index, std::vector<Index>> at_;  // curves that end at a corner
-  std::map<Cell, std::vector<Point>> grid_;
+  std::vector<char> kept_;          // of each candidate
+  std::vector<std::size_t> first_;  // point of each candidate
+  std::vector<Vec3> points_;
+  std::vector<double> positions_;  // arc lengths
+  std::vector<Index> curve_;       // the candidate of each point
+  PointSet set_{points_};
+  std::optional<KdTree> tree_;
+  std::map<Index, std::vector<Index>> at_;  // candidates that stay and end at a corner
 };
 
 // The direction in which a curve leaves the corner at one of its ends, over a length of about `width`.
@@ -437,15 +411,15 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return is_crease(a.curve) != is_crease(b.curve) ? !is_crease(a.curve) : a.weight > b.weight;
   });
-  Kept kept(vertices, width);
+  Kept kept(candidates, vertices, width);
   std::vector<FeatureCurve> left;
-  for (Candidate& candidate : candidates) {
-    if (is_crease(candidate.curve) && kept.beside(candidate) > kBeside) {
+  for (Index c = 0; c < candidates.size(); ++c) {
+    if (is_crease(candidates[c].curve) && kept.beside(c) > kBeside) {
       ++result.merged;
       continue;
     }
-    kept.add(candidate);
-    left.push_back(std::move(candidate.curve));
+    kept.keep(c);
+    left.push_back(candidates[c].curve);
   }
   // Corners on no curve, such as the tips of cones.
   std::vector<char> on_curve(graph.corners.size(), 0);
