@@ -118,14 +118,13 @@ struct RemeshSeconds {
 // What became of the input's features where they are fine (remesh/detail.h).
 struct DetailResult {
   double width = 0;          // details below it were merged or let go; 0: there are none
-  std::size_t resolved = 0;  // curves that are left
   std::size_t merged = 0;    // curves that a neighbour stands for
   std::size_t let_go = 0;    // curves that nothing stands for
   std::size_t vertices = 0;  // that would resolve all; 0: far more than were asked for
 };
 
 struct FeatureResult {
-  std::size_t curves = 0, corners = 0;  // of the input
+  std::size_t curves = 0, corners = 0;  // of the input, without details that were merged or let go
   std::size_t broken = 0;               // curves that are not chains of edges of the result
   std::size_t seeds = 0;                // of the result, on features
   FeatureDistance distance;             // of the result's feature edges and the input's, before a fit

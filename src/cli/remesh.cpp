@@ -225,7 +225,7 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["topology"]["faults"] = faults_json(result);
   report["features"] = features_json(result.features, result.mesh.feature_edges.size());
   report["detail"] = {{"width", result.detail.width},
-                      {"resolved", result.detail.resolved},
+                      {"resolved", result.features.curves},
                       {"merged", result.detail.merged},
                       {"let_go", result.detail.let_go},
                       {"vertices", result.detail.vertices}};

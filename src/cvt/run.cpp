@@ -9,12 +9,17 @@
 namespace bisector {
 namespace {
 
+void add_dual(Diagram& diagram) {
+  diagram.dual = extract_dual(diagram.polygons);
+  diagram.has = diagram.has | Want::dual;
+}
+
 void remove_strays(const Surface& surface, DiagramOfSeeds& known) {
   known.strays = 0;
   Diagram& diagram = known.diagram;
   if (!includes(diagram.has, Want::polygons)) return;
   known.strays = localise_cells(surface, known.positions, diagram.polygons);
-  if (known.strays > 0 && includes(diagram.has, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
+  if (known.strays > 0 && includes(diagram.has, Want::dual)) add_dual(diagram);
 }
 
 }  // namespace
@@ -27,19 +32,18 @@ void CvtRun::localise(bool on) {
 }
 
 void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& known) {
-  const bool known_seeds = known.positions == positions;
-  if (known_seeds && includes(known.diagram.has, Want::polygons) && !includes(known.diagram.has, Want::dual) &&
-      includes(want, Want::dual)) {
-    known.diagram.dual = extract_dual(known.diagram.polygons);
-    known.diagram.has = known.diagram.has | Want::dual;
+  // The dual is read off here, when stray parts are gone, and not by the backend.
+  const bool wants_dual = includes(want, Want::dual);
+  const Want computed = wants_dual ? (want & Want::polyhedra) | Want::polygons : want;
+  if (known.positions != positions || !includes(known.diagram.has, computed)) {
+    known.positions.clear();
+    known.report = backend_->evaluate(positions, computed, known.diagram);
+    known.positions = positions;
+    if (localised_) remove_strays(surface(), known);
+    ++totals.evaluations;
+    totals.seconds += known.report.seconds;
   }
-  if (known_seeds && includes(known.diagram.has, want)) return;
-  known.positions.clear();
-  known.report = backend_->evaluate(positions, want, known.diagram);
-  known.positions = positions;
-  if (localised_) remove_strays(surface(), known);
-  ++totals.evaluations;
-  totals.seconds += known.report.seconds;
+  if (wants_dual && !includes(known.diagram.has, Want::dual)) add_dual(known.diagram);
 }
 
 const Diagram& CvtRun::diagram(Want want) {

@@ -169,13 +169,9 @@ class Planner {
 }  // namespace
 
 DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
-                        std::size_t vertices, DetailMode mode) {
+                        std::size_t vertices, bool all) {
   DetailPlan plan;
-  plan.features = features;
-  plan.result.resolved = features.curves.size();
-  if (mode == DetailMode::off || features.curves.empty()) return plan;
   const Planner planner(mesh, features, edge_length, vertices);
-  const bool all = mode == DetailMode::all;
   Planner::Trial best = planner.finest(all ? 1 : kCoarsening);
   const double needed = best.vertices;
   if (!all) best = planner.within_budget(std::move(best));
@@ -187,7 +183,6 @@ DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, 
   plan.features = std::move(best.simplified.graph);
   plan.points = std::move(best.points);
   plan.lengths = std::move(best.lengths);
-  plan.result.resolved = plan.features.curves.size();
   plan.result.merged = best.simplified.merged;
   plan.result.let_go = best.simplified.let_go;
   if (plan.result.merged + plan.result.let_go > 0) plan.result.width = best.width;

@@ -28,7 +28,9 @@ inline constexpr double kDetailGradation = 0.35;
 // details; details below it are merged or let go (features/simplify.h). Details are the gaps between curves
 // (curve_gaps), the lengths of curves, and quarters of the lengths of closed ones. `edge_length` is the length aimed at
 // without details, one value per vertex.
+// With `all` everything is resolved that is not finer than a sixteenth of the mean edge length; throws Error where that
+// takes far more vertices than there are.
 DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
-                        std::size_t vertices, DetailMode mode);
+                        std::size_t vertices, bool all);
 
 }  // namespace bisector

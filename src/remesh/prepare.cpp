@@ -82,7 +82,7 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
 
 Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options, const Context& context)
     : welded_(join_borders(input, options.weld)), mesh_(std::exchange(welded_.mesh, {})), sizing_(options.sizing),
-      target_(target_of(options)), given_seeds_(options.seeds.size()), energy_(options.energy) {
+      target_(target_of(options)), given_seeds_(options.seeds.size()) {
   const std::vector<Index>& vertex_of = welded_.vertex_of;
   warn_of_weld(welded_, options, context);
   orient_with_warning(mesh_, context);
@@ -95,7 +95,7 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
     b = vertex_of[b];
   }
   std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
-  if (energy_ == Energy::automatic) find_noise(features);
+  if (options.energy == Energy::automatic) find_noise(features);
   features_ = detect_features(mesh_, features);
 
   if (!sizing_.attribute.empty()) {
@@ -120,17 +120,22 @@ void Preparation::find_noise(FeatureOptions& features) {
 }
 
 void Preparation::plan(const RemeshOptions& options) {
-  const Sizing plain = refine_for_density(mesh_, sizing_, target_).sizing;
+  unbounded_ = refine_for_density(mesh_, sizing_, target_);
+  const Sizing& plain = unbounded_->sizing;
   std::vector<double> lengths(mesh_.vertices.size());
   for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(plain, v);
-  DetailPlan plan = plan_details(mesh_, features_, lengths, plain.vertices, options.detail);
+  DetailPlan plan = plan_details(mesh_, features_, lengths, plain.vertices, options.detail == DetailMode::all);
   features_ = std::move(plan.features);
   detail_ = plan.result;
+  if (options.detail == DetailMode::all && detail_.vertices > plain.vertices) {
+    target_ = {detail_.vertices, 0};
+    unbounded_.reset();
+  }
   bound(plan.points, plan.lengths);
-  if (options.detail == DetailMode::all && detail_.vertices > plain.vertices) target_ = {detail_.vertices, 0};
 }
 
 void Preparation::bound(const std::vector<Vec3>& points, const std::vector<double>& lengths) {
+  if (!points.empty()) unbounded_.reset();
   bounded_points_.insert(bounded_points_.end(), points.begin(), points.end());
   bounded_lengths_.insert(bounded_lengths_.end(), lengths.begin(), lengths.end());
 }
@@ -138,7 +143,7 @@ void Preparation::bound(const std::vector<Vec3>& points, const std::vector<doubl
 PreparedInput Preparation::lay_down() const {
   std::optional<SizeField> field;
   if (!bounded_points_.empty()) field.emplace(bounded_points_, bounded_lengths_, kDetailGradation);
-  SizedMesh sized = refine_for_density(mesh_, sizing_, target_, field ? &*field : nullptr);
+  SizedMesh sized = unbounded_ ? *unbounded_ : refine_for_density(mesh_, sizing_, target_, field ? &*field : nullptr);
   if (sized.sizing.vertices > kMostVertices && given_seeds_ == 0)
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
                             target_.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));

@@ -45,9 +45,9 @@ class Preparation {
   SizingOptions sizing_;
   SizingTarget target_;
   std::size_t given_seeds_;
-  Energy energy_;
   DetailResult detail_;
   bool noisy_ = false;
+  std::optional<SizedMesh> unbounded_;  // laid down already, and still good
   std::vector<Vec3> bounded_points_;
   std::vector<double> bounded_lengths_;
 };

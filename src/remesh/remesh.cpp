@@ -24,6 +24,7 @@
 #include "remesh/sheets.h"
 #include "remesh/topology_control.h"
 #include "voronoi/dual.h"
+#include "voronoi/polygons.h"
 #include "voronoi/tiling.h"
 
 namespace bisector {
@@ -113,7 +114,6 @@ class Pipeline {
   void extract();
   void extract_features(const std::vector<Index>& vertex_of);
   void fit();
-  double density_at(const BallReport::Groups& parts, const RestrictedPolygons& polygons) const;
 
   const Surface& surface_;
   const RemeshPlan& plan_;
@@ -348,15 +348,17 @@ Pipeline::Crowded Pipeline::crowded() {
   const MeshTopology& input = result_.input_topology;
   if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !input.manifold || !input.oriented)
     return found;
-  run_.localise(true);
+  run_.localise(localises_);
   const RestrictedPolygons& polygons = run_.diagram(Want::polygons).polygons;
   const BallReport report = check_ball_property(surface_, polygons);
   if (report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
   for (const BallReport::Cell& cell : report.cells) {
-    // The edges of a cell of this mass, as of the hexagons of a regular mesh.
-    const double mass = run_.diagram().moments.cells[cell.seed].mass;
-    const double length = kShorter * std::sqrt(2 / std::numbers::sqrt3 * mass / density_at(cell.parts, polygons));
-    if (!(length > 0) || !std::isfinite(length)) continue;
+    double area = 0;
+    for (const auto& part : cell.parts)
+      for (const std::size_t p : part) area += polygon_area(polygons, p);
+    if (!(area > 0)) continue;
+    // Cells of a regular mesh are hexagons.
+    const double length = kShorter * std::sqrt(2 / std::numbers::sqrt3 * area);
     found.points.push_back(run_.seeds.position(cell.seed));
     found.lengths.push_back(length);
     for (const auto& part : cell.parts)
@@ -367,20 +369,6 @@ Pipeline::Crowded Pipeline::crowded() {
         }
   }
   return found;
-}
-
-// The mean density of a cell's parts.
-double Pipeline::density_at(const BallReport::Groups& parts, const RestrictedPolygons& polygons) const {
-  if (surface_.density.empty()) return 1;
-  double sum = 0;
-  std::size_t count = 0;
-  for (const auto& part : parts)
-    for (const std::size_t p : part)
-      for (const Index v : surface_.mesh.triangles[polygons.pairs[p].triangle]) {
-        sum += surface_.density[v];
-        ++count;
-      }
-  return count > 0 ? sum / static_cast<double>(count) : 1;
 }
 
 RemeshResult Pipeline::finish() {
@@ -428,11 +416,11 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   RunTotals totals;
   for (int attempt = 0;; ++attempt) {
     const Stopwatch laying_down;
-    const PreparedInput prepared = preparation.lay_down();
+    PreparedInput prepared = preparation.lay_down();
     RemeshPlan plan = plan_of(options);
     plan.vertices = prepared.vertices;
     if (prepared.noisy) plan.constrained = false;
-    const Surface surface(prepared.mesh, prepared.density);
+    const Surface surface(std::move(prepared.mesh), prepared.density);
     preparing += laying_down.seconds();
     const std::unique_ptr<Backend> backend = compute.backend(surface);
     Pipeline pipeline(*backend, prepared.features, plan, context);

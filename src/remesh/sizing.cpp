@@ -174,7 +174,8 @@ class Field {
   Field(const TriangleMesh& mesh, const SizingOptions& options, double vertices, double uniform,
         const SizeField* bound = nullptr)
       : kind_(options.kind), bound_(bound) {
-    if (bound) bounds_ = bound->at(mesh.vertices, nearest_);
+    std::vector<Index> nearest;
+    if (bound) bounds_ = bound->at(mesh.vertices, nearest);
     const double diagonal = bounding_box(mesh.vertices).diagonal();
     unit_ = diagonal;
     least_ = std::min(kSmallestFeature * uniform / diagonal, 1.0);
@@ -219,7 +220,6 @@ class Field {
   std::vector<double> values_;
   const SizeField* bound_;
   std::vector<double> bounds_;
-  std::vector<Index> nearest_;
 };
 
 // The lengths of a calibrated field, and the factor that led to them.

@@ -13,6 +13,7 @@
 #include "cvt/constrain.h"
 #include "remesh/sheets.h"
 #include "voronoi/dual.h"
+#include "voronoi/polygons.h"
 
 namespace bisector {
 namespace {
@@ -91,10 +92,8 @@ class Repair {
   Extremes extremes_of_polygon(std::size_t p, const Vec3& seed) const {
     Extremes x;
     const std::size_t first = polygons_.offsets[p], end = polygons_.offsets[p + 1];
-    const Vec3& apex = polygons_.vertices[first];
     for (std::size_t e = first; e < end; ++e) x.far(polygons_.vertices[e], seed);
-    for (std::size_t e = first + 1; e + 1 < end; ++e)
-      x.near(nearest_on_triangle(seed, apex, polygons_.vertices[e], polygons_.vertices[e + 1]), seed);
+    x.near(nearest_on_polygon(polygons_, p, seed), seed);
     return x;
   }
 

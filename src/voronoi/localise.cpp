@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "voronoi/ball_property.h"
+#include "voronoi/polygons.h"
 
 namespace bisector {
 namespace {
@@ -33,43 +34,25 @@ class Localiser {
   Localiser(const Surface& surface, const std::vector<Vec3>& seeds, RestrictedPolygons& polygons)
       : surface_(surface), seeds_(seeds), polygons_(polygons) {}
 
-  // How many pieces changed hands.
-  std::size_t run() {
+  struct Moves {
+    std::size_t moved = 0, left = 0;  // pieces
+  };
+  Moves run() {
     const BallReport report = check_ball_property(surface_, polygons_);
     find_pieces(report);
-    if (pieces_.empty()) return 0;
+    if (pieces_.empty()) return {};
     measure();
     for (std::size_t k = 0; k < pieces_.size(); ++k) choose(k);
     while (cancel_impossible()) {
     }
-    const auto moved = std::count_if(pieces_.begin(), pieces_.end(), [](const Piece& p) { return p.to() != kNone; });
-    if (moved > 0) rebuild();
-    return static_cast<std::size_t>(moved);
+    Moves moves;
+    for (const Piece& piece : pieces_) ++(piece.to() == kNone ? moves.left : moves.moved);
+    if (moves.moved > 0) rebuild();
+    return moves;
   }
 
  private:
   static constexpr std::size_t kOwn = static_cast<std::size_t>(-1);
-
-  double squared_distance(std::size_t polygon, const Vec3& p) const {
-    double least = std::numeric_limits<double>::infinity();
-    const std::size_t first = polygons_.offsets[polygon], end = polygons_.offsets[polygon + 1];
-    for (std::size_t e = first + 1; e + 1 < end; ++e) {
-      const Vec3 q =
-          nearest_on_triangle(p, polygons_.vertices[first], polygons_.vertices[e], polygons_.vertices[e + 1]);
-      least = std::min(least, norm2(q - p));
-    }
-    return least;
-  }
-
-  double area(std::size_t polygon) const {
-    const Vec3& normal = surface_.facets[surface_.facet_of[polygons_.pairs[polygon].triangle]].normal;
-    const std::size_t first = polygons_.offsets[polygon], end = polygons_.offsets[polygon + 1];
-    Vec3 sum;
-    for (std::size_t e = first + 1; e + 1 < end; ++e)
-      sum += cross(polygons_.vertices[e] - polygons_.vertices[first],
-                   polygons_.vertices[e + 1] - polygons_.vertices[first]);
-    return std::abs(0.5 * dot(normal, sum));
-  }
 
   void find_pieces(const BallReport& report) {
     piece_.assign(polygons_.pairs.size(), kOwn);
@@ -79,7 +62,8 @@ class Localiser {
       double least = std::numeric_limits<double>::infinity();
       for (std::size_t k = 0; k < cell.parts.size(); ++k)
         for (const std::size_t p : cell.parts[k])
-          if (const double d = squared_distance(p, seeds_[cell.seed]); d < least) {
+          if (const double d = norm2(nearest_on_polygon(polygons_, p, seeds_[cell.seed]) - seeds_[cell.seed]);
+              d < least) {
             least = d;
             own = k;
           }
@@ -94,7 +78,7 @@ class Localiser {
   void measure() {
     own_area_.assign(seeds_.size(), 0);
     for (std::size_t p = 0; p < polygons_.pairs.size(); ++p)
-      (piece_[p] == kOwn ? own_area_[polygons_.pairs[p].cell] : pieces_[piece_[p]].area) += area(p);
+      (piece_[p] == kOwn ? own_area_[polygons_.pairs[p].cell] : pieces_[piece_[p]].area) += polygon_area(polygons_, p);
   }
 
   // The polygon of a cell on the triangle of another polygon.
@@ -303,9 +287,9 @@ class Localiser {
 std::size_t localise_cells(const Surface& surface, const std::vector<Vec3>& seeds, RestrictedPolygons& polygons) {
   std::size_t all = 0;
   for (int round = 0; round < kRounds; ++round) {
-    const std::size_t moved = Localiser(surface, seeds, polygons).run();
-    all += moved;
-    if (moved == 0) break;
+    const Localiser::Moves moves = Localiser(surface, seeds, polygons).run();
+    all += moves.moved;
+    if (moves.moved == 0 || moves.left == 0) break;
   }
   return all;
 }

@@ -24,4 +24,23 @@ std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std:
   return begin;
 }
 
+double polygon_area(const RestrictedPolygons& polygons, std::size_t polygon) {
+  const std::size_t first = polygons.offsets[polygon], end = polygons.offsets[polygon + 1];
+  const Vec3& apex = polygons.vertices[first];
+  Vec3 sum;
+  for (std::size_t e = first + 1; e + 1 < end; ++e)
+    sum += cross(polygons.vertices[e] - apex, polygons.vertices[e + 1] - apex);
+  return 0.5 * norm(sum);
+}
+
+Vec3 nearest_on_polygon(const RestrictedPolygons& polygons, std::size_t polygon, const Vec3& p) {
+  const std::size_t first = polygons.offsets[polygon], end = polygons.offsets[polygon + 1];
+  Vec3 nearest = polygons.vertices[first];
+  for (std::size_t e = first + 1; e + 1 < end; ++e) {
+    const Vec3 q = nearest_on_triangle(p, polygons.vertices[first], polygons.vertices[e], polygons.vertices[e + 1]);
+    if (norm2(q - p) < norm2(nearest - p)) nearest = q;
+  }
+  return nearest;
+}
+
 }  // namespace bisector

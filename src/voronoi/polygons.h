@@ -17,4 +17,9 @@ void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index tria
 // The first polygon of each triangle, and one past the last.
 std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles);
 
+double polygon_area(const RestrictedPolygons& polygons, std::size_t polygon);
+
+// The nearest point of a convex polygon.
+Vec3 nearest_on_polygon(const RestrictedPolygons& polygons, std::size_t polygon, const Vec3& p);
+
 }  // namespace bisector

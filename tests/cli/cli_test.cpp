@@ -532,17 +532,17 @@ class CliRemesh : public Cli {
 
 // A plate too thin for its edges: its walls' curves are merged, or have the vertices that they take, or are left.
 TEST_F(CliRemesh, DetailsAreMergedOrResolved) {
-  write_mesh(in("plate.off"), test::prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}}));
-  const auto remeshed = [&](const char* detail) { return remesh("plate.off", {"-n", "400", "--detail", detail}); };
+  write_mesh(in("plate.off"), test::prism({{0, 0}, {1, 0}, {1, 0.02}, {0, 0.02}}));
+  const auto remeshed = [&](const char* detail) { return remesh("plate.off", {"-n", "200", "--detail", detail}); };
   const Json merged = remeshed("auto"), all = remeshed("all"), off = remeshed("off");
   EXPECT_GT(merged["detail"]["merged"], 0);
   EXPECT_LT(merged["detail"]["resolved"], 12);
   EXPECT_GT(merged["detail"]["width"], 0.02);
-  EXPECT_GT(merged["detail"]["vertices"], 400);
-  EXPECT_EQ(merged["output"]["vertices"], 400);
+  EXPECT_GT(merged["detail"]["vertices"], 200);
+  EXPECT_EQ(merged["output"]["vertices"], 200);
   EXPECT_EQ(all["detail"]["merged"], 0);
   EXPECT_EQ(all["features"]["curves"], 12);
-  EXPECT_GT(all["output"]["vertices"], 400);
+  EXPECT_GT(all["output"]["vertices"], 200);
   EXPECT_EQ(off["features"]["curves"], 12);
   EXPECT_EQ(off["detail"]["width"], 0);
   EXPECT_LT(merged["quality"]["theta_below_30"], 0.5 * off["quality"]["theta_below_30"].get<double>());

@@ -21,28 +21,20 @@ TriangleMesh chamfered(double width) {
   return prism({{0, 0}, {4, 0}, {4, 3 - cut}, {4 - cut, 3}, {0, 3}});
 }
 
-DetailPlan plan_for(const TriangleMesh& mesh, std::size_t vertices, DetailMode mode = DetailMode::budget) {
+DetailPlan plan_for(const TriangleMesh& mesh, std::size_t vertices) {
   SizingTarget target;
   target.vertices = vertices;
   const double h = compute_sizing(mesh, {}, target).unit_edge;
-  return plan_details(mesh, sharp_graph(mesh), std::vector<double>(mesh.vertices.size(), h), vertices, mode);
-}
-
-TEST(Detail, OffIsTheInput) {
-  const TriangleMesh mesh = chamfered(0.1);
-  const DetailPlan plan = plan_for(mesh, 500, DetailMode::off);
-  EXPECT_EQ(plan.features.edges, sharp_graph(mesh).edges);
-  EXPECT_TRUE(plan.points.empty());
+  return plan_details(mesh, sharp_graph(mesh), std::vector<double>(mesh.vertices.size(), h), vertices, false);
 }
 
 TEST(Detail, WhereNothingIsFineEdgesAreAsTheyWere) {
-  for (const char* name : {"box", "cylinder"})
-    for (const FeaturedModel& model : featured_models()) {
-      if (model.name != std::string(name)) continue;
-      const DetailPlan plan = plan_for(model.mesh, 2000);
-      EXPECT_EQ(plan.features.edges, sharp_graph(model.mesh).edges) << name;
-      EXPECT_TRUE(plan.lengths.empty()) << name;
-    }
+  for (const FeaturedModel& model : featured_models()) {
+    if (model.name != std::string("box") && model.name != std::string("cylinder")) continue;
+    const DetailPlan plan = plan_for(model.mesh, 2000);
+    EXPECT_EQ(plan.features.edges, sharp_graph(model.mesh).edges) << model.name;
+    EXPECT_TRUE(plan.lengths.empty()) << model.name;
+  }
 }
 
 TEST(Detail, MoreVerticesResolveMore) {
