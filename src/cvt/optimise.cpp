@@ -19,6 +19,7 @@ constexpr double kArmijo = 1e-4;            // share of the slope's promise that
 constexpr double kFlatGradient = 1e-8;      // relative to the first; what is left is rounding
 constexpr int kLineSearchTrials = 8;        // evaluations per step at most
 constexpr std::size_t kDecreaseWindow = 5;  // steps over which the energy's fall is judged
+constexpr std::size_t kMemory = 8;          // energies that a step is measured against if diagrams are localised
 constexpr int kReseedTrials = 10;           // rounds of giving empty cells another place
 
 using Kind = SeedPlace::Kind;
@@ -124,6 +125,7 @@ class Descent {
   const OptimiseOptions& options_;
   Lbfgs history_;
   Iterate now_, next_;
+  std::vector<double> energies_;  // of all iterates
 };
 
 // Puts the seeds back to where they are held. `moments` are those of the cells before the seeds moved, `before` where
@@ -179,10 +181,16 @@ void Descent::start() {
     throw Error("the diagram does not cover the domain; its coordinates may span too many magnitudes");
 }
 
-// Whether a step lowers the energy enough; where rounding hides that, whether the slope says so: the approximate Wolfe
+// Whether a step lowers the energy enough, of localised cells below the largest of the last (Grippo, Lampariello and
+// Lucidi 1986); where rounding hides that, whether the slope says so: the approximate Wolfe
 // condition (Hager and Zhang 2005, section 2).
 bool Descent::is_descent(const std::vector<Vec3>& direction, double slope, double step) const {
-  if (next_.energy <= now_.energy + kArmijo * step * slope) return true;
+  // Where a stray part meets its cell or comes off, the energy of localised cells jumps.
+  double before = now_.energy;
+  if (run_.localises())
+    before = *std::max_element(energies_.end() - static_cast<std::ptrdiff_t>(std::min(energies_.size(), kMemory)),
+                               energies_.end());
+  if (next_.energy <= before + kArmijo * step * slope) return true;
   const double noise = run_.backend().energy_noise() * now_.energy;
   return noise > 0 && next_.energy <= now_.energy + noise &&
          inner(next_.gradient, direction) <= (2 * kArmijo - 1) * slope;
@@ -238,7 +246,7 @@ void Descent::hand_back() {
 
 void Descent::minimise() {
   start();
-  std::vector<double> energies{now_.energy};
+  energies_.assign(1, now_.energy);
   const double first_norm = now_.gradient_norm;
   bool restarted = false;
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
@@ -254,12 +262,12 @@ void Descent::minimise() {
     }
     restarted = false;
     accept();
-    energies.push_back(now_.energy);
+    energies_.push_back(now_.energy);
     run_.context().report({options_.phase, iteration + 1, options_.iterations, now_.energy, now_.gradient_norm,
                            options_.done + options_.share * (iteration + 1) / options_.iterations});
-    const std::size_t n = energies.size();
+    const std::size_t n = energies_.size();
     if (n > kDecreaseWindow &&
-        energies[n - 1 - kDecreaseWindow] - energies[n - 1] < kDecreaseWindow * options_.tolerance * energies[n - 1])
+        energies_[n - 1 - kDecreaseWindow] - energies_[n - 1] < kDecreaseWindow * options_.tolerance * energies_[n - 1])
       break;
   }
   hand_back();

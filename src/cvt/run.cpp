@@ -3,8 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/stopwatch.h"
 #include "voronoi/dual.h"
-#include "voronoi/localise.h"
 
 namespace bisector {
 namespace {
@@ -14,32 +14,31 @@ void add_dual(Diagram& diagram) {
   diagram.has = diagram.has | Want::dual;
 }
 
-void remove_strays(const Surface& surface, DiagramOfSeeds& known) {
-  known.strays = 0;
-  Diagram& diagram = known.diagram;
-  if (!includes(diagram.has, Want::polygons)) return;
-  known.strays = localise_cells(surface, known.positions, diagram.polygons);
-  if (known.strays > 0 && includes(diagram.has, Want::dual)) add_dual(diagram);
-}
-
 }  // namespace
 
 void CvtRun::localise(bool on) {
-  if (localised_ == on) return;
-  localised_ = on;
-  if (on && !diagram_.positions.empty()) remove_strays(surface(), diagram_);
-  if (!on && diagram_.strays > 0) diagram_ = {};
+  if (localises() == on) return;
+  localiser_ = on ? std::make_unique<Localiser>(surface()) : nullptr;
+  if (on || diagram_.strays > 0) diagram_ = {};
+}
+
+std::size_t CvtRun::strays() {
+  diagram();
+  return diagram_.strays;
 }
 
 void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& known) {
   // The dual is read off here, when stray parts are gone, and not by the backend.
   const bool wants_dual = includes(want, Want::dual);
-  const Want computed = wants_dual ? (want & Want::polyhedra) | Want::polygons : want;
+  Want computed = want & (Want::polygons | Want::polyhedra);
+  if (wants_dual || localiser_) computed = computed | Want::polygons;
   if (known.positions != positions || !includes(known.diagram.has, computed)) {
     known.positions.clear();
     known.report = backend_->evaluate(positions, computed, known.diagram);
     known.positions = positions;
-    if (localised_) remove_strays(surface(), known);
+    const Stopwatch watch;
+    known.strays = localiser_ ? localiser_->localise(positions, known.diagram) : 0;
+    known.report.seconds.clip += watch.seconds();
     ++totals.evaluations;
     totals.seconds += known.report.seconds;
   }
@@ -67,8 +66,10 @@ bool CvtRun::covers(const Diagram& diagram) const {
 }
 
 void CvtRun::change_backend(Backend& backend) {
-  if (&backend != backend_) diagram_ = {};
+  if (&backend == backend_) return;
+  diagram_ = {};
   backend_ = &backend;
+  if (localiser_) localiser_ = std::make_unique<Localiser>(surface());
 }
 
 }  // namespace bisector

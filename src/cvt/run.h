@@ -1,12 +1,14 @@
 // A run: the domain's backend, the seeds, the diagram of exactly those seeds, and what all its evaluations cost.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "backend/backend.h"
 #include "bisector/context.h"
 #include "features/placed_seeds.h"
 #include "voronoi/diagram.h"
+#include "voronoi/localise.h"
 
 namespace bisector {
 
@@ -22,7 +24,7 @@ struct DiagramOfSeeds {
   Diagram diagram;
   EvaluationReport report;
   std::vector<Vec3> positions;  // empty: there is no diagram yet
-  std::size_t strays = 0;       // pieces of cells that localise_cells has given to others
+  std::size_t strays = 0;       // cells that had pieces apart from their seed, if these are left out
 };
 
 class CvtRun {
@@ -49,8 +51,11 @@ class CvtRun {
   // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other
   // positions, or lacks something. The reference is good until the next call that computes one.
   const Diagram& diagram(Want want = Want::moments);
-  // Whether polygons and dual are those of cells without stray parts (voronoi/localise.h). Moments are not.
+  // Whether diagrams are those of cells without stray parts (voronoi/localise.h).
   void localise(bool on);
+  bool localises() const { return localiser_ != nullptr; }
+  // How many cells had such parts, with the seeds as they are.
+  std::size_t strays();
   // How the last diagram of the run's seeds was certified.
   const Certification& certification() const { return diagram_.report.certification; }
   // The diagram of the seeds as they are, to be kept beside a copy of them.
@@ -72,7 +77,7 @@ class CvtRun {
   const FeatureCurves& curves_;
   const Context& context_;
   DiagramOfSeeds diagram_;
-  bool localised_ = false;
+  std::unique_ptr<Localiser> localiser_;  // if diagrams are localised
   // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.
   std::vector<Vec3> normals_;
 };

@@ -33,6 +33,10 @@ namespace {
 // Of the steps allowed per level: the coarsest of several levels settles soon, the finest starts near its minimum, and
 // seeds that are put on the surface move little.
 constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0.05;
+// Diagrams are localised from a level's start if more than one cell in so many has stray parts there, and else for so
+// much of the steps at the end of the finest.
+constexpr std::size_t kManyStrays = 20;
+constexpr double kLocalisedShare = 0.2;
 constexpr int kMendingRounds = 3;  // of features and topology
 // Runs that start again with edges shorter by this where cells were no disks; not if more than one cell in so many was.
 constexpr int kAttempts = 2;
@@ -104,6 +108,7 @@ class Pipeline {
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
   void optimise_levels();
+  void localise_if_above(std::size_t cells);
   bool dual_suffices();
   bool free_tips();
   std::vector<Vec3> all_vertices() const;
@@ -179,7 +184,13 @@ void Pipeline::optimise_levels() {
     const double share = steps_share(level, counts.size());
     step_.iterations = share_of(plan_.iterations, share);
     step_.done += std::exchange(step_.share, share * cost(counts[level]) / total);
+    localise_if_above(counts[level] / kManyStrays);
     optimise(run_, step_);
+    if (!run_.localises() && level + 1 == counts.size()) {
+      localise_if_above(0);
+      step_.iterations = share_of(plan_.iterations, kLocalisedShare);
+      if (run_.localises()) optimise(run_, step_);
+    }
     if (run_.has_features()) clear_features(run_, trace_, measure_, step_);
     if (level + 1 < counts.size()) to_next_level(counts[level + 1]);
   }
@@ -192,6 +203,12 @@ void Pipeline::optimise_levels() {
   }
   step_.done = 1;
   step_.share = 0;
+}
+
+// Has stray parts of cells left out of diagrams from here on if more than so many cells have any.
+void Pipeline::localise_if_above(std::size_t cells) {
+  run_.localise(localises_);
+  if (localises_ && run_.strays() <= cells) run_.localise(false);
 }
 
 // Folds of a rough surface give cells pieces that leave no trace in the dual.
@@ -297,10 +314,8 @@ void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
 
 void Pipeline::extract() {
   const Stopwatch watch;
-  run_.localise(false);
-  result_.untiled = count_untiled(surface_, run_.diagram(Want::polygons).polygons);
-  run_.localise(localises_);
   const Diagram& diagram = run_.diagram(Want::polygons | Want::dual);
+  result_.untiled = count_untiled(surface_, diagram.polygons);
   if (run_.has_features()) features_ = check_features(trace_, curves_, run_.seeds.places(), diagram);
   const Divided divided = divide_sheets();
   const Dual dual = divided.polygons ? extract_dual(*divided.polygons) : diagram.dual;

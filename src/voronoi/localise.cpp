@@ -4,294 +4,525 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
+#include <unordered_map>
 #include <utility>
 
-#include "voronoi/ball_property.h"
+#include "core/disjoint_sets.h"
+#include "core/grouping.h"
+#include "core/parallel.h"
+#include "mesh/topology.h"
+#include "voronoi/clip.h"
+#include "voronoi/dual.h"
+#include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polygons.h"
+#include "voronoi/step_mass.h"
 
 namespace bisector {
 namespace {
 
-constexpr int kRounds = 4;  // pieces that lie among other pieces wait for these
+constexpr int kRounds = 16;  // pieces across a wall come to light one behind the other
+// A seed's list of neighbours reaches this far at first, in mean distances of seeds.
+constexpr double kReach = 2;
+constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
 
-// A piece of a cell apart from its seed.
-struct Piece {
-  std::vector<std::size_t> polygons;
-  double area = 0;
-  std::vector<Index> choices;  // cells that it could go to, the best last
-  Index to() const { return choices.empty() ? kNone : choices.back(); }
-};
+using Triangles = std::vector<Index>;  // ascending
 
-// A polygon while its triangle is put together anew.
-struct Polygon {
-  Index cell;
-  std::vector<Index> labels;
-  std::vector<Vec3> vertices;
-};
+bool contains(const std::vector<Index>& values, Index value) {
+  return std::find(values.begin(), values.end(), value) != values.end();
+}
 
-class Localiser {
+void sort_unique(std::vector<Index>& values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+}
+
+// Values for some of the items 0 to n - 1.
+template <class T>
+class Overlay {
  public:
-  Localiser(const Surface& surface, const std::vector<Vec3>& seeds, RestrictedPolygons& polygons)
-      : surface_(surface), seeds_(seeds), polygons_(polygons) {}
-
-  struct Moves {
-    std::size_t moved = 0, left = 0;  // pieces
-  };
-  Moves run() {
-    const BallReport report = check_ball_property(surface_, polygons_);
-    find_pieces(report);
-    if (pieces_.empty()) return {};
-    measure();
-    for (std::size_t k = 0; k < pieces_.size(); ++k) choose(k);
-    while (cancel_impossible()) {
-    }
-    Moves moves;
-    for (const Piece& piece : pieces_) ++(piece.to() == kNone ? moves.left : moves.moved);
-    if (moves.moved > 0) rebuild();
-    return moves;
+  void reset(std::size_t n) {
+    at_.assign(n, kNone);
+    items.clear();
+    values_.clear();
   }
+  const T* find(Index item) const { return at_[item] == kNone ? nullptr : &values_[at_[item]]; }
+  T& operator[](Index item) {
+    if (at_[item] == kNone) {
+      at_[item] = static_cast<Index>(items.size());
+      items.push_back(item);
+      values_.emplace_back();
+    }
+    return values_[at_[item]];
+  }
+
+  std::vector<Index> items;  // that have a value
 
  private:
-  static constexpr std::size_t kOwn = static_cast<std::size_t>(-1);
-
-  void find_pieces(const BallReport& report) {
-    piece_.assign(polygons_.pairs.size(), kOwn);
-    for (const BallReport::Cell& cell : report.cells) {
-      if (cell.parts.size() < 2) continue;
-      std::size_t own = 0;
-      double least = std::numeric_limits<double>::infinity();
-      for (std::size_t k = 0; k < cell.parts.size(); ++k)
-        for (const std::size_t p : cell.parts[k])
-          if (const double d = norm2(nearest_on_polygon(polygons_, p, seeds_[cell.seed]) - seeds_[cell.seed]);
-              d < least) {
-            least = d;
-            own = k;
-          }
-      for (std::size_t k = 0; k < cell.parts.size(); ++k) {
-        if (k == own || cell.parts[k].empty()) continue;
-        for (const std::size_t p : cell.parts[k]) piece_[p] = pieces_.size();
-        pieces_.push_back({cell.parts[k], 0, {}});
-      }
-    }
-  }
-
-  void measure() {
-    own_area_.assign(seeds_.size(), 0);
-    for (std::size_t p = 0; p < polygons_.pairs.size(); ++p)
-      (piece_[p] == kOwn ? own_area_[polygons_.pairs[p].cell] : pieces_[piece_[p]].area) += polygon_area(polygons_, p);
-  }
-
-  // The polygon of a cell on the triangle of another polygon.
-  std::size_t beside(std::size_t polygon, Index cell) const {
-    const auto& pairs = polygons_.pairs;
-    const Index triangle = pairs[polygon].triangle;
-    for (std::size_t p = polygon; p-- > 0 && pairs[p].triangle == triangle;)
-      if (pairs[p].cell == cell) return p;
-    for (std::size_t p = polygon + 1; p < pairs.size() && pairs[p].triangle == triangle; ++p)
-      if (pairs[p].cell == cell) return p;
-    return kOwn;
-  }
-
-  bool has_label(std::size_t polygon, Index label) const {
-    const auto begin = polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[polygon]);
-    const auto end = polygons_.labels.begin() + static_cast<std::ptrdiff_t>(polygons_.offsets[polygon + 1]);
-    return std::find(begin, end, label) != end;
-  }
-
-  void choose(std::size_t index) {
-    Piece& piece = pieces_[index];
-    std::map<Index, double> border;
-    for (const std::size_t p : piece.polygons) {
-      const std::size_t first = polygons_.offsets[p], size = polygons_.offsets[p + 1] - first;
-      for (std::size_t e = 0; e < size; ++e) {
-        const Index label = polygons_.labels[first + e];
-        if (is_edge(label)) continue;
-        const std::size_t other = beside(p, label);
-        if (other == kOwn || piece_[other] != kOwn) continue;
-        border[label] += norm(polygons_.vertices[first + (e + 1) % size] - polygons_.vertices[first + e]);
-      }
-    }
-    std::vector<std::pair<double, Index>> order;
-    for (const auto& [cell, length] : border) {
-      const bool apart = std::any_of(piece.polygons.begin(), piece.polygons.end(),
-                                     [&, c = cell](std::size_t p) { return beside(p, c) != kOwn && !has_label(p, c); });
-      if (!apart && piece.area <= own_area_[cell]) order.push_back({length, cell});
-    }
-    std::sort(order.begin(), order.end());
-    for (const auto& [length, cell] : order) piece.choices.push_back(cell);
-  }
-
-  Index new_cell(std::size_t polygon) const {
-    const std::size_t k = piece_[polygon];
-    return k == kOwn || pieces_[k].to() == kNone ? polygons_.pairs[polygon].cell : pieces_[k].to();
-  }
-
-  std::size_t end_of_triangle(std::size_t begin) const {
-    std::size_t end = begin;
-    while (end < polygons_.pairs.size() && polygons_.pairs[end].triangle == polygons_.pairs[begin].triangle) ++end;
-    return end;
-  }
-
-  // Makes one polygon of two that share an edge, each having its own cell as the label there.
-  static bool join(Polygon& a, const Polygon& b) {
-    const auto own = [](const Polygon& p) {
-      return static_cast<std::size_t>(std::find(p.labels.begin(), p.labels.end(), p.cell) - p.labels.begin());
-    };
-    const std::size_t e = own(a), f = own(b);
-    if (e == a.labels.size() || f == b.labels.size()) return false;
-    Polygon joined{a.cell, {}, {}};
-    for (const auto& [polygon, shared] : {std::pair<const Polygon*, std::size_t>{&a, e}, {&b, f}})
-      for (std::size_t k = 1; k < polygon->labels.size(); ++k) {
-        const std::size_t at = (shared + k) % polygon->labels.size();
-        joined.labels.push_back(polygon->labels[at]);
-        joined.vertices.push_back(polygon->vertices[at]);
-      }
-    a = std::move(joined);
-    return true;
-  }
-
-  // Leaves out corners between edges of the same label.
-  static void simplify(Polygon& polygon) {
-    Polygon left{polygon.cell, {}, {}};
-    const std::size_t size = polygon.labels.size();
-    for (std::size_t k = 0; k < size; ++k) {
-      if (polygon.labels[k] == polygon.labels[(k + size - 1) % size]) continue;
-      left.labels.push_back(polygon.labels[k]);
-      left.vertices.push_back(polygon.vertices[k]);
-    }
-    if (!left.labels.empty()) polygon = std::move(left);
-  }
-
-  // Two cells share one edge on a triangle at most, or corners could not be told apart by their labels.
-  static void add_repeated(const Polygon& polygon, std::vector<Index>& spoilt) {
-    std::vector<Index> labels = polygon.labels;
-    labels.push_back(polygon.cell);
-    std::sort(labels.begin(), labels.end());
-    for (std::size_t k = 1; k < labels.size(); ++k)
-      if (labels[k] == labels[k - 1]) spoilt.insert(spoilt.end(), {polygon.cell, labels[k]});
-  }
-
-  struct Changed {
-    std::vector<Polygon> polygons;  // by ascending cell
-    std::vector<Index> spoilt;      // cells that are in several polygons, or share several edges with another
-  };
-  // A triangle after its pieces have changed hands.
-  Changed changed(std::size_t begin, std::size_t end) const {
-    std::map<Index, Index> renamed;
-    for (std::size_t p = begin; p < end; ++p) renamed[polygons_.pairs[p].cell] = new_cell(p);
-    Changed result;
-    std::vector<Polygon>& left = result.polygons;
-    for (std::size_t p = begin; p < end; ++p) {
-      Polygon polygon{new_cell(p), {}, {}};
-      for (std::size_t e = polygons_.offsets[p]; e < polygons_.offsets[p + 1]; ++e) {
-        const Index label = polygons_.labels[e];
-        const auto other = is_edge(label) ? renamed.end() : renamed.find(label);
-        polygon.labels.push_back(other == renamed.end() ? label : other->second);
-        polygon.vertices.push_back(polygons_.vertices[e]);
-      }
-      simplify(polygon);
-      left.push_back(std::move(polygon));
-    }
-    for (bool joined = true; joined;) {
-      joined = false;
-      for (std::size_t a = 0; a < left.size() && !joined; ++a)
-        for (std::size_t b = a + 1; b < left.size() && !joined; ++b) {
-          if (left[a].cell != left[b].cell || !join(left[a], left[b])) continue;
-          simplify(left[a]);
-          left.erase(left.begin() + static_cast<std::ptrdiff_t>(b));
-          joined = true;
-        }
-    }
-    std::sort(left.begin(), left.end(), [](const Polygon& a, const Polygon& b) { return a.cell < b.cell; });
-    for (std::size_t k = 0; k < left.size(); ++k) {
-      if (k > 0 && left[k].cell == left[k - 1].cell) result.spoilt.push_back(left[k].cell);
-      add_repeated(left[k], result.spoilt);
-    }
-    return result;
-  }
-
-  bool is_touched(std::size_t begin, std::size_t end) const {
-    for (std::size_t p = begin; p < end; ++p)
-      if (new_cell(p) != polygons_.pairs[p].cell) return true;
-    return false;
-  }
-
-  // Where a piece would not make one polygon with its new cell's on some triangle, it goes to the next best cell.
-  bool cancel_impossible() {
-    bool any = false;
-    for (std::size_t begin = 0, end = 0; begin < polygons_.pairs.size(); begin = end) {
-      end = end_of_triangle(begin);
-      if (!is_touched(begin, end)) continue;
-      const std::vector<Index> spoilt = changed(begin, end).spoilt;
-      if (spoilt.empty()) continue;
-      any = true;
-      if (!pass_on(begin, end,
-                   [&](Index cell) { return std::find(spoilt.begin(), spoilt.end(), cell) != spoilt.end(); }))
-        pass_on(begin, end, [](Index) { return true; });
-    }
-    return any;
-  }
-
-  // Has the pieces of a triangle that go to some cells go elsewhere; false if there are none.
-  template <class Some>
-  bool pass_on(std::size_t begin, std::size_t end, const Some& some) {
-    bool any = false;
-    for (std::size_t p = begin; p < end; ++p) {
-      if (piece_[p] == kOwn || pieces_[piece_[p]].choices.empty() || !some(pieces_[piece_[p]].to())) continue;
-      pieces_[piece_[p]].choices.pop_back();
-      any = true;
-    }
-    return any;
-  }
-
-  void rebuild() {
-    RestrictedPolygons built;
-    built.offsets = {0};
-    const auto close = [&](Index triangle, Index cell) {
-      built.pairs.push_back({triangle, cell});
-      built.offsets.push_back(built.labels.size());
-    };
-    for (std::size_t begin = 0, end = 0; begin < polygons_.pairs.size(); begin = end) {
-      end = end_of_triangle(begin);
-      if (is_touched(begin, end)) {
-        const std::vector<Polygon> anew = changed(begin, end).polygons;
-        for (const Polygon& polygon : anew) {
-          built.labels.insert(built.labels.end(), polygon.labels.begin(), polygon.labels.end());
-          built.vertices.insert(built.vertices.end(), polygon.vertices.begin(), polygon.vertices.end());
-          close(polygons_.pairs[begin].triangle, polygon.cell);
-        }
-        continue;
-      }
-      for (std::size_t p = begin; p < end; ++p) {
-        const auto first = static_cast<std::ptrdiff_t>(polygons_.offsets[p]);
-        const auto last = static_cast<std::ptrdiff_t>(polygons_.offsets[p + 1]);
-        built.labels.insert(built.labels.end(), polygons_.labels.begin() + first, polygons_.labels.begin() + last);
-        built.vertices.insert(built.vertices.end(), polygons_.vertices.begin() + first,
-                              polygons_.vertices.begin() + last);
-        close(polygons_.pairs[p].triangle, polygons_.pairs[p].cell);
-      }
-    }
-    polygons_ = std::move(built);
-  }
-
-  const Surface& surface_;
-  const std::vector<Vec3>& seeds_;
-  RestrictedPolygons& polygons_;
-  std::vector<Piece> pieces_;
-  std::vector<std::size_t> piece_;  // of each polygon; kOwn if it is part of the cell around the seed
-  std::vector<double> own_area_;    // of each cell
+  std::vector<Index> at_;
+  std::vector<T> values_;
 };
 
 }  // namespace
 
-std::size_t localise_cells(const Surface& surface, const std::vector<Vec3>& seeds, RestrictedPolygons& polygons) {
-  std::size_t all = 0;
-  for (int round = 0; round < kRounds; ++round) {
-    const Localiser::Moves moves = Localiser(surface, seeds, polygons).run();
-    all += moves.moved;
-    if (moves.moved == 0 || moves.left == 0) break;
+struct Localiser::Work {
+  const Surface& surface;
+  // The half-edges by which a triangle's neighbours across its own half-edge are entered, if need be behind triangles
+  // that are exactly collinear and have no polygons.
+  Csr<std::size_t> across;
+  std::vector<char> direct;  // of each half-edge: there is no such triangle between
+
+  SortedSeeds seeds;
+  Neighbours neighbours;
+  ThreadLocal<Clipper> clippers;  // of these seeds
+  const RestrictedPolygons* raw = nullptr;
+  std::vector<std::size_t> first;                                // polygon in `raw` of each triangle
+  Csr<std::size_t> of_cell;                                      // polygons in `raw`
+  Overlay<RestrictedPolygons> clipped;                           // triangles as they are divided now
+  Overlay<Triangles> cell_triangles;                             // of cells that changed
+  std::map<Index, std::vector<Triangles>> strays;                // components of cells apart from their seeds
+  std::unordered_map<Index, std::vector<Index>> left_out, back;  // of triangles: slots without a cell, and not again
+
+  explicit Work(const Surface& s);
+
+  std::size_t run(const std::vector<Vec3>& given, Diagram& diagram);
+
+ private:
+  // The polygons on a triangle as they are now.
+  struct Row {
+    const RestrictedPolygons* polygons;
+    std::size_t begin, end;
+    // The polygon of a cell; `end` if there is none.
+    std::size_t find(Index cell) const {
+      std::size_t p = begin;
+      while (p < end && polygons->pairs[p].cell != cell) ++p;
+      return p;
+    }
+    bool has_label(std::size_t polygon, Index label) const {
+      const auto& labels = polygons->labels;
+      for (std::size_t e = polygons->offsets[polygon]; e < polygons->offsets[polygon + 1]; ++e)
+        if (labels[e] == label) return true;
+      return false;
+    }
+  };
+  Row row(Index triangle) const {
+    if (const RestrictedPolygons* anew = clipped.find(triangle)) return {anew, 0, anew->pairs.size()};
+    return {raw, first[triangle], first[triangle + 1]};
   }
+  Triangles triangles_of(Index cell) const;
+
+  Clipper& clipper();
+  void take(const Row& on, std::size_t polygon, Clipper& clipper) const;
+  double squared_distance(Index triangle, Index cell, Clipper& clipper) const;
+  std::size_t nearest_to_seed(Index cell, const Triangles& triangles);
+  std::vector<Triangles> find_strays(Index cell);
+  void find_strays(const std::vector<Index>& cells);
+  bool is_own(Index triangle, Index cell) const;
+  bool borders_on_own(Index cell, const Triangles& piece) const;
+  bool is_left_out(Index triangle, Index cell) const;
+  bool has_own_at(std::size_t half_edge) const;
+  Triangles leave_out();
+  Triangles put_back_torn();
+  std::vector<Index> clip_anew(const Triangles& triangles);
+  RestrictedPolygons clip(Index triangle, Clipper& clipper) const;
+  Index nearest_but(const Vec3& q, const std::vector<Index>& without, Clipper& clipper) const;
+  RestrictedPolygons splice() const;
+  void sum(Diagram& diagram);
+};
+
+Localiser::Work::Work(const Surface& s) : surface(s) {
+  const std::vector<Triangle>& triangles = s.mesh.triangles;
+  const EdgeTable table = edge_table(triangles, s.mesh.vertices.size());
+  std::vector<std::size_t> edge_of(3 * triangles.size());
+  for (std::size_t e = 0; e < table.edges.size(); ++e)
+    for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of[*h] = e;
+  const auto has_facet = [&](std::size_t half_edge) { return s.facet_of[half_edge / 3] != kNone; };
+  direct.assign(3 * triangles.size(), 1);
+  std::vector<std::size_t> behind;  // half-edges of collinear triangles
+  across = group_into_rows<std::size_t>(3 * triangles.size(), [&](const auto& put) {
+    for (std::size_t from = 0; from < 3 * triangles.size(); ++from) {
+      if (!has_facet(from)) continue;
+      behind.assign(1, from);
+      for (std::size_t i = 0; i < behind.size(); ++i) {
+        const std::size_t edge = edge_of[behind[i]];
+        for (const std::size_t* h = table.half_edges.begin(edge); h != table.half_edges.end(edge); ++h) {
+          if (*h / 3 == behind[i] / 3 || *h / 3 == from / 3) continue;
+          if (has_facet(*h)) {
+            put(from, *h);
+            continue;
+          }
+          direct[from] = 0;
+          for (std::size_t next = *h - *h % 3, k = 0; k < 3; ++k)
+            if (next + k != *h && std::find(behind.begin(), behind.end(), next + k) == behind.end())
+              behind.push_back(next + k);
+        }
+      }
+    }
+  });
+}
+
+Triangles Localiser::Work::triangles_of(Index cell) const {
+  if (const Triangles* changed = cell_triangles.find(cell)) return *changed;
+  Triangles triangles;
+  for (const std::size_t* p = of_cell.begin(cell); p != of_cell.end(cell); ++p)
+    triangles.push_back(raw->pairs[*p].triangle);
+  return triangles;
+}
+
+Clipper& Localiser::Work::clipper() {
+  bool known = false;
+  Clipper& mine = clippers.local(known);
+  if (!known) mine.reset(seeds);
+  return mine;
+}
+
+// Has the clipper hold a polygon as its labels say, which is the same whatever computed them.
+void Localiser::Work::take(const Row& on, std::size_t polygon, Clipper& clipper) const {
+  const RestrictedPolygons& polygons = *on.polygons;
+  const auto& [triangle, cell] = polygons.pairs[polygon];
+  std::vector<Index> labels(polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon]),
+                            polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon + 1]));
+  for (Index& label : labels)
+    if (!is_edge(label)) label = seeds.slot[label];
+  clipper.begin(surface.facets[surface.facet_of[triangle]]);
+  clipper.take(seeds.slot[cell], labels.data(), labels.size());
+}
+
+// Of a cell's seed from its polygon on a triangle.
+double Localiser::Work::squared_distance(Index triangle, Index cell, Clipper& clipper) const {
+  const Row on = row(triangle);
+  take(on, on.find(cell), clipper);
+  double least = norm2(clipper.vertex(0));
+  for (std::size_t k = 1; k + 1 < clipper.size(); ++k)
+    least =
+        std::min(least, norm2(nearest_on_triangle({}, clipper.vertex(0), clipper.vertex(k), clipper.vertex(k + 1))));
+  return least;
+}
+
+// Which of a cell's triangles holds the polygon nearest to its seed. A polygon is no nearer than its triangle.
+std::size_t Localiser::Work::nearest_to_seed(Index cell, const Triangles& triangles) {
+  const Vec3& seed = seeds.x[seeds.slot[cell]];
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const auto& corners = surface.facets[surface.facet_of[triangles[i]]].corners;
+    order.push_back({norm2(nearest_on_triangle(seed, corners[0], corners[1], corners[2]) - seed), i});
+  }
+  std::sort(order.begin(), order.end());
+  std::size_t best = order[0].second;
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& [bound, i] : order) {
+    if (bound > least) break;
+    if (const double squared = squared_distance(triangles[i], cell, clipper()); squared < least) {
+      least = squared;
+      best = i;
+    }
+  }
+  return best;
+}
+
+// The components of a cell but for that nearest to its seed.
+std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
+  const bool changed = cell_triangles.find(cell) != nullptr;
+  const std::size_t count = changed ? cell_triangles.find(cell)->size() : of_cell.size(cell);
+  if (count < 2) return {};
+  const Triangles triangles = triangles_of(cell);
+  DisjointSets<> parts(count);
+  std::size_t components = count;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Row on = changed ? row(triangles[i]) : Row{raw, 0, 0};
+    const std::size_t p = changed ? on.find(cell) : of_cell.begin(cell)[i];
+    for (std::size_t e = on.polygons->offsets[p]; e < on.polygons->offsets[p + 1]; ++e) {
+      const Index label = on.polygons->labels[e];
+      if (!is_edge(label)) continue;
+      const std::size_t h = std::size_t{3} * triangles[i] + (label & ~kEdgeLabel);
+      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
+        const auto at = std::lower_bound(triangles.begin(), triangles.end(), static_cast<Index>(*other / 3));
+        if (at == triangles.end() || *at != *other / 3) continue;
+        components -= parts.join(i, static_cast<std::size_t>(at - triangles.begin()));
+      }
+    }
+  }
+  if (components == 1) return {};
+  const std::size_t own = parts.root(nearest_to_seed(cell, triangles));
+  std::vector<std::size_t> piece_of(count, count);
+  std::vector<Triangles> pieces;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t root = parts.root(i);
+    if (root == own) continue;
+    if (piece_of[root] == count) {
+      piece_of[root] = pieces.size();
+      pieces.emplace_back();
+    }
+    pieces[piece_of[root]].push_back(triangles[i]);
+  }
+  return pieces;
+}
+
+void Localiser::Work::find_strays(const std::vector<Index>& cells) {
+  std::vector<std::vector<Triangles>> found(cells.size());
+  parallel_each(
+      cells.size(), [&](std::size_t k) { found[k] = find_strays(cells[k]); }, kCellsAtOnce);
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    if (found[k].empty()) strays.erase(cells[k]);
+    else strays[cells[k]] = std::move(found[k]);
+  }
+}
+
+bool Localiser::Work::is_own(Index triangle, Index cell) const {
+  const auto at = strays.find(cell);
+  return at == strays.end() || std::none_of(at->second.begin(), at->second.end(), [&](const Triangles& piece) {
+           return std::binary_search(piece.begin(), piece.end(), triangle);
+         });
+}
+
+// A sheet without a seed has pieces that border on none, and they stay. Beyond a mesh edge there may be another cell
+// where this one is left out already.
+bool Localiser::Work::borders_on_own(Index cell, const Triangles& piece) const {
+  for (const Index t : piece) {
+    const Row on = row(t);
+    const std::size_t p = on.find(cell);
+    for (std::size_t e = on.polygons->offsets[p]; e < on.polygons->offsets[p + 1]; ++e) {
+      const Index label = on.polygons->labels[e];
+      if (!is_edge(label)) {
+        if (is_own(t, label)) return true;
+        continue;
+      }
+      const std::size_t h = std::size_t{3} * t + (label & ~kEdgeLabel);
+      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other)
+        if (is_left_out(static_cast<Index>(*other / 3), cell) && has_own_at(*other)) return true;
+    }
+  }
+  return false;
+}
+
+bool Localiser::Work::is_left_out(Index triangle, Index cell) const {
+  const auto at = left_out.find(triangle);
+  return at != left_out.end() && contains(at->second, seeds.slot[cell]);
+}
+
+// Whether a cell's own part lies at a half-edge, in its triangle.
+bool Localiser::Work::has_own_at(std::size_t half_edge) const {
+  const auto triangle = static_cast<Index>(half_edge / 3);
+  const Row on = row(triangle);
+  for (std::size_t p = on.begin; p < on.end; ++p)
+    if (on.has_label(p, kEdgeLabel | static_cast<Index>(half_edge % 3)) && is_own(triangle, on.polygons->pairs[p].cell))
+      return true;
+  return false;
+}
+
+// Leaves out seeds where they have stray pieces. Returns the triangles, ascending.
+Triangles Localiser::Work::leave_out() {
+  Triangles triangles;
+  for (const auto& [cell, pieces] : strays)
+    for (const Triangles& piece : pieces) {
+      if (!borders_on_own(cell, piece)) continue;
+      for (const Index t : piece) {
+        const Index slot = seeds.slot[cell];
+        if (const auto at = back.find(t); at != back.end() && contains(at->second, slot)) continue;
+        left_out[t].push_back(slot);
+        triangles.push_back(t);
+      }
+    }
+  sort_unique(triangles);
+  return triangles;
+}
+
+// Where a cell ends at a mesh edge because it is left out beyond, it is put back there. Returns the triangles.
+Triangles Localiser::Work::put_back_torn() {
+  Triangles triangles;
+  std::vector<std::pair<Index, Index>> torn;
+  for (const auto& [triangle, slots] : left_out)
+    for (Index k = 0; k < 3; ++k) {
+      const std::size_t h = std::size_t{3} * triangle + k;
+      if (!direct[h]) continue;
+      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
+        const Row there = row(static_cast<Index>(*other / 3));
+        for (const Index slot : slots)
+          if (const std::size_t q = there.find(seeds.id[slot]);
+              q < there.end && there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)))
+            torn.push_back({triangle, slot});
+      }
+    }
+  for (const auto& [triangle, slot] : torn) {
+    std::erase(left_out[triangle], slot);
+    if (!contains(back[triangle], slot)) back[triangle].push_back(slot);
+    triangles.push_back(triangle);
+  }
+  sort_unique(triangles);
+  return triangles;
+}
+
+// A slot with a cell on the facet that the clipper is at, some being left out.
+Index Localiser::Work::nearest_but(const Vec3& q, const std::vector<Index>& without, Clipper& clipper) const {
+  double radius = norm(seeds.x[neighbours.nearest(q)] - q);
+  for (std::size_t tried = 0; tried + without.size() < seeds.x.size(); radius = 1.5 * radius + 1e-6 * seeds.extent) {
+    std::vector<Index> near = neighbours.around(q, radius);
+    std::erase_if(near, [&](Index s) { return norm(seeds.x[s] - q) > radius || contains(without, s); });
+    std::sort(near.begin(), near.end(), [&](Index a, Index b) {
+      return std::pair(norm2(seeds.x[a] - q), seeds.id[a]) < std::pair(norm2(seeds.x[b] - q), seeds.id[b]);
+    });
+    for (; tried < near.size(); ++tried)
+      if (clipper.clip(neighbours, near[tried])) return near[tried];
+  }
+  return kNone;
+}
+
+// The division of a triangle among the seeds that are not left out.
+RestrictedPolygons Localiser::Work::clip(Index triangle, Clipper& clipper) const {
+  const auto these = left_out.find(triangle);
+  const std::vector<Index> without = these == left_out.end() ? std::vector<Index>{} : these->second;
+  clipper.begin(surface.facets[surface.facet_of[triangle]], without);
+  std::vector<Index> met;
+  const auto meet = [&](Index slot) {
+    if (slot != kNone && !contains(met, slot) && !contains(without, slot)) met.push_back(slot);
+  };
+  const Row before = row(triangle);
+  for (std::size_t p = before.begin; p < before.end; ++p) meet(seeds.slot[before.polygons->pairs[p].cell]);
+  if (const auto at = back.find(triangle); at != back.end())
+    for (const Index slot : at->second) meet(slot);
+  if (met.empty()) meet(nearest_but(surface.mesh.vertices[surface.mesh.triangles[triangle][0]], without, clipper));
+  RestrictedPolygons found;
+  found.offsets = {0};
+  for (std::size_t k = 0; k < met.size(); ++k) {
+    if (!clipper.clip(neighbours, met[k])) continue;
+    append_polygon(clipper, seeds, triangle, met[k], found);
+    for (std::size_t e = 0; e < clipper.size(); ++e)
+      if (!is_edge(clipper.label(e))) meet(clipper.label(e));
+  }
+  std::vector<std::size_t> order(found.pairs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return found.pairs[a].cell < found.pairs[b].cell; });
+  RestrictedPolygons sorted;
+  for (const std::size_t p : order) append_polygons(found, p, p + 1, sorted);
+  return sorted;
+}
+
+// Returns the cells that lost or won.
+std::vector<Index> Localiser::Work::clip_anew(const Triangles& triangles) {
+  std::vector<RestrictedPolygons> anew(triangles.size());
+  parallel_each(
+      triangles.size(), [&](std::size_t k) { anew[k] = clip(triangles[k], clipper()); }, kTrianglesAtOnce);
+  std::vector<Index> cells;
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    const Index t = triangles[k];
+    const Row before = row(t);
+    for (std::size_t p = before.begin; p < before.end; ++p) cells.push_back(before.polygons->pairs[p].cell);
+    for (const auto& pair : anew[k].pairs) cells.push_back(pair.cell);
+  }
+  sort_unique(cells);
+  for (const Index cell : cells)
+    if (!cell_triangles.find(cell)) {
+      Triangles now = triangles_of(cell);
+      cell_triangles[cell] = std::move(now);
+    }
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    const Index t = triangles[k];
+    const Row before = row(t);
+    for (std::size_t p = before.begin; p < before.end; ++p) {
+      Triangles& of = cell_triangles[before.polygons->pairs[p].cell];
+      of.erase(std::lower_bound(of.begin(), of.end(), t));
+    }
+    for (const auto& pair : anew[k].pairs) {
+      Triangles& of = cell_triangles[pair.cell];
+      of.insert(std::lower_bound(of.begin(), of.end(), t), t);
+    }
+    clipped[t] = std::move(anew[k]);
+  }
+  return cells;
+}
+
+RestrictedPolygons Localiser::Work::splice() const {
+  RestrictedPolygons all;
+  all.pairs.reserve(raw->pairs.size());
+  all.offsets.reserve(raw->offsets.size());
+  all.labels.reserve(raw->labels.size());
+  all.vertices.reserve(raw->vertices.size());
+  Triangles triangles = clipped.items;
+  std::sort(triangles.begin(), triangles.end());
+  std::size_t kept = 0;
+  for (const Index t : triangles) {
+    const RestrictedPolygons& polygons = *clipped.find(t);
+    append_polygons(*raw, kept, first[t], all);
+    append_polygons(polygons, 0, polygons.pairs.size(), all);
+    kept = first[t + 1];
+  }
+  append_polygons(*raw, kept, raw->pairs.size(), all);
   return all;
 }
+
+// Sets the moments of the cells that changed, and the triangles of all.
+void Localiser::Work::sum(Diagram& diagram) {
+  CellMoments& moments = diagram.moments;
+  const std::vector<Index>& cells = cell_triangles.items;
+  const bool uniform = surface.density.empty();
+  parallel_each(
+      cells.size(),
+      [&](std::size_t k) {
+        const Index cell = cells[k];
+        Clipper& mine = clipper();
+        FixedTreeSum sum;
+        for (const Index t : *cell_triangles.find(cell)) {
+          const Row on = row(t);
+          take(on, on.find(cell), mine);
+          sum.add(uniform ? mine.integrate<true>() : mine.integrate<false>());
+        }
+        moments.cells[cell] = sum.finish();
+        moments.step_mass[cell] = -1;
+      },
+      kCellsAtOnce);
+  Csr<Index>& triangles = moments.triangles;
+  std::vector<Index> values;
+  std::vector<std::size_t> offsets{0};
+  for (Index cell = 0; cell < moments.cells.size(); ++cell) {
+    if (const Triangles* changed = cell_triangles.find(cell))
+      values.insert(values.end(), changed->begin(), changed->end());
+    else values.insert(values.end(), triangles.begin(cell), triangles.end(cell));
+    offsets.push_back(values.size());
+  }
+  triangles.values = std::move(values);
+  triangles.offsets = std::move(offsets);
+  complete_step_masses(
+      seeds, [&]() -> const Neighbours& { return neighbours; }, moments);
+  moments.mass = fixed_sum(moments.cells.size(), [&](std::size_t i) { return moments.cells[i].mass; });
+  moments.energy = fixed_sum(moments.cells.size(), [&](std::size_t i) { return moments.cells[i].second; });
+}
+
+std::size_t Localiser::Work::run(const std::vector<Vec3>& given, Diagram& diagram) {
+  raw = &diagram.polygons;
+  first = first_polygons(*raw, surface.mesh.triangles.size());
+  of_cell = group_into_rows<std::size_t>(given.size(), [&](const auto& put) {
+    for (std::size_t p = 0; p < raw->pairs.size(); ++p) put(raw->pairs[p].cell, p);
+  });
+  seeds = sort_seeds(given);
+  clippers.clear();
+  clipped.reset(surface.mesh.triangles.size());
+  cell_triangles.reset(given.size());
+  strays.clear();
+  left_out.clear();
+  back.clear();
+  std::vector<Index> cells(given.size());
+  std::iota(cells.begin(), cells.end(), Index{0});
+  find_strays(cells);
+  const std::size_t count = strays.size();
+  if (count == 0) return 0;
+  neighbours.build_on_demand(seeds, kReach * std::sqrt(surface.area / static_cast<double>(seeds.x.size())));
+  for (int round = 0; round < kRounds; ++round) {
+    const Triangles triangles = leave_out();
+    if (triangles.empty()) break;
+    find_strays(clip_anew(triangles));
+  }
+  for (Triangles torn = put_back_torn(); !torn.empty(); torn = put_back_torn()) clip_anew(torn);
+  if (clipped.items.empty()) return 0;
+  sum(diagram);
+  diagram.polygons = splice();
+  if (includes(diagram.has, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
+  return count;
+}
+
+Localiser::Localiser(const Surface& surface) : work_(std::make_unique<Work>(surface)) {}
+Localiser::~Localiser() = default;
+
+std::size_t Localiser::localise(const std::vector<Vec3>& seeds, Diagram& diagram) { return work_->run(seeds, diagram); }
 
 }  // namespace bisector

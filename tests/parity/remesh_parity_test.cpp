@@ -200,7 +200,10 @@ TEST_P(RemeshRuns, AreTheCpus) {
   }
   SCOPED_TRACE("the backend's own seeds");
   Diagram diagram = expect_same_diagram_of(problem, setup, *backend, found.mesh.vertices);
-  localise_cells(problem.surface, found.mesh.vertices, diagram.polygons);
+  Localiser localiser(problem.surface);
+  Diagram on_cpu = diagram_of(cpu, found.mesh.vertices);
+  EXPECT_EQ(localiser.localise(found.mesh.vertices, on_cpu), localiser.localise(found.mesh.vertices, diagram));
+  EXPECT_EQ(on_cpu.polygons.labels, diagram.polygons.labels);
   const TriangleMesh dual = dual_mesh(found.mesh.vertices, extract_dual(diagram.polygons));
   EXPECT_TRUE(dual.triangles == found.mesh.triangles) << "not the dual of its vertices";
 }

@@ -1,47 +1,40 @@
-// Cells without their stray parts: labels stay those of a division of every facet, and the dual follows the surface.
+// Cells without their stray parts tile the surface as before, and on sheets apart they are those of each sheet alone.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
 #include <vector>
 
 #include "backend/cpu_backend.h"
+#include "core/parallel.h"
 #include "support/diagram.h"
 #include "support/featured.h"
 #include "support/run.h"
 #include "voronoi/ball_property.h"
 #include "voronoi/localise.h"
+#include "voronoi/polygons.h"
+#include "voronoi/tiling.h"
 
 namespace bisector::test {
 namespace {
 
-// On every triangle a cell has one polygon, no label twice and none of its own; cells that are labels of each
-// other are so from both sides.
-void expect_division(const RestrictedPolygons& polygons) {
-  std::map<Index, std::map<Index, std::set<Index>>> labels;  // by triangle and cell
-  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
-    const auto [triangle, cell] = polygons.pairs[k];
-    if (k > 0) {
-      const RestrictedPolygons::Pair& last = polygons.pairs[k - 1];
-      ASSERT_TRUE(last.triangle < triangle || (last.triangle == triangle && last.cell < cell));
-    }
-    const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
-    ASSERT_GE(size, 2u);
-    std::set<Index> own{cell};
-    for (std::size_t e = 0; e < size; ++e) {
-      const Index label = polygons.labels[first + e];
-      EXPECT_TRUE(own.insert(label).second);
-      if (!is_edge(label)) labels[triangle][cell].insert(label);
-    }
+// Polygons tile the surface, and the moments are theirs.
+void expect_diagram(const Surface& surface, const Diagram& diagram) {
+  EXPECT_EQ(count_untiled(surface, diagram.polygons), 0u);
+  EXPECT_NEAR(diagram.moments.mass, surface.mass, 1e-12 * surface.mass);
+  std::vector<double> areas(diagram.moments.cells.size(), 0);
+  std::vector<std::vector<Index>> triangles(areas.size());
+  for (std::size_t p = 0; p < diagram.polygons.pairs.size(); ++p) {
+    const auto [triangle, cell] = diagram.polygons.pairs[p];
+    areas[cell] += polygon_area(diagram.polygons, p);
+    triangles[cell].push_back(triangle);
   }
-  for (const auto& [triangle, cells] : labels)
-    for (const auto& [cell, others] : cells)
-      for (const Index other : others) {
-        ASSERT_TRUE(cells.contains(other));
-        EXPECT_TRUE(cells.at(other).contains(cell));
-      }
+  const Csr<Index>& listed = diagram.moments.triangles;
+  ASSERT_EQ(listed.rows(), areas.size());
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    EXPECT_NEAR(diagram.moments.cells[i].mass, areas[i], 1e-12 * surface.mass);
+    EXPECT_EQ(triangles[i], std::vector<Index>(listed.begin(i), listed.end(i)));
+  }
 }
 
 std::vector<Vec3> optimised_plate_seeds(const Surface& surface, std::uint64_t random_seed) {
@@ -56,32 +49,92 @@ TEST(LocalisedCells, AreTheCellsWhereTheseAreDisks) {
   const Surface surface(sphere);
   const std::vector<Vec3> seeds = random_seeds(sphere, 200, 3);
   const Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
-  RestrictedPolygons localised = diagram.polygons;
-  EXPECT_EQ(localise_cells(surface, seeds, localised), 0u);
-  EXPECT_EQ(localised.labels, diagram.polygons.labels);
-  EXPECT_TRUE(same_bits(localised.vertices, diagram.polygons.vertices));
+  Diagram localised = diagram;
+  EXPECT_EQ(Localiser(surface).localise(seeds, localised), 0u);
+  EXPECT_EQ(localised.polygons.labels, diagram.polygons.labels);
+  EXPECT_TRUE(same_bits(localised.polygons.vertices, diagram.polygons.vertices));
+  EXPECT_TRUE(same_bits(localised.moments.cells, diagram.moments.cells));
+}
+
+// Two sheets that are not joined: on each the diagram is that of the seeds on it alone.
+TEST(LocalisedCells, OfTwoSheetsAreThoseOfEachSheetAlone) {
+  for (const double distance : {0.2, 0.05, 0.01}) {
+    const TriangleMesh lower = grid_patch(9, 9);
+    TriangleMesh upper = lower;
+    for (Vec3& v : upper.vertices) v.z += 9 * distance;
+    TriangleMesh both = lower;
+    both.vertices.insert(both.vertices.end(), upper.vertices.begin(), upper.vertices.end());
+    const auto first = static_cast<Index>(lower.vertices.size());
+    for (const Triangle& t : upper.triangles) both.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    const std::vector<Vec3> below = random_seeds(lower, 40, 5), above = random_seeds(upper, 60, 6);
+    std::vector<Vec3> seeds = below;
+    seeds.insert(seeds.end(), above.begin(), above.end());
+
+    const Surface surface(both), surface_below(lower), surface_above(upper);
+    Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+    EXPECT_GT(Localiser(surface).localise(seeds, diagram), 0u);
+    expect_diagram(surface, diagram);
+    const Diagram parts[2] = {diagram_of(surface_below, below, NeighbourSource::nearest),
+                              diagram_of(surface_above, above, NeighbourSource::nearest)};
+    RestrictedPolygons expected = parts[0].polygons;
+    for (std::size_t p = 0; p < parts[1].polygons.pairs.size(); ++p) {
+      const auto [triangle, cell] = parts[1].polygons.pairs[p];
+      expected.pairs.push_back({triangle + static_cast<Index>(lower.triangles.size()), cell + 40});
+      for (std::size_t e = parts[1].polygons.offsets[p]; e < parts[1].polygons.offsets[p + 1]; ++e) {
+        const Index label = parts[1].polygons.labels[e];
+        expected.labels.push_back(is_edge(label) ? label : label + 40);
+      }
+      expected.offsets.push_back(expected.labels.size());
+    }
+    ASSERT_EQ(diagram.polygons.pairs.size(), expected.pairs.size());
+    for (std::size_t p = 0; p < expected.pairs.size(); ++p) {
+      EXPECT_EQ(diagram.polygons.pairs[p].triangle, expected.pairs[p].triangle);
+      EXPECT_EQ(diagram.polygons.pairs[p].cell, expected.pairs[p].cell);
+    }
+    EXPECT_EQ(diagram.polygons.labels, expected.labels);
+    EXPECT_NEAR(diagram.moments.energy, parts[0].moments.energy + parts[1].moments.energy,
+                1e-12 * diagram.moments.energy);
+  }
+}
+
+// A sheet without a seed of its own keeps the cells of the sheet across.
+TEST(LocalisedCells, OfASheetWithoutSeedStay) {
+  TriangleMesh mesh = grid_patch(5, 5);
+  const auto first = static_cast<Index>(mesh.vertices.size());
+  const std::size_t triangles = mesh.triangles.size();
+  const std::vector<Vec3> seeds = random_seeds(mesh, 20, 5);
+  for (Index v = 0; v < first; ++v) mesh.vertices.push_back(mesh.vertices[v] + Vec3{0, 0, 0.1});
+  for (std::size_t t = 0; t < triangles; ++t) {
+    const Triangle v = mesh.triangles[t];
+    mesh.triangles.push_back({v[0] + first, v[1] + first, v[2] + first});
+  }
+  const Surface surface(mesh);
+  const Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+  Diagram localised = diagram;
+  Localiser(surface).localise(seeds, localised);
+  EXPECT_EQ(localised.polygons.labels, diagram.polygons.labels);
 }
 
 // Seeds on both sides of a plate own pieces of the other side, wherever the two sides are not sampled alike.
 TEST(LocalisedCells, OfAPlateAreDisksOnOneSide) {
-  std::size_t moved = 0;
   for (const double thickness : {0.05, 0.02}) {
     TriangleMesh plate = box(16);
     for (Vec3& v : plate.vertices) v.z *= thickness;
     const Surface surface(plate);
+    Localiser localiser(surface);
     for (std::uint64_t random_seed = 1; random_seed < 6; ++random_seed) {
       const std::vector<Vec3> seeds = optimised_plate_seeds(surface, random_seed);
       Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
       const BallReport before = check_ball_property(surface, diagram.polygons);
       EXPECT_FALSE(before.holds);
-      moved += localise_cells(surface, seeds, diagram.polygons);
-      expect_division(diagram.polygons);
+      EXPECT_GT(localiser.localise(seeds, diagram), 0u);
+      expect_diagram(surface, diagram);
       const BallReport after = check_ball_property(surface, diagram.polygons);
+      for (const BallReport::Cell& cell : after.cells) EXPECT_EQ(cell.components, 1u);
       EXPECT_LT(8 * after.failures(), before.failures());
       EXPECT_EQ(after.euler, 2);
     }
   }
-  EXPECT_GT(moved, 100u);
 }
 
 // The dual of a wedge's raw cells has caves and bubbles along the edge; that of the localised ones is its surface.
@@ -92,12 +145,26 @@ TEST(LocalisedCells, OfAWedgeHaveItsSurfaceAsDual) {
     const std::vector<Vec3> seeds = random_seeds(mesh, 400, 11);
     Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
     const std::size_t before = check_ball_property(surface, diagram.polygons).failures();
-    localise_cells(surface, seeds, diagram.polygons);
-    expect_division(diagram.polygons);
+    Localiser(surface).localise(seeds, diagram);
+    expect_diagram(surface, diagram);
     const BallReport after = check_ball_property(surface, diagram.polygons);
     EXPECT_LT(2 * after.failures(), before);
     EXPECT_EQ(after.euler, 2);
   }
+}
+
+TEST(LocalisedCells, AreTheSameWithAnyNumberOfThreads) {
+  const TriangleMesh mesh = wedge(0.35);
+  const Surface surface(mesh);
+  const std::vector<Vec3> seeds = random_seeds(mesh, 400, 11);
+  const Diagram raw = diagram_of(surface, seeds, NeighbourSource::nearest);
+  Diagram all = raw, one = raw;
+  Localiser(surface).localise(seeds, all);
+  const ThreadLimit limit(1);
+  Localiser(surface).localise(seeds, one);
+  EXPECT_EQ(all.polygons.labels, one.polygons.labels);
+  EXPECT_TRUE(same_bits(all.moments.cells, one.moments.cells));
+  EXPECT_TRUE(same_bits(all.moments.step_mass, one.moments.step_mass));
 }
 
 }  // namespace
