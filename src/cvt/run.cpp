@@ -17,8 +17,9 @@ void add_dual(Diagram& diagram) {
 }  // namespace
 
 void CvtRun::localise(bool on) {
-  if (localises() == on) return;
-  localiser_ = on ? std::make_unique<Localiser>(surface()) : nullptr;
+  if (localised_ == on) return;
+  localised_ = on;
+  if (on && !localiser_) localiser_ = std::make_unique<Localiser>(surface());
   if (on || diagram_.strays > 0) diagram_ = {};
 }
 
@@ -31,13 +32,13 @@ void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSe
   // The dual is read off here, when stray parts are gone, and not by the backend.
   const bool wants_dual = includes(want, Want::dual);
   Want computed = want & (Want::polygons | Want::polyhedra);
-  if (wants_dual || localiser_) computed = computed | Want::polygons;
+  if (wants_dual || localised_) computed = computed | Want::polygons;
   if (known.positions != positions || !includes(known.diagram.has, computed)) {
     known.positions.clear();
     known.report = backend_->evaluate(positions, computed, known.diagram);
     known.positions = positions;
     const Stopwatch watch;
-    known.strays = localiser_ ? localiser_->localise(positions, known.diagram) : 0;
+    known.strays = localised_ ? localiser_->localise(positions, known.diagram) : 0;
     known.report.seconds.clip += watch.seconds();
     ++totals.evaluations;
     totals.seconds += known.report.seconds;

@@ -53,7 +53,7 @@ class CvtRun {
   const Diagram& diagram(Want want = Want::moments);
   // Whether diagrams are those of cells without stray parts (voronoi/localise.h).
   void localise(bool on);
-  bool localises() const { return localiser_ != nullptr; }
+  bool localises() const { return localised_; }
   // How many cells had such parts, with the seeds as they are.
   std::size_t strays();
   // How the last diagram of the run's seeds was certified.
@@ -77,7 +77,8 @@ class CvtRun {
   const FeatureCurves& curves_;
   const Context& context_;
   DiagramOfSeeds diagram_;
-  std::unique_ptr<Localiser> localiser_;  // if diagrams are localised
+  bool localised_ = false;
+  std::unique_ptr<Localiser> localiser_;  // of the surface, once there was need of it
   // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.
   std::vector<Vec3> normals_;
 };

@@ -24,6 +24,8 @@ namespace {
 constexpr int kRounds = 16;  // pieces across a wall come to light one behind the other
 // A seed's list of neighbours reaches this far at first, in mean distances of seeds.
 constexpr double kReach = 2;
+// Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
+constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
 
 using Triangles = std::vector<Index>;  // ascending
@@ -114,7 +116,7 @@ struct Localiser::Work {
   Clipper& clipper();
   void take(const Row& on, std::size_t polygon, Clipper& clipper) const;
   double squared_distance(Index triangle, Index cell, Clipper& clipper) const;
-  std::size_t nearest_to_seed(Index cell, const Triangles& triangles);
+  std::vector<std::size_t> nearest_to_seed(Index cell, const Triangles& triangles);
   std::vector<Triangles> find_strays(Index cell);
   void find_strays(const std::vector<Index>& cells);
   bool is_own(Index triangle, Index cell) const;
@@ -199,28 +201,31 @@ double Localiser::Work::squared_distance(Index triangle, Index cell, Clipper& cl
   return least;
 }
 
-// Which of a cell's triangles holds the polygon nearest to its seed. A polygon is no nearer than its triangle.
-std::size_t Localiser::Work::nearest_to_seed(Index cell, const Triangles& triangles) {
+// Which of a cell's triangles hold the polygons nearest to its seed; several where it is on all of them. A polygon is
+// no nearer than its triangle.
+std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, const Triangles& triangles) {
   const Vec3& seed = seeds.x[seeds.slot[cell]];
+  const double same = kSamePoint * seeds.extent;
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const auto& corners = surface.facets[surface.facet_of[triangles[i]]].corners;
-    order.push_back({norm2(nearest_on_triangle(seed, corners[0], corners[1], corners[2]) - seed), i});
+    order.push_back({norm(nearest_on_triangle(seed, corners[0], corners[1], corners[2]) - seed), i});
   }
   std::sort(order.begin(), order.end());
-  std::size_t best = order[0].second;
+  std::vector<std::pair<double, std::size_t>> tried;
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [bound, i] : order) {
-    if (bound > least) break;
-    if (const double squared = squared_distance(triangles[i], cell, clipper()); squared < least) {
-      least = squared;
-      best = i;
-    }
+    if (bound > least + same) break;
+    tried.push_back({std::sqrt(squared_distance(triangles[i], cell, clipper())), i});
+    least = std::min(least, tried.back().first);
   }
-  return best;
+  std::vector<std::size_t> nearest;
+  for (const auto& [distance, i] : tried)
+    if (distance <= least + same) nearest.push_back(i);
+  return nearest;
 }
 
-// The components of a cell but for that nearest to its seed.
+// The components of a cell but for that nearest to its seed, or those that it is on.
 std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
   const bool changed = cell_triangles.find(cell) != nullptr;
   const std::size_t count = changed ? cell_triangles.find(cell)->size() : of_cell.size(cell);
@@ -243,7 +248,9 @@ std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
     }
   }
   if (components == 1) return {};
-  const std::size_t own = parts.root(nearest_to_seed(cell, triangles));
+  const std::vector<std::size_t> nearest = nearest_to_seed(cell, triangles);
+  for (const std::size_t i : nearest) parts.join(i, nearest[0]);
+  const std::size_t own = parts.root(nearest[0]);
   std::vector<std::size_t> piece_of(count, count);
   std::vector<Triangles> pieces;
   for (std::size_t i = 0; i < count; ++i) {
