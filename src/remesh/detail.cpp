@@ -15,7 +15,9 @@
 #include "core/parallel.h"
 #include "features/curve_network.h"
 #include "features/curves.h"
+#include "features/disk_radius.h"
 #include "features/simplify.h"
+#include "mesh/sampling.h"
 
 namespace bisector {
 namespace {
@@ -30,6 +32,10 @@ constexpr double kPerGap = 1.15, kPerLoop = 0.25;
 constexpr double kFinest = 1.0 / 16, kCoarsest = 4;
 // Where curves run beside each other for a short while only, edges may be shorter than the width by this.
 constexpr double kBelowWidth = 0.5;
+// Edge lengths, in radii up to which the surface is a disk: five or six edges run around a limb then.
+constexpr double kPerDisk = 0.55;
+// Points where that is looked at, for each vertex wanted of so many.
+constexpr double kLimbSamples = 6, kMostLimbVertices = 50'000;
 constexpr int kBisections = 7;
 constexpr std::size_t kMostPoints = 100'000;  // of the curves
 // Triangles are divided until they are no longer than so many edges, for integrals.
@@ -48,6 +54,7 @@ class Planner {
     double sum = 0;
     for (const double h : edge_length) sum += h;
     mean_ = sum / static_cast<double>(edge_length.size());
+    find_limbs();
   }
 
   struct Trial {
@@ -89,6 +96,22 @@ class Planner {
   }
 
  private:
+  // Where the surface is no disk as far as the edges around a vertex reach, edges are to be shorter.
+  void find_limbs() {
+    const std::vector<SurfaceSample> samples =
+        sample_surface(mesh_, static_cast<std::size_t>(kLimbSamples * std::min(vertices_, kMostLimbVertices)), 1);
+    std::vector<double> plain, radii;
+    for (const SurfaceSample& sample : samples) {
+      double h = 0;
+      for (const Index v : mesh_.triangles[sample.triangle]) h += edge_length_[v] / 3;
+      plain.push_back(h);
+      radii.push_back(h / kPerDisk);
+    }
+    const std::vector<double> disks = disk_radii(mesh_, samples, radii, kFinest);
+    for (std::size_t k = 0; k < samples.size(); ++k)
+      if (disks[k] < radii[k]) limbs_.push_back({samples[k].point, kPerDisk * disks[k], plain[k]});
+  }
+
   // The edge length without details, at the nearest vertex of a curve.
   double length_at(const FeatureCurves& curves, Index curve, double position) const {
     return edge_length_[curves.graph().curves[curve].vertices[curves.segment_at(curve, position)]];
@@ -118,6 +141,12 @@ class Planner {
       const double length = std::max(std::min(bound[p], kPerGap * gaps[p]), kBelowWidth * t.width);
       if (length >= plain[p]) continue;
       t.points.push_back(network.points()[p]);
+      t.lengths.push_back(length);
+    }
+    for (const Limb& limb : limbs_) {
+      const double length = std::max(limb.length, kBelowWidth * t.width);
+      if (length >= coarsening * limb.plain) continue;
+      t.points.push_back(limb.point);
       t.lengths.push_back(length);
     }
   }
@@ -157,6 +186,11 @@ class Planner {
     sum += 2 / std::sqrt(3.0) * triangle_area(p[0], p[1], p[2]) / (h * h);
   }
 
+  struct Limb {
+    Vec3 point;
+    double length, plain;  // of edges there: what it takes, and what they are without details
+  };
+
   const TriangleMesh& mesh_;
   const FeatureGraph& features_;
   const std::vector<double>& edge_length_;
@@ -164,6 +198,7 @@ class Planner {
   double mean_ = 0;
   std::vector<double> weights_;
   std::vector<std::array<Index, 2>> links_;
+  std::vector<Limb> limbs_;
 };
 
 }  // namespace

@@ -109,7 +109,7 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
   sizing_.sharp = features_.edges;
   // Where sheets meet in one edge, curves cannot be led elsewhere.
   const bool manifold = analyse_topology(mesh_.triangles, mesh_.vertices.size()).manifold;
-  if (given_seeds_ == 0 && options.detail != DetailMode::off && !features_.curves.empty() && manifold) plan(options);
+  if (given_seeds_ == 0 && options.detail != DetailMode::off && manifold) plan(options);
 }
 
 // What noise folds is no feature.

@@ -39,7 +39,7 @@ constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.2;
 constexpr int kMendingRounds = 3;  // of features and topology
 // Runs that start again with edges shorter by this where cells were no disks; not if more than one cell in so many was.
-constexpr int kAttempts = 2;
+constexpr int kAttempts = 1;
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
 constexpr int kFreedSteps = 20;

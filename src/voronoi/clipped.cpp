@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
+#include "core/marks.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "voronoi/clip_tet.h"
 #include "voronoi/fixed_tree_sum.h"
-#include "voronoi/marks.h"
 #include "voronoi/polyhedra.h"
 #include "voronoi/step_mass.h"
 

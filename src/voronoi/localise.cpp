@@ -21,7 +21,10 @@
 namespace bisector {
 namespace {
 
-constexpr int kRounds = 16;  // pieces across a wall come to light one behind the other
+// Pieces across a wall come to light one behind the other. Where sheets cross there is no end to it, and it is given up
+// after so many rounds, or when each triangle has been divided so often on average.
+constexpr int kRounds = 16;
+constexpr std::size_t kDivisions = 4;
 // A seed's list of neighbours reaches this far at first, in mean distances of seeds.
 constexpr double kReach = 2;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
@@ -514,9 +517,11 @@ std::size_t Localiser::Work::run(const std::vector<Vec3>& given, Diagram& diagra
   const std::size_t count = strays.size();
   if (count == 0) return 0;
   neighbours.build_on_demand(seeds, kReach * std::sqrt(surface.area / static_cast<double>(seeds.x.size())));
-  for (int round = 0; round < kRounds; ++round) {
+  std::size_t divided = 0;
+  for (int round = 0; round < kRounds && divided < kDivisions * surface.facets.size(); ++round) {
     const Triangles triangles = leave_out();
     if (triangles.empty()) break;
+    divided += triangles.size();
     find_strays(clip_anew(triangles));
   }
   for (Triangles torn = put_back_torn(); !torn.empty(); torn = put_back_torn()) clip_anew(torn);

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
+#include "core/marks.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "voronoi/clip.h"
 #include "voronoi/fixed_tree_sum.h"
-#include "voronoi/marks.h"
 #include "voronoi/owner.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"

@@ -1,0 +1,83 @@
+#include "features/disk_radius.h"
+
+#include <cmath>
+
+#include "core/marks.h"
+#include "core/parallel.h"
+#include "mesh/topology.h"
+
+namespace bisector {
+namespace {
+
+constexpr double kStep = 0.8;
+constexpr std::size_t kPointsAtOnce = 16;  // of a parallel loop
+
+class Balls {
+ public:
+  explicit Balls(const TriangleMesh& mesh) : mesh_(mesh), twin_(3 * mesh.triangles.size(), kNone) {
+    const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
+    on_border_.assign(mesh.vertices.size(), 0);
+    for (std::size_t e = 0; e < table.edges.size(); ++e) {
+      const std::size_t* h = table.half_edges.begin(e);
+      if (table.half_edges.size(e) == 2) {
+        twin_[h[0]] = static_cast<Index>(h[1]);
+        twin_[h[1]] = static_cast<Index>(h[0]);
+      } else {
+        for (const Index v : table.edges[e]) on_border_[v] = 1;
+      }
+    }
+  }
+
+  struct Visit {
+    Marks triangles, vertices;
+    std::vector<Index> queue;
+  };
+
+  // Triangles, edges and vertices are convex, and so are their parts in the ball: the triangles' less those of the
+  // edges between them plus the vertices' is the Euler characteristic (inclusion and exclusion).
+  bool is_disk(const SurfaceSample& centre, double radius, Visit& visit) const {
+    const double squared = radius * radius;
+    visit.triangles.begin(mesh_.triangles.size());
+    visit.vertices.begin(mesh_.vertices.size());
+    visit.queue.assign(1, centre.triangle);
+    visit.triangles.mark(centre.triangle);
+    long long half_edges = 0, vertices = 0;
+    for (std::size_t i = 0; i < visit.queue.size(); ++i) {
+      const Index t = visit.queue[i];
+      for (Index k = 0; k < 3; ++k) {
+        const Index v = mesh_.triangles[t][k], w = mesh_.triangles[t][(k + 1) % 3];
+        const Vec3 &a = mesh_.vertices[v], &b = mesh_.vertices[w];
+        if (!on_border_[v] && norm2(a - centre.point) <= squared && visit.vertices.mark(v)) ++vertices;
+        const Index twin = twin_[3 * t + k];
+        if (twin == kNone || norm2(nearest_on_segment(centre.point, a, b) - centre.point) > squared) continue;
+        ++half_edges;
+        if (visit.triangles.mark(twin / 3)) visit.queue.push_back(twin / 3);
+      }
+    }
+    return static_cast<long long>(visit.queue.size()) - half_edges / 2 + vertices == 1;
+  }
+
+ private:
+  const TriangleMesh& mesh_;
+  std::vector<Index> twin_;  // of each half-edge; kNone on the border
+  std::vector<char> on_border_;
+};
+
+}  // namespace
+
+std::vector<double> disk_radii(const TriangleMesh& mesh, const std::vector<SurfaceSample>& points,
+                               const std::vector<double>& radii, double least) {
+  const Balls balls(mesh);
+  ThreadLocal<Balls::Visit> visits;
+  std::vector<double> found(radii);
+  parallel_each(
+      points.size(),
+      [&](std::size_t k) {
+        Balls::Visit& visit = visits.local();
+        while (found[k] * kStep >= least * radii[k] && !balls.is_disk(points[k], found[k], visit)) found[k] *= kStep;
+      },
+      kPointsAtOnce);
+  return found;
+}
+
+}  // namespace bisector
