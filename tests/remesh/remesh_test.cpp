@@ -131,6 +131,22 @@ TEST(RemeshThin, APlateKeepsItsTwoSides) {
   }
 }
 
+// A hollow ball whose wall is a tenth of the edges: each side is meshed as if the other were not there.
+TEST(RemeshThin, AShellHasGoodTrianglesOnBothSides) {
+  TriangleMesh shell = icosphere(3);
+  TriangleMesh inside = shell;
+  for (Vec3& v : inside.vertices) v = 0.98 * v;
+  const auto first = static_cast<Index>(shell.vertices.size());
+  shell.vertices.insert(shell.vertices.end(), inside.vertices.begin(), inside.vertices.end());
+  for (const Triangle& t : inside.triangles) shell.triangles.push_back({t[0] + first, t[2] + first, t[1] + first});
+  const RemeshResult result = remesh(shell, options_for(400));
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_TRUE(result.ball_property);
+  EXPECT_EQ(result.untiled, 0u);
+  EXPECT_GT(measure_quality(result.mesh).theta_min, 35);
+  for (const Vec3& p : result.mesh.vertices) EXPECT_TRUE(norm(p) > 0.99 || norm(p) < 0.981) << norm(p);
+}
+
 // Whatever the dual is, it is reported for what it is.
 TEST(RemeshHard, NonManifoldInputRunsAndReports) {
   const std::vector<Case> hard{{"pages", pages(), 300, false},
