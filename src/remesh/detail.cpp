@@ -32,8 +32,9 @@ constexpr double kPerGap = 1.15, kPerLoop = 0.25;
 constexpr double kFinest = 1.0 / 16, kCoarsest = 4;
 // Where curves run beside each other for a short while only, edges may be shorter than the width by this.
 constexpr double kBelowWidth = 0.5;
-// Edge lengths, in radii up to which the surface is a disk: five or six edges run around a limb then.
-constexpr double kPerDisk = 0.55;
+// Cells are disks if the surface is one in balls of about this radius, in edge lengths: twice what reaches a hexagon's
+// corners. Where it is not, edges are so long in radii up to which it is: five or six run around a limb then.
+constexpr double kDiskReach = 1.15, kPerDisk = 0.6;
 // Points where that is looked at, for each vertex wanted of so many.
 constexpr double kLimbSamples = 6, kMostLimbVertices = 50'000;
 constexpr int kBisections = 7;
@@ -105,7 +106,7 @@ class Planner {
       double h = 0;
       for (const Index v : mesh_.triangles[sample.triangle]) h += edge_length_[v] / 3;
       plain.push_back(h);
-      radii.push_back(h / kPerDisk);
+      radii.push_back(kDiskReach * h);
     }
     const std::vector<double> disks = disk_radii(mesh_, samples, radii, kFinest);
     for (std::size_t k = 0; k < samples.size(); ++k)

@@ -107,9 +107,9 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
     sizing_.attribute = std::move(values);
   }
   sizing_.sharp = features_.edges;
-  // Where sheets meet in one edge, curves cannot be led elsewhere.
+  // Where sheets meet in one edge, curves cannot be led elsewhere; the folds of noise are no details.
   const bool manifold = analyse_topology(mesh_.triangles, mesh_.vertices.size()).manifold;
-  if (given_seeds_ == 0 && options.detail != DetailMode::off && manifold) plan(options);
+  if (given_seeds_ == 0 && options.detail != DetailMode::off && manifold && !noisy_) plan(options);
 }
 
 // What noise folds is no feature.
