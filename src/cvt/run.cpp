@@ -19,13 +19,31 @@ void add_dual(Diagram& diagram) {
 void CvtRun::localise(bool on) {
   if (localised_ == on) return;
   localised_ = on;
-  if (on && !localiser_) localiser_ = std::make_unique<Localiser>(surface());
-  if (on || diagram_.strays > 0) diagram_ = {};
+  if (!on) {
+    if (diagram_.strays > 0) diagram_ = {};
+  } else if (includes(diagram_.diagram.has, Want::polygons)) {
+    leave_out_strays(diagram_);
+  } else {
+    diagram_ = {};
+  }
+}
+
+Localiser& CvtRun::localiser() {
+  if (!localiser_) localiser_ = std::make_unique<Localiser>(surface());
+  return *localiser_;
+}
+
+void CvtRun::leave_out_strays(DiagramOfSeeds& known) {
+  const Stopwatch watch;
+  known.strays = localiser().localise(known.positions, known.diagram);
+  if (known.strays > 0 && includes(known.diagram.has, Want::dual)) add_dual(known.diagram);
+  known.report.seconds.clip += watch.seconds();
+  totals.seconds.clip += watch.seconds();
 }
 
 std::size_t CvtRun::strays() {
-  diagram();
-  return diagram_.strays;
+  const Diagram& now = diagram(Want::polygons);
+  return localised_ ? diagram_.strays : localiser().count_strays(diagram_.positions, now);
 }
 
 void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& known) {
@@ -37,11 +55,10 @@ void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSe
     known.positions.clear();
     known.report = backend_->evaluate(positions, computed, known.diagram);
     known.positions = positions;
-    const Stopwatch watch;
-    known.strays = localised_ ? localiser_->localise(positions, known.diagram) : 0;
-    known.report.seconds.clip += watch.seconds();
+    known.strays = 0;
     ++totals.evaluations;
     totals.seconds += known.report.seconds;
+    if (localised_) leave_out_strays(known);
   }
   if (wants_dual && !includes(known.diagram.has, Want::dual)) add_dual(known.diagram);
 }
@@ -70,7 +87,7 @@ void CvtRun::change_backend(Backend& backend) {
   if (&backend == backend_) return;
   diagram_ = {};
   backend_ = &backend;
-  if (localiser_) localiser_ = std::make_unique<Localiser>(surface());
+  localiser_.reset();
 }
 
 }  // namespace bisector

@@ -54,7 +54,7 @@ class CvtRun {
   // Whether diagrams are those of cells without stray parts (voronoi/localise.h).
   void localise(bool on);
   bool localises() const { return localised_; }
-  // How many cells had such parts, with the seeds as they are.
+  // How many cells have such parts, or had them where they are left out, with the seeds as they are.
   std::size_t strays();
   // How the last diagram of the run's seeds was certified.
   const Certification& certification() const { return diagram_.report.certification; }
@@ -76,6 +76,9 @@ class CvtRun {
   Backend* backend_;
   const FeatureCurves& curves_;
   const Context& context_;
+  Localiser& localiser();
+  void leave_out_strays(DiagramOfSeeds& known);
+
   DiagramOfSeeds diagram_;
   bool localised_ = false;
   std::unique_ptr<Localiser> localiser_;  // of the surface, once there was need of it

@@ -10,6 +10,8 @@ namespace bisector {
 namespace {
 
 constexpr double kStep = 0.8;
+// A ball that a corner or bump juts out of makes a hole in the surface, which is gone in a ball so much wider.
+constexpr double kBump = 1.5;
 constexpr std::size_t kPointsAtOnce = 16;  // of a parallel loop
 
 class Balls {
@@ -74,7 +76,10 @@ std::vector<double> disk_radii(const TriangleMesh& mesh, const std::vector<Surfa
       points.size(),
       [&](std::size_t k) {
         Balls::Visit& visit = visits.local();
-        while (found[k] * kStep >= least * radii[k] && !balls.is_disk(points[k], found[k], visit)) found[k] *= kStep;
+        const auto fits = [&](double radius) {
+          return balls.is_disk(points[k], radius, visit) || balls.is_disk(points[k], kBump * radius, visit);
+        };
+        while (found[k] * kStep >= least * radii[k] && !fits(found[k])) found[k] *= kStep;
       },
       kPointsAtOnce);
   return found;

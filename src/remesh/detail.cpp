@@ -35,8 +35,6 @@ constexpr double kBelowWidth = 0.5;
 // Cells are disks if the surface is one in balls of about this radius, in edge lengths: twice what reaches a hexagon's
 // corners. Where it is not, edges are so long in radii up to which it is: five or six run around a limb then.
 constexpr double kDiskReach = 1.15, kPerDisk = 0.6;
-// A corner of features that juts out of such a ball makes a hole as well. So many radii around it are left to curves.
-constexpr double kCornerReach = 2;
 // Points where that is looked at, for each vertex wanted of so many.
 constexpr double kLimbSamples = 6, kMostLimbVertices = 50'000;
 constexpr int kBisections = 7;
@@ -99,11 +97,6 @@ class Planner {
   }
 
  private:
-  bool is_near_corner(const Vec3& p, double reach) const {
-    return std::any_of(features_.corners.begin(), features_.corners.end(),
-                       [&](Index v) { return norm2(mesh_.vertices[v] - p) < reach * reach; });
-  }
-
   // Where the surface is no disk as far as the edges around a vertex reach, edges are to be shorter.
   void find_limbs() {
     const std::vector<SurfaceSample> samples =
@@ -117,8 +110,7 @@ class Planner {
     }
     const std::vector<double> disks = disk_radii(mesh_, samples, radii, kFinest);
     for (std::size_t k = 0; k < samples.size(); ++k)
-      if (disks[k] < radii[k] && !is_near_corner(samples[k].point, kCornerReach * radii[k]))
-        limbs_.push_back({samples[k].point, kPerDisk * disks[k], plain[k]});
+      if (disks[k] < radii[k]) limbs_.push_back({samples[k].point, kPerDisk * disks[k], plain[k]});
   }
 
   // The edge length without details, at the nearest vertex of a curve.

@@ -140,10 +140,11 @@ void Preparation::bound(const std::vector<Vec3>& points, const std::vector<doubl
   bounded_lengths_.insert(bounded_lengths_.end(), lengths.begin(), lengths.end());
 }
 
-PreparedInput Preparation::lay_down() const {
+PreparedInput Preparation::lay_down() {
   std::optional<SizeField> field;
   if (!bounded_points_.empty()) field.emplace(bounded_points_, bounded_lengths_, kDetailGradation);
-  SizedMesh sized = unbounded_ ? *unbounded_ : refine_for_density(mesh_, sizing_, target_, field ? &*field : nullptr);
+  SizedMesh sized = unbounded_ ? *std::exchange(unbounded_, std::nullopt)
+                               : refine_for_density(mesh_, sizing_, target_, field ? &*field : nullptr);
   if (sized.sizing.vertices > kMostVertices && given_seeds_ == 0)
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
                             target_.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));

@@ -32,7 +32,7 @@ class Preparation {
   // Edges at these points must not be longer than these lengths.
   void bound(const std::vector<Vec3>& points, const std::vector<double>& lengths);
   // The domain with its density as it stands.
-  PreparedInput lay_down() const;
+  PreparedInput lay_down();
   const WeldResult& welded() const { return welded_; }
 
  private:

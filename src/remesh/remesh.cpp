@@ -208,8 +208,9 @@ void Pipeline::optimise_levels() {
 // Has stray parts of cells left out of diagrams from here on if more than so many cells have any. Where sheets touch or
 // are joined to more than one, the seeds of each have to keep away from the curves of the others.
 void Pipeline::localise_if_above(std::size_t cells) {
-  run_.localise(localises_ && plan_.constrained && result_.input_topology.manifold);
-  if (run_.localises() && run_.strays() <= cells) run_.localise(false);
+  run_.localise(false);
+  const bool may = localises_ && plan_.constrained && result_.input_topology.manifold;
+  if (may && run_.strays() > cells) run_.localise(true);
 }
 
 // Folds of a rough surface give cells pieces that leave no trace in the dual.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <span>
 #include <unordered_map>
 #include <utility>
 
@@ -13,7 +14,6 @@
 #include "core/parallel.h"
 #include "mesh/topology.h"
 #include "voronoi/clip.h"
-#include "voronoi/dual.h"
 #include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
@@ -33,13 +33,20 @@ constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel
 
 using Triangles = std::vector<Index>;  // ascending
 
-bool contains(const std::vector<Index>& values, Index value) {
+bool contains(std::span<const Index> values, Index value) {
   return std::find(values.begin(), values.end(), value) != values.end();
 }
 
 void sort_unique(std::vector<Index>& values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
+}
+
+using Slots = std::unordered_map<Index, std::vector<Index>>;  // of triangles
+
+bool has_slot(const Slots& of, Index triangle, Index slot) {
+  const auto at = of.find(triangle);
+  return at != of.end() && contains(at->second, slot);
 }
 
 // Values for some of the items 0 to n - 1.
@@ -81,16 +88,18 @@ struct Localiser::Work {
   Neighbours neighbours;
   ThreadLocal<Clipper> clippers;  // of these seeds
   const RestrictedPolygons* raw = nullptr;
-  std::vector<std::size_t> first;                                // polygon in `raw` of each triangle
-  Csr<std::size_t> of_cell;                                      // polygons in `raw`
-  Overlay<RestrictedPolygons> clipped;                           // triangles as they are divided now
-  Overlay<Triangles> cell_triangles;                             // of cells that changed
-  std::map<Index, std::vector<Triangles>> strays;                // components of cells apart from their seeds
-  std::unordered_map<Index, std::vector<Index>> left_out, back;  // of triangles: slots without a cell, and not again
+  const Csr<Index>* raw_triangles = nullptr;       // of each cell in `raw`
+  std::vector<std::size_t> first;                  // polygon in `raw` of each triangle
+  Overlay<RestrictedPolygons> clipped;             // triangles as they are divided now
+  Overlay<Triangles> cell_triangles;               // of cells that changed
+  std::map<Index, std::vector<Triangles>> strays;  // components of cells apart from their seeds
+  Slots left_out, back;                            // without a cell on a triangle, and not again
 
   explicit Work(const Surface& s);
 
-  std::size_t run(const std::vector<Vec3>& given, Diagram& diagram);
+  // Both return how many cells have strays.
+  std::size_t find_all_strays(const std::vector<Vec3>& given, const Diagram& diagram);
+  std::size_t localise(const std::vector<Vec3>& given, Diagram& diagram);
 
  private:
   // The polygons on a triangle as they are now.
@@ -130,7 +139,7 @@ struct Localiser::Work {
   Triangles put_back_torn();
   std::vector<Index> clip_anew(const Triangles& triangles);
   RestrictedPolygons clip(Index triangle, Clipper& clipper) const;
-  Index nearest_but(const Vec3& q, const std::vector<Index>& without, Clipper& clipper) const;
+  Index nearest_but(const Vec3& q, std::span<const Index> without, Clipper& clipper) const;
   RestrictedPolygons splice() const;
   void sum(Diagram& diagram);
 };
@@ -168,10 +177,7 @@ Localiser::Work::Work(const Surface& s) : surface(s) {
 
 Triangles Localiser::Work::triangles_of(Index cell) const {
   if (const Triangles* changed = cell_triangles.find(cell)) return *changed;
-  Triangles triangles;
-  for (const std::size_t* p = of_cell.begin(cell); p != of_cell.end(cell); ++p)
-    triangles.push_back(raw->pairs[*p].triangle);
-  return triangles;
+  return {raw_triangles->begin(cell), raw_triangles->end(cell)};
 }
 
 Clipper& Localiser::Work::clipper() {
@@ -230,15 +236,14 @@ std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, const Tria
 
 // The components of a cell but for that nearest to its seed, or those that it is on.
 std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
-  const bool changed = cell_triangles.find(cell) != nullptr;
-  const std::size_t count = changed ? cell_triangles.find(cell)->size() : of_cell.size(cell);
-  if (count < 2) return {};
   const Triangles triangles = triangles_of(cell);
+  const std::size_t count = triangles.size();
+  if (count < 2) return {};
   DisjointSets<> parts(count);
   std::size_t components = count;
   for (std::size_t i = 0; i < count; ++i) {
-    const Row on = changed ? row(triangles[i]) : Row{raw, 0, 0};
-    const std::size_t p = changed ? on.find(cell) : of_cell.begin(cell)[i];
+    const Row on = row(triangles[i]);
+    const std::size_t p = on.find(cell);
     for (std::size_t e = on.polygons->offsets[p]; e < on.polygons->offsets[p + 1]; ++e) {
       const Index label = on.polygons->labels[e];
       if (!is_edge(label)) continue;
@@ -306,8 +311,7 @@ bool Localiser::Work::borders_on_own(Index cell, const Triangles& piece) const {
 }
 
 bool Localiser::Work::is_left_out(Index triangle, Index cell) const {
-  const auto at = left_out.find(triangle);
-  return at != left_out.end() && contains(at->second, seeds.slot[cell]);
+  return has_slot(left_out, triangle, seeds.slot[cell]);
 }
 
 // Whether a cell's own part lies at a half-edge, in its triangle.
@@ -328,7 +332,7 @@ Triangles Localiser::Work::leave_out() {
       if (!borders_on_own(cell, piece)) continue;
       for (const Index t : piece) {
         const Index slot = seeds.slot[cell];
-        if (const auto at = back.find(t); at != back.end() && contains(at->second, slot)) continue;
+        if (has_slot(back, t, slot)) continue;
         left_out[t].push_back(slot);
         triangles.push_back(t);
       }
@@ -363,7 +367,7 @@ Triangles Localiser::Work::put_back_torn() {
 }
 
 // A slot with a cell on the facet that the clipper is at, some being left out.
-Index Localiser::Work::nearest_but(const Vec3& q, const std::vector<Index>& without, Clipper& clipper) const {
+Index Localiser::Work::nearest_but(const Vec3& q, std::span<const Index> without, Clipper& clipper) const {
   double radius = norm(seeds.x[neighbours.nearest(q)] - q);
   for (std::size_t tried = 0; tried + without.size() < seeds.x.size(); radius = 1.5 * radius + 1e-6 * seeds.extent) {
     std::vector<Index> near = neighbours.around(q, radius);
@@ -380,7 +384,7 @@ Index Localiser::Work::nearest_but(const Vec3& q, const std::vector<Index>& with
 // The division of a triangle among the seeds that are not left out.
 RestrictedPolygons Localiser::Work::clip(Index triangle, Clipper& clipper) const {
   const auto these = left_out.find(triangle);
-  const std::vector<Index> without = these == left_out.end() ? std::vector<Index>{} : these->second;
+  const std::span<const Index> without = these == left_out.end() ? std::span<const Index>{} : these->second;
   clipper.begin(surface.facets[surface.facet_of[triangle]], without);
   std::vector<Index> met;
   const auto meet = [&](Index slot) {
@@ -498,12 +502,10 @@ void Localiser::Work::sum(Diagram& diagram) {
   moments.energy = fixed_sum(moments.cells.size(), [&](std::size_t i) { return moments.cells[i].second; });
 }
 
-std::size_t Localiser::Work::run(const std::vector<Vec3>& given, Diagram& diagram) {
+std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, const Diagram& diagram) {
   raw = &diagram.polygons;
+  raw_triangles = &diagram.moments.triangles;
   first = first_polygons(*raw, surface.mesh.triangles.size());
-  of_cell = group_into_rows<std::size_t>(given.size(), [&](const auto& put) {
-    for (std::size_t p = 0; p < raw->pairs.size(); ++p) put(raw->pairs[p].cell, p);
-  });
   seeds = sort_seeds(given);
   clippers.clear();
   clipped.reset(surface.mesh.triangles.size());
@@ -514,7 +516,11 @@ std::size_t Localiser::Work::run(const std::vector<Vec3>& given, Diagram& diagra
   std::vector<Index> cells(given.size());
   std::iota(cells.begin(), cells.end(), Index{0});
   find_strays(cells);
-  const std::size_t count = strays.size();
+  return strays.size();
+}
+
+std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
+  const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
   neighbours.build_on_demand(seeds, kReach * std::sqrt(surface.area / static_cast<double>(seeds.x.size())));
   std::size_t divided = 0;
@@ -528,13 +534,18 @@ std::size_t Localiser::Work::run(const std::vector<Vec3>& given, Diagram& diagra
   if (clipped.items.empty()) return 0;
   sum(diagram);
   diagram.polygons = splice();
-  if (includes(diagram.has, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
   return count;
 }
 
 Localiser::Localiser(const Surface& surface) : work_(std::make_unique<Work>(surface)) {}
 Localiser::~Localiser() = default;
 
-std::size_t Localiser::localise(const std::vector<Vec3>& seeds, Diagram& diagram) { return work_->run(seeds, diagram); }
+std::size_t Localiser::localise(const std::vector<Vec3>& seeds, Diagram& diagram) {
+  return work_->localise(seeds, diagram);
+}
+
+std::size_t Localiser::count_strays(const std::vector<Vec3>& seeds, const Diagram& diagram) {
+  return work_->find_all_strays(seeds, diagram);
+}
 
 }  // namespace bisector

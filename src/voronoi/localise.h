@@ -25,9 +25,11 @@ class Localiser {
 
   // Gives each component of a cell that is not the one nearest to the seed, and that borders on other cells' own
   // components, to those. `diagram` is that of the seeds, with its polygons; these and the moments become those of the
-  // localised cells, and so does its dual if it is there. The result depends on seeds and labels alone, and polygons
-  // tile the surface as before. Returns how many cells had such components.
+  // localised cells. The result depends on seeds and labels alone, and polygons tile the surface as before. Returns how
+  // many cells had such components.
   std::size_t localise(const std::vector<Vec3>& seeds, Diagram& diagram);
+  // That number alone.
+  std::size_t count_strays(const std::vector<Vec3>& seeds, const Diagram& diagram);
 
  private:
   struct Work;
