@@ -33,10 +33,10 @@ namespace {
 // Of the steps allowed per level: the coarsest of several levels settles soon, the finest starts near its minimum, and
 // seeds that are put on the surface move little.
 constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0.05;
-// Diagrams are localised from a level's start if more than one cell in so many has stray parts there, and else for so
-// much of the steps at the end of the finest.
+// Where more than one cell in so many has stray parts, diagrams are localised for so much of the finest level's steps.
+// Where fewer have any, so much of the steps is added with them.
 constexpr std::size_t kManyStrays = 20;
-constexpr double kLocalisedShare = 0.2;
+constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
 constexpr int kMendingRounds = 3;  // of features and topology
 // Runs that start again with edges shorter by this where cells were no disks; not if more than one cell in so many was.
 constexpr int kAttempts = 1;
@@ -108,7 +108,7 @@ class Pipeline {
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
   void optimise_levels();
-  void localise_if_above(std::size_t cells);
+  bool can_localise() const;
   bool dual_suffices();
   bool free_tips();
   std::vector<Vec3> all_vertices() const;
@@ -182,14 +182,16 @@ void Pipeline::optimise_levels() {
   for (std::size_t level = 0; level < counts.size(); ++level) {
     step_.phase = counts.size() > 1 ? fmt::format("level {}/{}", level + 1, counts.size()) : "optimising";
     const double share = steps_share(level, counts.size());
-    step_.iterations = share_of(plan_.iterations, share);
     step_.done += std::exchange(step_.share, share * cost(counts[level]) / total);
-    localise_if_above(counts[level] / kManyStrays);
+    const int steps = share_of(plan_.iterations, share);
+    const bool may_localise = level + 1 == counts.size() && can_localise();
+    const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
+    step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
     optimise(run_, step_);
-    if (!run_.localises() && level + 1 == counts.size()) {
-      localise_if_above(0);
-      step_.iterations = share_of(plan_.iterations, kLocalisedShare);
-      if (run_.localises()) optimise(run_, step_);
+    if (may_localise && run_.strays() > 0) {
+      run_.localise(true);
+      step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
+      optimise(run_, step_);
     }
     if (run_.has_features()) clear_features(run_, trace_, measure_, step_);
     if (level + 1 < counts.size()) to_next_level(counts[level + 1]);
@@ -205,13 +207,9 @@ void Pipeline::optimise_levels() {
   step_.share = 0;
 }
 
-// Has stray parts of cells left out of diagrams from here on if more than so many cells have any. Where sheets touch or
-// are joined to more than one, the seeds of each have to keep away from the curves of the others.
-void Pipeline::localise_if_above(std::size_t cells) {
-  run_.localise(false);
-  const bool may = localises_ && plan_.constrained && result_.input_topology.manifold;
-  if (may && run_.strays() > cells) run_.localise(true);
-}
+// Whether diagrams may be localised while seeds move far. Where sheets touch or are joined to more than one, the seeds
+// of each have to keep away from the curves of the others.
+bool Pipeline::can_localise() const { return localises_ && plan_.constrained && result_.input_topology.manifold; }
 
 // Folds of a rough surface give cells pieces that leave no trace in the dual.
 bool Pipeline::dual_suffices() {

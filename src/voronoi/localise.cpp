@@ -25,8 +25,6 @@ namespace {
 // after so many rounds, or when each triangle has been divided so often on average.
 constexpr int kRounds = 16;
 constexpr std::size_t kDivisions = 4;
-// A seed's list of neighbours reaches this far at first, in mean distances of seeds.
-constexpr double kReach = 2;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
@@ -86,7 +84,8 @@ struct Localiser::Work {
 
   SortedSeeds seeds;
   Neighbours neighbours;
-  ThreadLocal<Clipper> clippers;  // of these seeds
+  ThreadLocal<Clipper> clippers;           // of these seeds
+  ThreadLocal<std::vector<Index>> places;  // of triangles in the list of one cell; anything for others
   const RestrictedPolygons* raw = nullptr;
   const Csr<Index>* raw_triangles = nullptr;       // of each cell in `raw`
   std::vector<std::size_t> first;                  // polygon in `raw` of each triangle
@@ -215,19 +214,22 @@ double Localiser::Work::squared_distance(Index triangle, Index cell, Clipper& cl
 std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, const Triangles& triangles) {
   const Vec3& seed = seeds.x[seeds.slot[cell]];
   const double same = kSamePoint * seeds.extent;
-  std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    const auto& corners = surface.facets[surface.facet_of[triangles[i]]].corners;
-    order.push_back({norm(nearest_on_triangle(seed, corners[0], corners[1], corners[2]) - seed), i});
+  std::vector<double> bounds;
+  for (const Index t : triangles) {
+    const auto& corners = surface.facets[surface.facet_of[t]].corners;
+    bounds.push_back(norm(nearest_on_triangle(seed, corners[0], corners[1], corners[2]) - seed));
   }
-  std::sort(order.begin(), order.end());
   std::vector<std::pair<double, std::size_t>> tried;
   double least = std::numeric_limits<double>::infinity();
-  for (const auto& [bound, i] : order) {
-    if (bound > least + same) break;
+  const auto attempt = [&](std::size_t i) {
+    if (bounds[i] > least + same) return;
     tried.push_back({std::sqrt(squared_distance(triangles[i], cell, clipper())), i});
     least = std::min(least, tried.back().first);
-  }
+  };
+  const auto lowest = static_cast<std::size_t>(std::min_element(bounds.begin(), bounds.end()) - bounds.begin());
+  attempt(lowest);
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    if (i != lowest) attempt(i);
   std::vector<std::size_t> nearest;
   for (const auto& [distance, i] : tried)
     if (distance <= least + same) nearest.push_back(i);
@@ -239,6 +241,9 @@ std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
   const Triangles triangles = triangles_of(cell);
   const std::size_t count = triangles.size();
   if (count < 2) return {};
+  std::vector<Index>& place = places.local();
+  place.resize(surface.mesh.triangles.size());
+  for (Index i = 0; i < count; ++i) place[triangles[i]] = i;
   DisjointSets<> parts(count);
   std::size_t components = count;
   for (std::size_t i = 0; i < count; ++i) {
@@ -249,9 +254,8 @@ std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
       if (!is_edge(label)) continue;
       const std::size_t h = std::size_t{3} * triangles[i] + (label & ~kEdgeLabel);
       for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
-        const auto at = std::lower_bound(triangles.begin(), triangles.end(), static_cast<Index>(*other / 3));
-        if (at == triangles.end() || *at != *other / 3) continue;
-        components -= parts.join(i, static_cast<std::size_t>(at - triangles.begin()));
+        const Index t = static_cast<Index>(*other / 3), at = place[t];
+        if (at < count && triangles[at] == t) components -= parts.join(i, at);
       }
     }
   }
@@ -522,7 +526,7 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
 std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
   const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
-  neighbours.build_on_demand(seeds, kReach * std::sqrt(surface.area / static_cast<double>(seeds.x.size())));
+  neighbours.build(seeds, NeighbourSource::nearest);
   std::size_t divided = 0;
   for (int round = 0; round < kRounds && divided < kDivisions * surface.facets.size(); ++round) {
     const Triangles triangles = leave_out();
