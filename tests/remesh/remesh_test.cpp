@@ -159,6 +159,7 @@ TEST(RemeshHard, NonManifoldInputRunsAndReports) {
       SCOPED_TRACE(name);
       RemeshOptions options = options_for(vertices);
       options.topology = control;
+      options.iterations = 30;
       const RemeshResult result = remesh(mesh, options);
       EXPECT_EQ(result.untiled, 0u);
       EXPECT_FALSE(result.mesh.triangles.empty());

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -120,10 +121,11 @@ TEST(Restricted, LargerGridAgreesWithTheOracle) {
 
 // --- Medium cases ---
 
+// Every process lists all cases, so what they are of is only made by the tests that run.
 struct MediumCase {
   std::string name;
-  TriangleMesh mesh;
-  std::vector<Vec3> seeds;
+  std::function<TriangleMesh()> make_mesh;
+  std::function<std::vector<Vec3>(const TriangleMesh&)> make_seeds;
 };
 
 std::vector<Vec3> moved_by(std::vector<Vec3> points, const Vec3& by) {
@@ -167,46 +169,53 @@ std::vector<Vec3> box_seeds(const TriangleMesh& mesh, std::size_t count, double 
 std::vector<MediumCase> medium_cases() {
   struct Named {
     const char* name;
-    TriangleMesh mesh;
+    std::function<TriangleMesh()> make;
   };
-  const std::vector<Named> meshes{{"icosphere", icosphere(4)},
-                                  {"box", box(16)},
-                                  {"grid patch", grid_patch(40, 30)},
-                                  {"pages", pages()},
-                                  {"two spheres", two_spheres()},
-                                  {"soup", soup(400, 41)},
-                                  {"needles", needles()}};
+  const std::vector<Named> meshes{{"icosphere", [] { return icosphere(4); }},
+                                  {"box", [] { return box(16); }},
+                                  {"grid patch", [] { return grid_patch(40, 30); }},
+                                  {"pages", [] { return pages(); }},
+                                  {"two spheres", [] { return two_spheres(); }},
+                                  {"soup", [] { return soup(400, 41); }},
+                                  {"needles", [] { return needles(); }}};
+  using Mesh = const TriangleMesh&;
   std::vector<MediumCase> cases;
-  for (const auto& [name, mesh] : meshes) {
-    const auto add = [&](const char* what, std::vector<Vec3> seeds) {
-      cases.push_back({std::string(name) + " " + what, mesh, std::move(seeds)});
+  for (const auto& [name, make] : meshes) {
+    const auto add = [&](const char* what, auto make_seeds) {
+      cases.push_back({std::string(name) + " " + what, make, make_seeds});
     };
-    add("10 random", random_seeds(mesh, 10, 21));
-    add("1000 random", random_seeds(mesh, 1000, 22));
-    add("4000 random", random_seeds(mesh, 4000, 23));
-    add("vertices", vertex_seeds(mesh));
-    add("vertices twice", repeated(vertex_seeds(mesh), 2));
-    add("grid", grid_seeds(mesh, 11, 11, 11));
-    add("clustered", clustered_seeds(mesh, 2000));
-    add("mirrored", mirrored(random_seeds(mesh, 700, 24), 0));
-    std::vector<Vec3> flat = random_seeds(mesh, 300, 25);
-    for (Vec3& x : flat) x.z = 0;
-    add("planar", flat);
-    add("in the box", box_seeds(mesh, 2000, 0.1));
-    add("far", moved_by(random_seeds(mesh, 300, 26), {30, 20, 10}));
+    add("10 random", [](Mesh mesh) { return random_seeds(mesh, 10, 21); });
+    add("1000 random", [](Mesh mesh) { return random_seeds(mesh, 1000, 22); });
+    add("4000 random", [](Mesh mesh) { return random_seeds(mesh, 4000, 23); });
+    add("vertices", [](Mesh mesh) { return vertex_seeds(mesh); });
+    add("vertices twice", [](Mesh mesh) { return repeated(vertex_seeds(mesh), 2); });
+    add("grid", [](Mesh mesh) { return grid_seeds(mesh, 11, 11, 11); });
+    add("clustered", [](Mesh mesh) { return clustered_seeds(mesh, 2000); });
+    add("mirrored", [](Mesh mesh) { return mirrored(random_seeds(mesh, 700, 24), 0); });
+    add("planar", [](Mesh mesh) {
+      std::vector<Vec3> flat = random_seeds(mesh, 300, 25);
+      for (Vec3& x : flat) x.z = 0;
+      return flat;
+    });
+    add("in the box", [](Mesh mesh) { return box_seeds(mesh, 2000, 0.1); });
+    add("far", [](Mesh mesh) { return moved_by(random_seeds(mesh, 300, 26), {30, 20, 10}); });
   }
   for (std::size_t k : {0u, 3u, 4u}) {
-    cases.push_back({std::string(meshes[k].name) + " cospherical", meshes[k].mesh, round_seeds(2000, false)});
+    const auto& [name, make] = meshes[k];
+    cases.push_back({std::string(name) + " cospherical", make, [](Mesh) { return round_seeds(2000, false); }});
     // All cells meet along one line, where every decision is close: the cost grows with the square of the count.
-    cases.push_back({std::string(meshes[k].name) + " cocircular", meshes[k].mesh, round_seeds(120, true)});
+    cases.push_back({std::string(name) + " cocircular", make, [](Mesh) { return round_seeds(120, true); }});
   }
   return cases;
 }
 
-class Medium : public testing::TestWithParam<MediumCase> {};
+class Medium : public testing::TestWithParam<MediumCase> {
+ protected:
+  const TriangleMesh mesh = GetParam().make_mesh();
+  const std::vector<Vec3> seeds = GetParam().make_seeds(mesh);
+};
 
 TEST_P(Medium, EverySourceAndThreadCountGivesTheSameBits) {
-  const auto& [name, mesh, seeds] = GetParam();
   const Surface surface(mesh);
   const Diagram reference = diagram_of(surface, seeds, NeighbourSource::nearest);
   expect_sound(surface, reference);
@@ -228,7 +237,6 @@ TEST_P(Medium, EverySourceAndThreadCountGivesTheSameBits) {
 
 // The optimiser's use: seeds that move a little, or jump, change their number, coincide, and come back.
 TEST_P(Medium, AUsedObjectAnswersAsAFreshOne) {
-  const auto& [name, mesh, seeds] = GetParam();
   const Surface surface(mesh);
   const double size = bounding_box(mesh.vertices).diagonal();
   RestrictedVoronoi used(surface);
@@ -259,7 +267,6 @@ TEST_P(Medium, AUsedObjectAnswersAsAFreshOne) {
 
 // Step masses steer the optimiser, so they may not depend on the source either.
 TEST_P(Medium, StepMassesAreTheSameForBothSources) {
-  const auto& [name, mesh, seeds] = GetParam();
   const Surface surface(mesh);
   Diagram nearest, delaunay;
   RestrictedVoronoi(surface).evaluate(seeds, NeighbourSource::nearest, Want::moments, nearest);
@@ -268,7 +275,6 @@ TEST_P(Medium, StepMassesAreTheSameForBothSources) {
 }
 
 TEST_P(Medium, CertificationIsReproducible) {
-  const auto& [name, mesh, seeds] = GetParam();
   const Surface surface(mesh);
   for (NeighbourSource source : kSources) {
     PairCounts first;
