@@ -119,11 +119,11 @@ INSTANTIATE_TEST_SUITE_P(Surfaces, Remesh, testing::ValuesIn(cases()),
 TEST(RemeshThin, APlateKeepsItsTwoSides) {
   TriangleMesh plate = box(8);
   for (Vec3& v : plate.vertices) v.z *= 0.02;
-  for (std::uint64_t random_seed : {1u, 2u, 3u}) {
-    RemeshOptions options = options_for(3000);
+  for (std::uint64_t random_seed : {1u, 2u}) {
+    RemeshOptions options = options_for(1000);
     options.random_seed = random_seed;
     const RemeshResult result = remesh(plate, options);
-    EXPECT_EQ(result.mesh.vertices.size(), 3000u);
+    EXPECT_EQ(result.mesh.vertices.size(), 1000u);
     EXPECT_TRUE(result.topology_matches) << "random seed " << random_seed;
     EXPECT_EQ(result.topology.euler, 2);
     EXPECT_TRUE(result.topology.manifold && result.topology.closed);
@@ -150,7 +150,7 @@ TEST(RemeshThin, AShellHasGoodTrianglesOnBothSides) {
 // Whatever the dual is, it is reported for what it is.
 TEST(RemeshHard, NonManifoldInputRunsAndReports) {
   const std::vector<Case> hard{{"pages", pages(), 300, false},
-                               {"soup", soup(60, 5), 400, false},
+                               {"soup", soup(20, 5), 200, false},
                                {"duplicated", duplicated_triangles(), 100, false},
                                {"needles", needles(), 100, false},
                                {"collinear", collinear_among_good(), 100, false}};
@@ -259,7 +259,7 @@ TEST(RemeshHard, AThinTipKeepsTheTopology) {
   }
   cone.vertices.push_back({0, 0, 20});
   cone.vertices.push_back({0, 0, 0});
-  const RemeshResult result = remesh(cone, options_for(1000));
+  const RemeshResult result = remesh(cone, options_for(400));
   EXPECT_TRUE(result.topology_matches);
   EXPECT_TRUE(result.ball_property);
   EXPECT_EQ(result.features.broken, 0u);
