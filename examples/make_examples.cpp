@@ -1,6 +1,6 @@
-// Generates the two models that ship with Bisector: smooth.off, a closed organic surface of genus 1, and part.off, a
-// machined part of genus 4. Both are triangulated the way such models arrive: the one by marching tetrahedra, the other
-// as a CAD system exports faces. Usage: make_examples DIRECTORY
+// Generates the models that ship with Bisector: smooth.off, a closed organic surface of genus 1, part.off, a machined
+// part of genus 4, and engraved.off, a cube with letters. They are triangulated the way such models arrive: the first
+// by marching tetrahedra, the others as a CAD system exports faces. Usage: make_examples DIRECTORY
 #include <bisector/error.h>
 #include <bisector/io.h>
 
@@ -349,6 +349,43 @@ TriangleMesh make_part() {
   return part.take();
 }
 
+// ---- engraved.off: a cube of 20 mm with letters 0.5 mm deep ----
+
+// Letters of strokes 1 wide in a box of 5 by 7.
+using Letter = std::vector<std::array<double, 2>>;
+const Letter kC{{0, 0}, {5, 0}, {5, 1}, {1, 1}, {1, 6}, {5, 6}, {5, 7}, {0, 7}};
+const Letter kV{{2, 0}, {3, 0}, {5, 7}, {4, 7}, {2.5, 1.75}, {1, 7}, {0, 7}};
+const Letter kT{{2, 0}, {3, 0}, {3, 6}, {5, 6}, {5, 7}, {0, 7}, {0, 6}, {2, 6}};
+const Letter kM{{0, 0}, {1, 0}, {1, 5}, {2.5, 2}, {4, 5}, {4, 0}, {5, 0}, {5, 7}, {4, 7}, {2.5, 4}, {1, 7}, {0, 7}};
+const Letter kE{{0, 0}, {5, 0}, {5, 1}, {1, 1}, {1, 3}, {4, 3}, {4, 4}, {1, 4}, {1, 6}, {5, 6}, {5, 7}, {0, 7}};
+const Letter kS{{0, 0}, {5, 0}, {5, 4}, {1, 4}, {1, 6}, {5, 6}, {5, 7}, {0, 7}, {0, 3}, {4, 3}, {4, 1}, {0, 1}};
+const Letter kH{{0, 0}, {1, 0}, {1, 3}, {4, 3}, {4, 0}, {5, 0}, {5, 7}, {4, 7}, {4, 4}, {1, 4}, {1, 7}, {0, 7}};
+
+TriangleMesh make_engraved() {
+  constexpr double kSide = 20, kDepth = 0.5;
+  std::vector<Loop> letters;
+  const auto engrave = [&](const std::vector<Letter>& row, double x, double y, double size, double space) {
+    for (const Letter& letter : row) {
+      Loop& loop = letters.emplace_back();
+      for (const auto& [u, v] : letter) loop.push_back(at(x + size * u, y + size * v));
+      x += 5 * size + space;
+    }
+  };
+  engrave({kC, kV, kT}, 1.75, 11, 0.9, 1.5);
+  engrave({kM, kE, kS, kH}, 1.25, 3, 0.75, 0.8);
+
+  const Loop square{at(0, 0), at(kSide, 0), at(kSide, kSide), at(0, kSide)};
+  Part part;
+  part.cap(square, {}, 0, false);
+  part.wall(square, 0, square, kSide, true);
+  part.cap(square, letters, kSide, true);
+  for (const Loop& letter : letters) {
+    part.wall(letter, kSide - kDepth, letter, kSide, false);
+    part.cap(letter, {}, kSide - kDepth, true);
+  }
+  return part.take();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -360,6 +397,7 @@ int main(int argc, char** argv) {
     const std::string directory = argv[1];
     bisector::write_mesh(directory + "/smooth.off", Polygoniser().run());
     bisector::write_mesh(directory + "/part.off", make_part());
+    bisector::write_mesh(directory + "/engraved.off", make_engraved());
   } catch (const bisector::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

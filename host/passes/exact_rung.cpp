@@ -18,8 +18,10 @@ void ExactRung::begin(const SortedSeeds& seeds, const Neighbours* neighbours, do
 
 const Neighbours& ExactRung::neighbours() {
   if (given_) return *given_;
-  if (!built_) own_.build_on_demand(*seeds_, kFirstRadius * spacing_);
-  built_ = true;
+  if (!built_) {
+    own_.build_on_demand(*seeds_, kFirstRadius * spacing_);
+    built_ = true;
+  }
   return own_;
 }
 

@@ -14,7 +14,8 @@ class ExactRung {
   void begin(const SortedSeeds& seeds, const Neighbours* neighbours, double spacing);
   // The slots that own the points.
   std::vector<Index> owners(const std::vector<Vec3>& points);
-  // Neighbours that can answer Neighbours::nearest_to().
+  // Neighbours that can answer Neighbours::nearest_to(). The first call is not for several threads at once; what
+  // for_each() visits may make others.
   const Neighbours& neighbours();
   // Calls visit(k, clipper) for k < count, with a clipper (voronoi/clip.h, clip_tet.h) that knows the seeds, in
   // parallel.

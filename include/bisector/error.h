@@ -15,7 +15,8 @@ enum class Reason {
   device_failed,        // the device was lost, or lacks memory, capacity or a driver
   no_single_precision,  // the CPU computes in double precision only
   no_double_precision,  // the device computes in single precision only
-  open_surface,         // the surface has borders, which welding may close
+  open_surface,         // the surface has borders, which welding or wrapping may close
+  no_solid,             // the surface bounds no solid for another reason; wrapping gives one that does
 };
 
 // Bad input or a failed run. what() is one line: what is wrong, where, and what to do.

@@ -6,10 +6,19 @@
 #include <vector>
 
 #include "bisector/mesh.h"
+#include "console.h"
+#include "options.h"
+#include "report.h"
 
 namespace bisector::cli {
 
 // `count`: how many the command line asks for, or 0. Throws Error if the file has another number.
 std::vector<Vec3> read_seeds(const std::string& path, std::size_t count);
+
+// Wraps a mesh if that is asked for; without a radius it is about the edge length of a mesh of so many vertices, or
+// `edge_length` if that is positive. Warns if labels are lost. Returns what the report says about it, null if there is
+// no wrap.
+Json wrap_if_asked(const WrapOption& option, const TriangleMesh& mesh, std::size_t vertices, double edge_length,
+                   Console& console, TriangleMesh& wrapped);
 
 }  // namespace bisector::cli

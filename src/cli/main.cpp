@@ -37,7 +37,8 @@ std::string with_advice(const bisector::Error& error) {
     case bisector::Reason::no_single_precision:
       return "--precision single: " + what + "; use --precision double or a device";
     case bisector::Reason::no_double_precision: return what + "; use --precision single";
-    case bisector::Reason::open_surface: return what + " (--weld)";
+    case bisector::Reason::open_surface: return what + " (--weld), or wrap it (--wrap)";
+    case bisector::Reason::no_solid: return what + ", or wrap it (--wrap)";
   }
   return what;
 }

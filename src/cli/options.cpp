@@ -227,6 +227,24 @@ void add_weld(CLI::App* app, double& tolerance) {
       ->group("Features");
 }
 
+void add_wrap(CLI::App* app, WrapOption& wrap) {
+  app->add_option_function<std::string>(
+         "--wrap",
+         [&wrap](const std::string& word) {
+           wrap.on = true;
+           if (word.empty()) return;
+           if (const std::string error = number_above_zero()(word); !error.empty())
+             throw CLI::ValidationError("--wrap: '" + word + "' is no number above 0; put files before the option");
+           wrap.alpha = std::stod(word);
+         },
+         "first make a closed manifold around whatever triangles\n"
+         "there are, as a ball of the radius ALPHA sees them from\n"
+         "outside (default: about the edge length asked for)")
+      ->type_name("[ALPHA]")
+      ->expected(0, 1)
+      ->group("Features");
+}
+
 void Usage::refuse(const char* option, const char* why) const {
   if (given(option)) throw CLI::ValidationError(std::string(option) + ": " + why);
 }
@@ -250,6 +268,14 @@ void Usage::check_edge_bounds(const SizingOptions& sizing) const {
 void Usage::check_uniform_density() const {
   for (const char* option : {"--gradation", "--edge-min", "--edge-max"})
     refuse(option, "a uniform density has edges of one length; choose another --density");
+}
+
+void Usage::check_wrap(const std::string& attribute) const {
+  if (!given("--wrap")) return;
+  if (!attribute.empty())
+    throw CLI::ValidationError("--density: a wrap has other vertices than its input; leave out attribute: or --wrap");
+  refuse("--weld", "--wrap closes what welding would; leave one of the two out");
+  refuse("--feature-file", "a wrap has other vertices than its input; leave out --feature-file or --wrap");
 }
 
 }  // namespace bisector::cli

@@ -62,6 +62,11 @@ void add_density(CLI::App* app, SizingOptions& sizing, std::string& attribute, c
 void add_features(CLI::App* app, FeatureOptions& features, const char* help);
 void add_feature_file(CLI::App* app, std::string& path);
 void add_weld(CLI::App* app, double& tolerance);
+struct WrapOption {
+  bool on = false;
+  double alpha = 0;  // 0: not given
+};
+void add_wrap(CLI::App* app, WrapOption& wrap);
 
 // --- What options ask of each other ---
 
@@ -77,6 +82,8 @@ class Usage {
   void check_number_of_vertices() const;  // -n, edge lengths and seeds of remesh and tet
   void check_edge_bounds(const SizingOptions& sizing) const;
   void check_uniform_density() const;
+  // What belongs to vertices or triangles of the input is of no use to its wrap; so is an attribute's name.
+  void check_wrap(const std::string& attribute) const;
 
  private:
   const CLI::App& app_;

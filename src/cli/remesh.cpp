@@ -29,6 +29,7 @@ struct RemeshCommand {
   std::string feature_file, feature_output;
   double edge_length_relative = 0;  // of the input's diagonal; 0: not given
   double weld = -1;                 // not given
+  WrapOption wrap;
   RemeshOptions options;
   CommonOptions common;
 };
@@ -76,6 +77,7 @@ void add_options(CLI::App* app, RemeshCommand& command) {
            "outputs hold them too")
       ->group("Features");
   add_weld(app, command.weld);
+  add_wrap(app, command.wrap);
   add_words(app, "--topology", command.options.topology, kTopologyWords,
             "where the result's topology is not the input's:\n"
             "enforce (mend it; default), check (warn) or off")
@@ -113,6 +115,7 @@ void add_options(CLI::App* app, RemeshCommand& command) {
 // What options ask of each other: an option that would change nothing is an error.
 void check_usage(const RemeshCommand& command, const Usage& usage) {
   usage.check_number_of_vertices();
+  usage.check_wrap(command.attribute);
   if (usage.given("--seeds")) {
     for (const char* option : {"--edge-min", "--edge-max"})
       usage.refuse(option, "seeds from a file have their own number; leave one of the two out");
@@ -176,9 +179,10 @@ void warn_of_topology(Console& console, const RemeshResult& result) {
     console.warn(fmt::format("{} instead of {}: fewer did not give the input's topology and features",
                              counted(result.mesh.vertices.size(), "vertex", "vertices"), result.wanted));
   if (result.topology_matches) return;
-  console.warn(fmt::format("the output's topology ({}) is not the input's ({}); {}", describe(result.topology),
-                           describe(result.input_topology),
-                           result.input_topology.manifold ? "ask for more vertices" : "mend the input"));
+  console.warn(
+      fmt::format("the output's topology ({}) is not the input's ({}); {}", describe(result.topology),
+                  describe(result.input_topology),
+                  result.input_topology.manifold ? "ask for more vertices" : "mend the input, or wrap it (--wrap)"));
 }
 
 // Everything but the seconds, whose place is kept.
@@ -201,7 +205,7 @@ Json weld_json(const WeldResult& welded) {
 }
 
 Json remesh_report(Console& console, const RemeshResult& result, const QualityReport& quality,
-                   const TriangleMesh& input, const RemeshOptions& options) {
+                   const TriangleMesh& input, const Json& wrapped, const RemeshOptions& options) {
   Json report = start_report("remesh");
   report["device"] = device_json(result.device);
   report["input"] = input_json(input);
@@ -232,6 +236,7 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length}};
   report["noisy"] = result.noisy;
   report["weld"] = weld_json(result.welded);
+  if (!wrapped.is_null()) report["wrap"] = wrapped;
   if (options.min_angle > 0 && options.energy != Energy::restricted && !result.noisy)
     report["improved"] = {{"made", result.improved.made},
                           {"inserted", result.improved.inserted},
@@ -302,12 +307,15 @@ void run(const RemeshCommand& command) {
   console.phase("reading " + command.input);
   const Stopwatch reading;
   const TriangleMesh input = read_mesh(command.input, context);
-  const RemeshOptions options = remesh_options(command, input);
-  warn_of_labels(console, input, command.output);
   double io = reading.seconds();
+  const RemeshOptions options = remesh_options(command, input);
+  TriangleMesh wrap;
+  const Json wrapped = wrap_if_asked(command.wrap, input, options.vertices, options.edge_length, console, wrap);
+  const TriangleMesh& surface = wrapped.is_null() ? input : wrap;
+  warn_of_labels(console, surface, command.output);
 
   console.phase("preparing");
-  const RemeshResult result = remesh(input, options, context);
+  const RemeshResult result = remesh(surface, options, context);
   require_sound(result);
   warn_of_features(console, result);
   if (options.topology != TopologyControl::off) warn_of_topology(console, result);
@@ -315,7 +323,7 @@ void run(const RemeshCommand& command) {
   const Stopwatch measuring;
   const QualityReport quality = measure_quality(result.mesh);
   Json report;
-  if (!report_path.empty()) report = remesh_report(console, result, quality, input, options);
+  if (!report_path.empty()) report = remesh_report(console, result, quality, input, wrapped, options);
   Json seconds = remesh_seconds(result.seconds);
   seconds["quality"] = measuring.seconds();
 
@@ -350,7 +358,14 @@ Command add_remesh(CLI::App& program) {
       "  bisector remesh part.stl -o out.ply --edge-length 0.5 --features 30\n\n"
       "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written.");
   add_options(app, *command);
-  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
+  return {app,
+          [=] {
+            const Usage usage(*app);
+            check_usage(*command, usage);
+            // Folds of a wrap are those of its own triangles.
+            if (usage.given("--wrap") && !usage.given("--features")) command->options.features.mode = FeatureMode::none;
+          },
+          [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -39,6 +39,7 @@ struct TetCommand {
   std::string sizes, feature_file;
   double edge_length_relative = 0;  // of the input's diagonal; 0: not given
   double weld = -1;                 // not given
+  WrapOption wrap;
   TetOptions options;
   CommonOptions common;
 };
@@ -84,6 +85,7 @@ void add_options(CLI::App* app, TetCommand& command) {
                "labels are kept unless none");
   add_feature_file(app, command.feature_file);
   add_weld(app, command.weld);
+  add_wrap(app, command.wrap);
   app->add_option("--min-angle", command.options.min_angle,
                   "degrees that all angles of the boundary's triangles\n"
                   "should exceed; 0: as they are; default 40")
@@ -108,6 +110,7 @@ void add_options(CLI::App* app, TetCommand& command) {
 
 void check_usage(const TetCommand& command, const Usage& usage) {
   usage.check_number_of_vertices();
+  usage.check_wrap(command.attribute);
   if (usage.given("--sizes")) usage.refuse("--density", "sizes come from --sizes; leave one of the two out");
   const SizingOptions& sizing = command.options.sizing.field;
   if (usage.given("--gradation") && sizing.gradation == 0)
@@ -157,6 +160,15 @@ SizeSamples read_sizes(const std::string& word) {
   return {mesh.vertices, read_tet_attribute(path, name), mesh.tets};
 }
 
+TriangleMesh surface_of(const Input& input) {
+  TriangleMesh surface = input.surface;
+  if (input.solid) {
+    surface.vertices = input.tets.vertices;
+    surface.triangles = boundary_facets(input.tets.tets);
+  }
+  return surface;
+}
+
 TetOptions tet_options(const TetCommand& command, const Input& input) {
   TetOptions options = command.options;
   if (!command.attribute.empty())
@@ -164,14 +176,8 @@ TetOptions tet_options(const TetCommand& command, const Input& input) {
                                          ? read_tet_attribute(command.input, command.attribute)
                                          : read_vertex_attribute(command.input, command.attribute);
   if (!command.sizes.empty()) options.sizing.sizes = read_sizes(command.sizes);
-  if (!command.feature_file.empty()) {
-    TriangleMesh surface = input.surface;
-    if (input.solid) {
-      surface.vertices = input.tets.vertices;
-      surface.triangles = boundary_facets(input.tets.tets);
-    }
-    options.features.given = read_feature_edges(command.feature_file, surface);
-  }
+  if (!command.feature_file.empty())
+    options.features.given = read_feature_edges(command.feature_file, surface_of(input));
   if (command.edge_length_relative > 0)
     options.edge_length = command.edge_length_relative * bounding_box(input.vertices()).diagonal();
   if (command.weld >= 0) options.weld = command.weld;
@@ -216,7 +222,7 @@ Json improved_json(const TetImproveReport& improved) {
 }
 
 Json tet_report(Console& console, const TetCommand& command, const TetResult& result, const Measures& measures,
-                const Input& input, const TriangleMesh& reference) {
+                const Input& input, const TriangleMesh& reference, const Json& wrapped) {
   Json report = start_report("tet");
   report["device"] = device_json(result.device);
   report["input"] = input_json(input);
@@ -245,6 +251,7 @@ Json tet_report(Console& console, const TetCommand& command, const TetResult& re
                        {"steiner_points", result.steiner_points},
                        {"refused_sites", result.refused_sites}};
   if (command.options.min_dihedral > 0) report["improved"] = improved_json(result.improved);
+  if (!wrapped.is_null()) report["wrap"] = wrapped;
   return report;
 }
 
@@ -327,9 +334,13 @@ void run(const TetCommand& command) {
   const Input input = read_input(command.input, context);
   const TetOptions options = tet_options(command, input);
   double io = reading.seconds();
+  TriangleMesh wrap;
+  const Json wrapped =
+      wrap_if_asked(command.wrap, surface_of(input), options.vertices, options.edge_length, console, wrap);
 
-  const TetResult result =
-      input.solid ? tetrahedralise(input.tets, options, context) : tetrahedralise(input.surface, options, context);
+  const TetResult result = !wrapped.is_null() ? tetrahedralise(wrap, options, context)
+                           : input.solid      ? tetrahedralise(input.tets, options, context)
+                                              : tetrahedralise(input.surface, options, context);
   if (result.untiled > 0)
     throw Error(fmt::format("the final diagram does not tile {} of the input; please report this as a bug",
                             counted(result.untiled, "tetrahedron or triangle", "tetrahedra or triangles")));
@@ -341,14 +352,7 @@ void run(const TetCommand& command) {
   measures.topology = analyse_tet_topology(result.mesh);
   warn_of(console, command, result, measures);
   Json report;
-  if (!report_path.empty()) {
-    TriangleMesh reference = input.surface;
-    if (input.solid) {
-      reference.vertices = input.tets.vertices;
-      reference.triangles = boundary_facets(input.tets.tets);
-    }
-    report = tet_report(console, command, result, measures, input, reference);
-  }
+  if (!report_path.empty()) report = tet_report(console, command, result, measures, input, surface_of(input), wrapped);
   Json seconds = tet_seconds(result.seconds);
   seconds["quality"] = measuring.seconds();
 
@@ -384,7 +388,14 @@ Command add_tet(CLI::App& program) {
                               ".vtk, .vtu). Ctrl-C stops the run;\n"
                               "nothing is written.");
   add_options(app, *command);
-  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
+  return {app,
+          [=] {
+            const Usage usage(*app);
+            check_usage(*command, usage);
+            // Folds of a wrap are those of its own triangles.
+            if (usage.given("--wrap") && !usage.given("--features")) command->options.features.mode = FeatureMode::none;
+          },
+          [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

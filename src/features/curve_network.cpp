@@ -12,6 +12,13 @@
 
 namespace bisector {
 
+namespace {
+
+// Half of what a gap must grow per length from the corner of its curves to be an angle, and no strip.
+constexpr double kAcute = 0.175;
+
+}  // namespace
+
 CurveNetwork::CurveNetwork(const FeatureCurves& curves, double spacing) {
   struct Both {
     Index a, b;
@@ -86,8 +93,11 @@ std::vector<double> curve_gaps(const CurveNetwork& network, const std::vector<do
         const double distance = std::sqrt(squared);
         const auto way = std::lower_bound(ways.begin(), ways.end(), other,
                                           [](const CurveNetwork::Way& w, Index to) { return w.to < to; });
-        if (way != ways.end() && way->to == other && (way->length <= kDetour * distance || way->corners == 1)) continue;
         if (other == i) continue;
+        if (way != ways.end() && way->to == other) {
+          if (way->length <= kDetour * distance) continue;
+          if (way->corners == 1 && distance >= kAcute * way->length) continue;
+        }
         gaps[i] = distance;
         break;
       }

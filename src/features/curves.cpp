@@ -7,6 +7,20 @@
 
 namespace bisector {
 
+std::vector<std::array<Index, 2>> edges_of(const std::vector<FeatureCurve>& curves) {
+  std::vector<std::array<Index, 2>> edges;
+  for (const FeatureCurve& curve : curves) {
+    const std::size_t count = curve.vertices.size();
+    for (std::size_t k = 0; k + (curve.closed ? 0 : 1) < count; ++k) {
+      const Index a = curve.vertices[k], b = curve.vertices[(k + 1) % count];
+      edges.push_back({std::min(a, b), std::max(a, b)});
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
 FeatureCurves::FeatureCurves(const FeatureGraph& graph, const std::vector<Vec3>& vertices) : graph_(graph) {
   for (const FeatureCurve& curve : graph_.curves) {
     std::vector<Vec3> points;

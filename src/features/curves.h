@@ -10,6 +10,9 @@
 
 namespace bisector {
 
+// The edges along curves, each once, as FeatureGraph::edges has them.
+std::vector<std::array<Index, 2>> edges_of(const std::vector<FeatureCurve>& curves);
+
 class FeatureCurves {
  public:
   FeatureCurves() = default;

@@ -430,20 +430,13 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
     if (!on_curve[k] && !kept.is_near(vertices[graph.corners[k]])) result.graph.corners.push_back(graph.corners[k]);
 
   join_straight(left, vertices, width);
-  for (FeatureCurve& curve : left) {
-    const std::size_t count = curve.vertices.size();
-    for (std::size_t k = 0; k + (curve.closed ? 0 : 1) < count; ++k) {
-      const Index a = curve.vertices[k], b = curve.vertices[(k + 1) % count];
-      result.graph.edges.push_back({std::min(a, b), std::max(a, b)});
-    }
+  for (const FeatureCurve& curve : left)
     if (!curve.closed)
       for (const Index v : {curve.vertices.front(), curve.vertices.back()}) result.graph.corners.push_back(v);
-  }
   std::sort(result.graph.corners.begin(), result.graph.corners.end());
   result.graph.corners.erase(std::unique(result.graph.corners.begin(), result.graph.corners.end()),
                              result.graph.corners.end());
-  std::sort(result.graph.edges.begin(), result.graph.edges.end());
-  result.graph.edges.erase(std::unique(result.graph.edges.begin(), result.graph.edges.end()), result.graph.edges.end());
+  result.graph.edges = edges_of(left);
   result.graph.curves = std::move(left);
   return result;
 }

@@ -131,18 +131,18 @@ void Preparation::plan(const RemeshOptions& options) {
     target_ = {detail_.vertices, 0};
     unbounded_.reset();
   }
-  bound(plan.points, plan.lengths);
+  bound({std::move(plan.points), std::move(plan.lengths)});
 }
 
-void Preparation::bound(const std::vector<Vec3>& points, const std::vector<double>& lengths) {
-  if (!points.empty()) unbounded_.reset();
-  bounded_points_.insert(bounded_points_.end(), points.begin(), points.end());
-  bounded_lengths_.insert(bounded_lengths_.end(), lengths.begin(), lengths.end());
+void Preparation::bound(const SizeBounds& bounds) {
+  if (!bounds.points.empty()) unbounded_.reset();
+  bounds_.points.insert(bounds_.points.end(), bounds.points.begin(), bounds.points.end());
+  bounds_.lengths.insert(bounds_.lengths.end(), bounds.lengths.begin(), bounds.lengths.end());
 }
 
 PreparedInput Preparation::lay_down() {
   std::optional<SizeField> field;
-  if (!bounded_points_.empty()) field.emplace(bounded_points_, bounded_lengths_, kDetailGradation);
+  if (!bounds_.points.empty()) field.emplace(bounds_.points, bounds_.lengths, kDetailGradation);
   SizedMesh sized = unbounded_ ? *std::exchange(unbounded_, std::nullopt)
                                : refine_for_density(mesh_, sizing_, target_, field ? &*field : nullptr);
   if (sized.sizing.vertices > kMostVertices && given_seeds_ == 0)

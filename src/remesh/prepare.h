@@ -19,6 +19,12 @@ struct PreparedInput {
   bool noisy = false;  // normals are noise, and Energy::automatic means restricted
 };
 
+// Edges at these points must not be longer than these lengths, in the mesh's unit.
+struct SizeBounds {
+  std::vector<Vec3> points;
+  std::vector<double> lengths;
+};
+
 // The input with its borders joined: within `tolerance`, or, without one, at the same point, if that closes borders and
 // makes no edge non-manifold.
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
@@ -29,8 +35,8 @@ class Preparation {
   // Welds and orients the input, finds its features and plans their details. Throws Error as remesh does.
   Preparation(const TriangleMesh& input, const RemeshOptions& options, const Context& context);
 
-  // Edges at these points must not be longer than these lengths.
-  void bound(const std::vector<Vec3>& points, const std::vector<double>& lengths);
+  // Beside the bounds that there are already.
+  void bound(const SizeBounds& bounds);
   // The domain with its density as it stands.
   PreparedInput lay_down();
   const WeldResult& welded() const { return welded_; }
@@ -48,8 +54,7 @@ class Preparation {
   DetailResult detail_;
   bool noisy_ = false;
   std::optional<SizedMesh> unbounded_;  // laid down already, and still good
-  std::vector<Vec3> bounded_points_;
-  std::vector<double> bounded_lengths_;
+  SizeBounds bounds_;
 };
 
 }  // namespace bisector

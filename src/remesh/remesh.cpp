@@ -22,6 +22,7 @@
 #include "remesh/improve.h"
 #include "remesh/prepare.h"
 #include "remesh/sheets.h"
+#include "remesh/slivers.h"
 #include "remesh/topology_control.h"
 #include "voronoi/dual.h"
 #include "voronoi/polygons.h"
@@ -38,8 +39,7 @@ constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0
 constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
 constexpr int kMendingRounds = 3;  // of features and topology
-// Runs that start again with edges shorter by this where cells were no disks; not if more than one cell in so many was.
-constexpr int kAttempts = 1;
+// A run starts again with edges shorter by this where cells are no disks; not if more than one cell in so many is none.
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
 constexpr int kFreedSteps = 20;
@@ -84,11 +84,7 @@ class Pipeline {
   void place();
   // Where cells are still no disks then, and how long edges should be there. Empty if topology is not enforced, or if
   // so many cells fail that the seeds are too few.
-  struct Crowded {
-    std::vector<Vec3> points;
-    std::vector<double> lengths;
-  };
-  Crowded crowded();
+  SizeBounds crowded();
   const RunTotals& totals() const { return run_.totals; }
   // Counts what was done before in vain.
   void count(const RunTotals& totals) { run_.totals = totals; }
@@ -358,8 +354,8 @@ void Pipeline::place() {
   optimise_levels();
 }
 
-Pipeline::Crowded Pipeline::crowded() {
-  Crowded found;
+SizeBounds Pipeline::crowded() {
+  SizeBounds found;
   const MeshTopology& input = result_.input_topology;
   if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !input.manifold || !input.oriented)
     return found;
@@ -429,7 +425,10 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   Compute compute(options.compute, context);
   double preparing = watch.seconds();
   RunTotals totals;
-  for (int attempt = 0;; ++attempt) {
+  // Once for cells that are no disks, and once for slivers, the run starts again with shorter edges there.
+  bool may_shorten = options.seeds.empty() && options.detail != DetailMode::off, may_refine = may_shorten;
+  std::optional<RemeshResult> best;
+  for (;;) {
     const Stopwatch laying_down;
     PreparedInput prepared = preparation.lay_down();
     RemeshPlan plan = plan_of(options);
@@ -441,22 +440,31 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     Pipeline pipeline(*backend, prepared.features, plan, context);
     pipeline.count(totals);
     pipeline.place();
-    if (attempt < kAttempts && options.seeds.empty() && options.detail != DetailMode::off) {
-      const Pipeline::Crowded crowded = pipeline.crowded();
+    if (std::exchange(may_shorten, false)) {
+      const SizeBounds crowded = pipeline.crowded();
       if (!crowded.points.empty()) {
-        preparation.bound(crowded.points, crowded.lengths);
+        preparation.bound(crowded);
         totals = pipeline.totals();
         continue;
       }
     }
     RemeshResult result = pipeline.finish();
-    result.welded = preparation.welded();
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
-    result.seconds.prepare = preparing;
-    result.seconds.total = watch.seconds();
-    return result;
+    const Slivers slivers = find_slivers(result.mesh);
+    if (!best || is_better(result, *best)) best = std::move(result);
+    best->iterations = pipeline.totals().iterations;
+    best->evaluations = pipeline.totals().evaluations;
+    if (std::exchange(may_refine, false) && plan.constrained && plan.min_angle > 0 && slivers.too_many) {
+      preparation.bound(slivers.bounds);
+      totals = pipeline.totals();
+      continue;
+    }
+    best->welded = preparation.welded();
+    best->seconds.prepare = preparing;
+    best->seconds.total = watch.seconds();
+    return *std::move(best);
   }
 }
 

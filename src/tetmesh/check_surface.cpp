@@ -58,7 +58,8 @@ void check_triangles(const TriangleMesh& mesh) {
     if (collinear(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]])) flat.add(fmt::format("{}", i));
   }
   if (flat.any())
-    throw Error("the surface has " + flat.list("triangle without area", "triangles without area") + "; remove them");
+    throw Error("the surface has " + flat.list("triangle without area", "triangles without area") + "; remove them",
+                Reason::no_solid);
 }
 
 void check_edges(const TriangleMesh& mesh, const EdgeTable& table, const std::vector<Index>& original) {
@@ -74,8 +75,9 @@ void check_edges(const TriangleMesh& mesh, const EdgeTable& table, const std::ve
                 Reason::open_surface);
   if (multiple.any())
     throw Error("the surface is not manifold: " +
-                multiple.list("edge has more than two triangles", "edges have more than two triangles") +
-                "; separate the parts that meet there");
+                    multiple.list("edge has more than two triangles", "edges have more than two triangles") +
+                    "; separate the parts that meet there",
+                Reason::no_solid);
   Offenders turned;
   for (std::size_t e = 0; e < table.edges.size(); ++e) {
     const std::size_t a = table.half_edges.begin(e)[0], b = table.half_edges.begin(e)[1];
@@ -84,7 +86,8 @@ void check_edges(const TriangleMesh& mesh, const EdgeTable& table, const std::ve
   }
   if (turned.any())
     throw Error("the surface has one side only: its triangles cannot be oriented alike across " +
-                turned.list("edge", "edges") + "; give the boundary of a solid");
+                    turned.list("edge", "edges") + "; give the boundary of a solid",
+                Reason::no_solid);
 }
 
 void check_vertices(const TriangleMesh& mesh, const std::vector<Index>& original) {
@@ -116,7 +119,8 @@ void check_vertices(const TriangleMesh& mesh, const std::vector<Index>& original
   }
   if (split.any())
     throw Error("the surface is not manifold: it touches itself at " + split.list("vertex", "vertices") +
-                "; separate the parts that meet there");
+                    "; separate the parts that meet there",
+                Reason::no_solid);
 }
 
 void check_intersections(const TriangleMesh& mesh) {
@@ -125,7 +129,8 @@ void check_intersections(const TriangleMesh& mesh) {
   Offenders crossing;
   for (const auto& [a, b] : pairs) crossing.add(fmt::format("{}-{}", a, b));
   throw Error("the surface intersects itself: " + crossing.list("pair of triangles meets", "pairs of triangles meet") +
-              "; mend it there");
+                  "; mend it there",
+              Reason::no_solid);
 }
 
 // How often the ray from `p` towards +x crosses triangles, none of which holds p. `p` is moved by (0, e, e^2) for an

@@ -898,6 +898,40 @@ TEST_F(CliRemesh, NoiseKeepsSeedsOffTheSurface) {
   EXPECT_EQ(remesh("rough.off", constrained)["noisy"], false);
 }
 
+// A ball with a hole and a sheet through it.
+TEST_F(CliRemesh, SoupIsWrapped) {
+  TriangleMesh soup = test::icosphere(3);
+  std::erase_if(soup.triangles, [&](const Triangle& t) { return soup.vertices[t[0]].z > 0.9; });
+  const auto first = static_cast<Index>(soup.vertices.size());
+  soup.vertices.insert(soup.vertices.end(), {{-1.5, -0.3, 0}, {1.5, -0.3, 0}, {0, 0.6, 0.2}});
+  soup.triangles.push_back({first, first + 1, first + 2});
+  soup.labels.assign(soup.triangles.size(), 1);
+  write_mesh(in("soup.ply"), soup);
+  write_mesh(in("ball.ply"), test::icosphere(3));
+  const Json report = remesh("soup.ply", {"-n", "400", "--wrap", "1", "--iterations", "20"});
+  EXPECT_EQ(report["wrap"]["alpha"], 1);
+  EXPECT_GT(report["wrap"]["faces"], 10);
+  EXPECT_EQ(report["topology"]["manifold"], true);
+  EXPECT_EQ(report["topology"]["closed"], true);
+  EXPECT_EQ(report["topology"]["euler"], 2);
+  EXPECT_EQ(report["topology"]["matches_input"], true);
+  EXPECT_EQ(report["quality"]["self_intersections"], 0);
+  EXPECT_NE(report["warnings"].dump().find("labels"), std::string::npos);
+  // Without a radius it follows the edges, and the option may end the line.
+  const Json by_length = remesh("ball.ply", {"--edge-length", "0.3", "--iterations", "5", "--levels", "1", "--wrap"});
+  EXPECT_NEAR(by_length["wrap"]["alpha"].get<double>(), 0.05 * std::sqrt(12), 0.01);
+  const auto refused = [&](int code, std::vector<std::string> more, const std::string& part) {
+    more.insert(more.begin(), {"remesh", in("soup.ply"), "-o", in("out.obj"), "-n", "200"});
+    expect_failure(code, more, part);
+  };
+  for (const char* word : {"0", "-1", "nan", "far"}) refused(2, {"--wrap", word}, "--wrap");
+  expect_failure(1, {"remesh", in("ball.ply"), "-o", in("out.obj"), "-n", "200", "--wrap", "1e-6"}, "at least");
+  refused(2, {"--wrap", "0.1", "--weld", "0.1"}, "--weld");
+  refused(2, {"--wrap", "0.1", "--density", "attribute:rho"}, "--density");
+  write_text("edges.txt", "0 1\n");
+  refused(2, {"--wrap", "0.1", "--feature-file", in("edges.txt")}, "--feature-file");
+}
+
 TEST_F(CliRemesh, ReportHasWhatIsDocumented) {
   write_mesh(in("box.off"), test::box(2));
   const Json report = remesh("box.off", {"-n", "100", "--fit"});
@@ -1263,11 +1297,13 @@ TEST_F(CliTet, BadInputIsOneLine) {
   open.triangles.pop_back();
   write_mesh(in("open.off"), open);
   refused("open.off", {}, "edges have one triangle");
+  refused("open.off", {}, "--wrap");
   TriangleMesh crossing = test::box(1);
   for (const Triangle& t : test::box(1).triangles) crossing.triangles.push_back({t[0] + 8, t[1] + 8, t[2] + 8});
   for (const Vec3& p : test::box(1).vertices) crossing.vertices.push_back(p + Vec3{0.5, 0.25, 0.125});
   write_mesh(in("crossing.off"), crossing);
   refused("crossing.off", {}, "intersects itself");
+  refused("crossing.off", {}, "--wrap");
   write_text("empty.off", "OFF\n0 0 0\n");
   refused("empty.off", {}, "");
   refused("cube.mesh", {"--sizes", in("absent.vtk")}, "absent.vtk");
@@ -1283,6 +1319,18 @@ TEST_F(CliTet, BadInputIsOneLine) {
   }
   write_text("few.xyz", "0.5 0.5 0.5\n");
   expect_failure(1, {"tet", in("cube.mesh"), "-o", in("out.msh"), "--seeds", in("few.xyz")}, "8 seeds");
+}
+
+TEST_F(CliTet, WhatBoundsNoSolidIsWrapped) {
+  TriangleMesh bowl = test::icosphere(3);
+  std::erase_if(bowl.triangles, [&](const Triangle& t) { return bowl.vertices[t[0]].z > 0.8; });
+  write_mesh(in("bowl.off"), bowl);
+  const Json report =
+      report_of({"tet", in("bowl.off"), "-o", in("out.mesh"), "-n", "600", "--wrap=1.5", "--quiet", "--report", "-"});
+  EXPECT_EQ(report["wrap"]["alpha"], 1.5);
+  EXPECT_EQ(report["topology"]["closed"], true);
+  EXPECT_GT(report["quality"]["volume"], 0.7 * 4.18879);
+  EXPECT_GT(report["quality"]["dihedral_min"], 8);
 }
 
 TEST_F(CliTet, WithoutTetgenSaysSo) {

@@ -1,0 +1,60 @@
+#include "remesh/slivers.h"
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+
+#include "core/geometry.h"
+#include "remesh/improve_patch.h"
+
+namespace bisector {
+namespace {
+
+// Degrees below which a triangle is a sliver; one of the second, or more than that share of slivers, is too many.
+constexpr double kSliver = 30, kWorst = 25;
+constexpr double kShare = 1e-3;
+// Edges to be had in a sliver's place, by its height, and at least this part of its own: equilateral triangles have
+// 1.15 times their height as edges.
+constexpr double kPerHeight = 1.15, kLeast = 0.5;
+
+}  // namespace
+
+Slivers find_slivers(const TriangleMesh& mesh) {
+  Slivers found;
+  std::size_t count = 0;
+  const ShapeGoal goal = shape_goal(kSliver, 180);
+  for (const Triangle& t : mesh.triangles) {
+    std::array<Vec3, 3> p;
+    for (int k = 0; k < 3; ++k) p[k] = mesh.vertices[t[k]];
+    const double under = shape_excess(p[0], p[1], p[2], goal).under;
+    if (under <= 0) continue;
+    int features = 0;
+    double longest = 0, perimeter = 0;
+    for (int k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
+      features += std::binary_search(mesh.feature_edges.begin(), mesh.feature_edges.end(), std::array<Index, 2>{a, b});
+      const double length = norm(p[(k + 1) % 3] - p[k]);
+      longest = std::max(longest, length);
+      perimeter += length;
+    }
+    if (features >= 2) continue;
+    ++count;
+    found.too_many |= kSliver - under < kWorst;
+    const double height = longest > 0 ? norm(twice_area_normal(p[0], p[1], p[2])) / longest : 0;
+    for (const Vec3& corner : p) {
+      found.bounds.points.push_back(corner);
+      found.bounds.lengths.push_back(std::max(kPerHeight * height, kLeast * perimeter / 3));
+    }
+  }
+  found.too_many |= static_cast<double>(count) > kShare * static_cast<double>(mesh.triangles.size());
+  return found;
+}
+
+bool is_better(const RemeshResult& result, const RemeshResult& than) {
+  const auto rank = [](const RemeshResult& r) {
+    return std::tuple(!r.topology_matches, r.features.broken, find_slivers(r.mesh).bounds.points.size());
+  };
+  return rank(result) < rank(than);
+}
+
+}  // namespace bisector

@@ -1,0 +1,21 @@
+// Triangles that the edge lengths around them left no room to be good.
+#pragma once
+
+#include "bisector/remesh.h"
+#include "remesh/prepare.h"
+
+namespace bisector {
+
+struct Slivers {
+  SizeBounds bounds;      // for better triangles in their places
+  bool too_many = false;  // for a mesh that anyone would call good
+};
+
+// Of a result with its feature edges. Triangles between two feature edges do not count: what is acute stays so.
+Slivers find_slivers(const TriangleMesh& mesh);
+
+// Whether a run is to be preferred to another on the same input: for its topology, then for the curves it keeps, then
+// for fewer slivers.
+bool is_better(const RemeshResult& result, const RemeshResult& than);
+
+}  // namespace bisector

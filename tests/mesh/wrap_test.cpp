@@ -1,0 +1,99 @@
+// Wraps: closed manifolds around anything that has triangles, near it wherever the ball gets to.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "bisector/error.h"
+#include "bisector/quality.h"
+#include "bisector/repair.h"
+#include "core/geometry.h"
+#include "support/models.h"
+
+namespace bisector::test {
+namespace {
+
+double volume(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (const auto& [a, b, c] : mesh.triangles)
+    sum += dot(mesh.vertices[a], cross(mesh.vertices[b], mesh.vertices[c])) / 6;
+  return sum;
+}
+
+void expect_closed_manifold(const TriangleMesh& mesh, int euler) {
+  const MeshTopology topology = analyse_topology(mesh.triangles, mesh.vertices.size());
+  EXPECT_TRUE(topology.manifold && topology.closed && topology.oriented);
+  EXPECT_EQ(topology.euler, euler);
+  EXPECT_EQ(count_self_intersections(mesh), 0u);
+}
+
+TriangleMesh without_cap(TriangleMesh ball, double height) {
+  std::erase_if(ball.triangles, [&](const Triangle& t) {
+    return ball.vertices[t[0]].z > height && ball.vertices[t[1]].z > height && ball.vertices[t[2]].z > height;
+  });
+  return ball;
+}
+
+TEST(Wrap, OfSolidsLiesJustOutside) {
+  const double alpha = 0.1;
+  for (const TriangleMesh& solid : {icosphere(3), torus(40, 24), box(2)}) {
+    const TriangleMesh wrapped = wrap(solid, alpha);
+    const MeshTopology topology = analyse_topology(solid.triangles, solid.vertices.size());
+    expect_closed_manifold(wrapped, static_cast<int>(topology.euler));
+    EXPECT_GT(volume(wrapped), volume(solid));
+    const DistanceReport distance = measure_distance(wrapped, solid);
+    const double diagonal = bounding_box(solid.vertices).diagonal();
+    EXPECT_LT(0.01 * distance.mean * diagonal, 0.1 * alpha);
+  }
+}
+
+// Sheets that cross, without common vertices, edges of three triangles and triangles without area.
+TEST(Wrap, OfSoupIsASolid) {
+  TriangleMesh mesh = soup(40, 3);
+  mesh.triangles.push_back(mesh.triangles[0]);
+  mesh.triangles.push_back({0, 1, 1});
+  const TriangleMesh wrapped = wrap(mesh, 0.05);
+  const MeshTopology topology = analyse_topology(wrapped.triangles, wrapped.vertices.size());
+  EXPECT_TRUE(topology.manifold && topology.closed && topology.oriented);
+  EXPECT_EQ(count_self_intersections(wrapped), 0u);
+  EXPECT_GT(volume(wrapped), 0);
+}
+
+// The ball passes through a hole of the radius 0.6 or does not.
+TEST(Wrap, ClosesHolesTheBallDoesNotPassThrough) {
+  const TriangleMesh bowl = without_cap(icosphere(4), 0.8);
+  const TriangleMesh closed = wrap(bowl, 1.2), open = wrap(bowl, 0.1);
+  expect_closed_manifold(closed, 2);
+  expect_closed_manifold(open, 2);
+  const double ball = 4.0 / 3 * std::numbers::pi;
+  EXPECT_GT(volume(closed), 0.8 * ball);
+  EXPECT_LT(volume(open), 0.1 * ball);
+}
+
+TEST(Wrap, FillsCavities) {
+  TriangleMesh hollow = icosphere(3);
+  const auto first = static_cast<Index>(hollow.vertices.size());
+  const TriangleMesh inner = hollow;
+  for (const Vec3& p : inner.vertices) hollow.vertices.push_back(0.5 * p);
+  for (const Triangle& t : inner.triangles) hollow.triangles.push_back({t[0] + first, t[2] + first, t[1] + first});
+  expect_closed_manifold(wrap(hollow, 0.1), 2);
+}
+
+TEST(Wrap, ErrorsSayWhatToDo) {
+  TriangleMesh flat;
+  flat.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  flat.triangles = {{0, 1, 2}};
+  EXPECT_THROW(wrap(flat, 0.1), Error);
+  EXPECT_THROW(wrap(TriangleMesh{}, 0.1), Error);
+  for (const double alpha : {0.0, -1.0, 1e-6, std::nan(""), std::numeric_limits<double>::infinity()})
+    EXPECT_THROW(wrap(icosphere(1), alpha), Error);
+  std::atomic<bool> cancel{true};
+  Context context;
+  context.cancel = &cancel;
+  EXPECT_THROW(wrap(icosphere(1), 0.1, context), Cancelled);
+}
+
+}  // namespace
+}  // namespace bisector::test
