@@ -15,7 +15,7 @@ namespace bisector {
 namespace {
 
 // Half of what a gap must grow per length from the corner of its curves to be an angle, and no strip.
-constexpr double kAcute = 0.175;
+constexpr double kAcute = 0.15;
 
 }  // namespace
 

@@ -40,8 +40,9 @@ class CurveNetwork {
 // How far each point of a network is from other curves, or other parts of its own: the distance to the nearest point
 // that is farther along the curves than kDetour times the distance; infinity if that is more than `reach`, one value
 // per point. Curves that part at an angle of more than about 47 degrees (2 asin(1 / kDetour)) are no gap, nor is a
-// circle. Between curves that part at less there is none as far as the way around their corner is shorter than kDetour
-// times the reach: what is acute stays so at any size.
+// circle. Between curves that part at less, but more than about 17 degrees, there is none as far as the way around
+// their corner is shorter than kDetour times the reach: what is acute stays so at any size. What opens more slowly is a
+// strip that ends in a corner.
 inline constexpr double kDetour = 2.5;
 std::vector<double> curve_gaps(const CurveNetwork& network, const std::vector<double>& reach);
 

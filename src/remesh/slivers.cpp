@@ -13,6 +13,8 @@ namespace {
 // Degrees below which a triangle is a sliver; one of the second, or more than that share of slivers, is too many.
 constexpr double kSliver = 30, kWorst = 25;
 constexpr double kShare = 1e-3;
+// Of the triangles; where more are slivers, it is not for the edge lengths.
+constexpr double kHopeless = 0.05;
 // Edges to be had in a sliver's place, by its height, and at least this part of its own: equilateral triangles have
 // 1.15 times their height as edges.
 constexpr double kPerHeight = 1.15, kLeast = 0.5;
@@ -46,7 +48,9 @@ Slivers find_slivers(const TriangleMesh& mesh) {
       found.bounds.lengths.push_back(std::max(kPerHeight * height, kLeast * perimeter / 3));
     }
   }
-  found.too_many |= static_cast<double>(count) > kShare * static_cast<double>(mesh.triangles.size());
+  const double share =
+      static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(mesh.triangles.size(), 1));
+  found.too_many = (found.too_many || share > kShare) && share < kHopeless;
   return found;
 }
 

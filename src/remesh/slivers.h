@@ -8,7 +8,7 @@ namespace bisector {
 
 struct Slivers {
   SizeBounds bounds;      // for better triangles in their places
-  bool too_many = false;  // for a mesh that anyone would call good
+  bool too_many = false;  // for a mesh that anyone would call good, but few enough to be mended
 };
 
 // Of a result with its feature edges. Triangles between two feature edges do not count: what is acute stays so.
