@@ -69,14 +69,19 @@ TEST(CurveGaps, AreNoneAroundACircleOrAtARightAngle) {
     EXPECT_EQ(gap, kInfinity);
 }
 
-// Of the other curve only what is far along it counts near the corner; beyond, the gap grows with the distance.
-TEST(CurveGaps, AtAnAcuteAngleBeginAwayFromTheCorner) {
+// Two straight curves that leave a corner at an angle, in radians.
+CurveNetwork wedge(double angle) {
   Chains corner;
   const Index tip = corner.corner({0, 0, 0});
-  const double angle = 0.2, reach = 0.3;
   corner.curve(tip, corner.corner({2, 0, 0}));
   corner.curve(tip, corner.corner({2 * std::cos(angle), 2 * std::sin(angle), 0}));
-  const CurveNetwork network(FeatureCurves(corner.graph, corner.points), 0.005);
+  return CurveNetwork(FeatureCurves(corner.graph, corner.points), 0.005);
+}
+
+// Of the other curve only what is far along it counts near the corner; beyond, the gap grows with the distance.
+TEST(CurveGaps, AtAnAcuteAngleBeginAwayFromTheCorner) {
+  const double angle = 0.4, reach = 0.3;
+  const CurveNetwork network = wedge(angle);
   const std::vector<double> gaps = gaps_of(network, reach);
   for (Index p = 0; p < gaps.size(); ++p) {
     const double along = norm(network.points()[p]);
@@ -86,6 +91,19 @@ TEST(CurveGaps, AtAnAcuteAngleBeginAwayFromTheCorner) {
       EXPECT_EQ(gaps[p], kInfinity);
     } else if (gap < 0.95 * reach && along < 1.8) {
       EXPECT_NEAR(gaps[p], gap, 0.01);
+    }
+  }
+}
+
+// A strip that ends in a corner is one up to there.
+TEST(CurveGaps, OfAStripReachTheCorner) {
+  const double angle = 0.1, reach = 0.3;
+  const CurveNetwork network = wedge(angle);
+  const std::vector<double> gaps = gaps_of(network, reach);
+  for (Index p = 0; p < gaps.size(); ++p) {
+    const double along = norm(network.points()[p]);
+    if (along > 0 && along < 1.9) {
+      EXPECT_NEAR(gaps[p], along * std::sin(angle), 0.01);
     }
   }
 }
