@@ -3,30 +3,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "bisector/repair.h"
 #include "core/geometry.h"
+#include "remesh/sizing.h"
 
 namespace bisector::cli {
 namespace {
 
-// What is finer than its edges a mesh does not show. The triangles of a soup may lie upon each other, so that no more
-// than the area of the bounding box counts.
+// What is finer than its edges a mesh does not show. The triangles of a soup may lie upon each other, so that their
+// area says little.
 double default_alpha(const TriangleMesh& mesh, std::size_t vertices, double edge_length) {
   constexpr double kFinest = 1.0 / 500, kCoarsest = 1.0 / 20;  // in diagonals of the bounding box
-  const Box box = bounding_box(mesh.vertices);
-  const Vec3 side = box.hi - box.lo;
-  double area = 0;
-  for (const auto& [a, b, c] : mesh.triangles)
-    area += 0.5 * norm(twice_area_normal(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]));
-  area = std::min(area, 2 * (side.x * side.y + side.y * side.z + side.z * side.x));
-  const double length =
-      edge_length > 0 ? edge_length : std::sqrt(2 / std::numbers::sqrt3 * area / static_cast<double>(vertices));
-  return std::clamp(length, kFinest * box.diagonal(), kCoarsest * box.diagonal());
+  const double diagonal = bounding_box(mesh.vertices).diagonal();
+  const SizingTarget target{edge_length > 0 ? 0 : vertices, edge_length};
+  return std::clamp(compute_sizing(mesh, {}, target).unit_edge, kFinest * diagonal, kCoarsest * diagonal);
 }
 
 }  // namespace

@@ -233,9 +233,10 @@ void add_wrap(CLI::App* app, WrapOption& wrap) {
          [&wrap](const std::string& word) {
            wrap.on = true;
            if (word.empty()) return;
-           if (const std::string error = number_above_zero()(word); !error.empty())
+           const std::optional<double> alpha = number_in<double>(word);
+           if (!alpha || !(*alpha > 0 && std::isfinite(*alpha)))
              throw CLI::ValidationError("--wrap: '" + word + "' is no number above 0; put files before the option");
-           wrap.alpha = std::stod(word);
+           wrap.alpha = *alpha;
          },
          "first make a closed manifold around whatever triangles\n"
          "there are, as a ball of the radius ALPHA sees them from\n"

@@ -139,6 +139,8 @@ RemeshOptions remesh_options(const RemeshCommand& command, const TriangleMesh& i
   if (command.edge_length_relative > 0)
     options.edge_length = command.edge_length_relative * bounding_box(input.vertices).diagonal();
   if (command.weld >= 0) options.weld = command.weld;
+  // Folds of a wrap are those of its own triangles.
+  if (command.wrap.on && options.features.mode == FeatureMode::automatic) options.features.mode = FeatureMode::none;
   options.threads = command.common.threads;
   if (!command.seeds.empty()) {
     options.seeds = read_seeds(command.seeds, options.vertices);
@@ -358,14 +360,7 @@ Command add_remesh(CLI::App& program) {
       "  bisector remesh part.stl -o out.ply --edge-length 0.5 --features 30\n\n"
       "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written.");
   add_options(app, *command);
-  return {app,
-          [=] {
-            const Usage usage(*app);
-            check_usage(*command, usage);
-            // Folds of a wrap are those of its own triangles.
-            if (usage.given("--wrap") && !usage.given("--features")) command->options.features.mode = FeatureMode::none;
-          },
-          [=] { run(*command); }};
+  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

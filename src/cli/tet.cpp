@@ -121,10 +121,8 @@ void check_usage(const TetCommand& command, const Usage& usage) {
 
 struct Input {
   bool solid = false;
-  TriangleMesh surface;
+  TriangleMesh surface;  // of a solid its boundary, with all of its vertices
   TetMesh tets;
-
-  const std::vector<Vec3>& vertices() const { return solid ? tets.vertices : surface.vertices; }
 };
 
 Input read_input(const std::string& path, const Context& context) {
@@ -132,7 +130,12 @@ Input read_input(const std::string& path, const Context& context) {
   if (is_tet_format(path)) {
     input.tets = read_tet_mesh(path, context);
     input.solid = !input.tets.tets.empty();
-    if (!input.solid) input.surface = surface_of_marks(input.tets);
+    if (input.solid) {
+      input.surface.vertices = input.tets.vertices;
+      input.surface.triangles = boundary_facets(input.tets.tets);
+    } else {
+      input.surface = surface_of_marks(input.tets);
+    }
   } else {
     input.surface = read_mesh(path, context);
   }
@@ -142,7 +145,7 @@ Input read_input(const std::string& path, const Context& context) {
 Json input_json(const Input& input) {
   if (!input.solid) return cli::input_json(input.surface);
   return {{"vertices", input.tets.vertices.size()},
-          {"faces", boundary_facets(input.tets.tets).size()},
+          {"faces", input.surface.triangles.size()},
           {"tets", input.tets.tets.size()}};
 }
 
@@ -160,15 +163,6 @@ SizeSamples read_sizes(const std::string& word) {
   return {mesh.vertices, read_tet_attribute(path, name), mesh.tets};
 }
 
-TriangleMesh surface_of(const Input& input) {
-  TriangleMesh surface = input.surface;
-  if (input.solid) {
-    surface.vertices = input.tets.vertices;
-    surface.triangles = boundary_facets(input.tets.tets);
-  }
-  return surface;
-}
-
 TetOptions tet_options(const TetCommand& command, const Input& input) {
   TetOptions options = command.options;
   if (!command.attribute.empty())
@@ -176,11 +170,12 @@ TetOptions tet_options(const TetCommand& command, const Input& input) {
                                          ? read_tet_attribute(command.input, command.attribute)
                                          : read_vertex_attribute(command.input, command.attribute);
   if (!command.sizes.empty()) options.sizing.sizes = read_sizes(command.sizes);
-  if (!command.feature_file.empty())
-    options.features.given = read_feature_edges(command.feature_file, surface_of(input));
+  if (!command.feature_file.empty()) options.features.given = read_feature_edges(command.feature_file, input.surface);
   if (command.edge_length_relative > 0)
-    options.edge_length = command.edge_length_relative * bounding_box(input.vertices()).diagonal();
+    options.edge_length = command.edge_length_relative * bounding_box(input.surface.vertices).diagonal();
   if (command.weld >= 0) options.weld = command.weld;
+  // Folds of a wrap are those of its own triangles.
+  if (command.wrap.on && options.features.mode == FeatureMode::automatic) options.features.mode = FeatureMode::none;
   options.threads = command.common.threads;
   if (!command.seeds.empty()) {
     options.seeds = read_seeds(command.seeds, options.vertices);
@@ -222,7 +217,7 @@ Json improved_json(const TetImproveReport& improved) {
 }
 
 Json tet_report(Console& console, const TetCommand& command, const TetResult& result, const Measures& measures,
-                const Input& input, const TriangleMesh& reference, const Json& wrapped) {
+                const Input& input, const Json& wrapped) {
   Json report = start_report("tet");
   report["device"] = device_json(result.device);
   report["input"] = input_json(input);
@@ -238,7 +233,7 @@ Json tet_report(Console& console, const TetCommand& command, const TetResult& re
   report["quality"] = quality_json(measures.boundary);
   add_tets(report["quality"], measures.tets);
   console.phase("measuring the distance of the boundary to the input");
-  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), reference));
+  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), input.surface));
   report["quality"]["volume_input"] = result.volume;
   report["topology"] = topology_json(measures.topology.boundary);
   add_tets(report["topology"], measures.topology);
@@ -335,8 +330,7 @@ void run(const TetCommand& command) {
   const TetOptions options = tet_options(command, input);
   double io = reading.seconds();
   TriangleMesh wrap;
-  const Json wrapped =
-      wrap_if_asked(command.wrap, surface_of(input), options.vertices, options.edge_length, console, wrap);
+  const Json wrapped = wrap_if_asked(command.wrap, input.surface, options.vertices, options.edge_length, console, wrap);
 
   const TetResult result = !wrapped.is_null() ? tetrahedralise(wrap, options, context)
                            : input.solid      ? tetrahedralise(input.tets, options, context)
@@ -352,7 +346,7 @@ void run(const TetCommand& command) {
   measures.topology = analyse_tet_topology(result.mesh);
   warn_of(console, command, result, measures);
   Json report;
-  if (!report_path.empty()) report = tet_report(console, command, result, measures, input, surface_of(input), wrapped);
+  if (!report_path.empty()) report = tet_report(console, command, result, measures, input, wrapped);
   Json seconds = tet_seconds(result.seconds);
   seconds["quality"] = measuring.seconds();
 
@@ -388,14 +382,7 @@ Command add_tet(CLI::App& program) {
                               ".vtk, .vtu). Ctrl-C stops the run;\n"
                               "nothing is written.");
   add_options(app, *command);
-  return {app,
-          [=] {
-            const Usage usage(*app);
-            check_usage(*command, usage);
-            // Folds of a wrap are those of its own triangles.
-            if (usage.given("--wrap") && !usage.given("--features")) command->options.features.mode = FeatureMode::none;
-          },
-          [=] { run(*command); }};
+  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

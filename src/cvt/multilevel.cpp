@@ -10,6 +10,7 @@
 #include "mesh/sampling.h"
 #include "mesh/topology.h"
 #include "voronoi/dual.h"
+#include "voronoi/polygons.h"
 
 namespace bisector {
 namespace {
@@ -73,19 +74,37 @@ std::vector<std::size_t> level_counts(std::size_t count, long long euler, std::s
 
 namespace {
 
+// Of each edge the square of its length over the length that edges have there, but for a factor: rho^(-1/4), rho being
+// the mean density of the two cells.
+std::vector<double> relative_squared_lengths(const Diagram& diagram, const std::vector<Vec3>& seeds,
+                                             const std::vector<DualEdge>& edges) {
+  const RestrictedPolygons& polygons = diagram.polygons;
+  std::vector<double> area(seeds.size(), 0), squared(edges.size());
+  for (std::size_t p = 0; p < polygons.pairs.size(); ++p) area[polygons.pairs[p].cell] += polygon_area(polygons, p);
+  const std::vector<Moments>& cells = diagram.moments.cells;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const auto [a, b] = std::pair(edges[k].a, edges[k].b);
+    const double areas = area[a] + area[b], density = areas > 0 ? (cells[a].mass + cells[b].mass) / areas : 1;
+    squared[k] = norm2(seeds[a] - seeds[b]) * std::sqrt(density);
+  }
+  return squared;
+}
+
 // The midpoints of the dual edges, as many as there is room for; where edges are too few, also points of cells of high
 // energy.
-void add_midpoints(const Diagram& diagram, const PlacedSeeds& coarse, std::vector<DualEdge> edges, std::size_t count,
-                   PlacedSeeds& finer) {
+void add_midpoints(const Diagram& diagram, const PlacedSeeds& coarse, const std::vector<DualEdge>& edges,
+                   std::size_t count, PlacedSeeds& finer) {
   const std::vector<Vec3>& seeds = coarse.positions();
   const std::size_t room = count > finer.size() ? count - finer.size() : 0;
+  std::vector<std::size_t> order(edges.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
   if (edges.size() > room) {
-    std::stable_sort(edges.begin(), edges.end(), [&](const DualEdge& e, const DualEdge& f) {
-      return norm2(seeds[e.a] - seeds[e.b]) > norm2(seeds[f.a] - seeds[f.b]);
-    });
-    edges.resize(room);
+    const std::vector<double> squared = relative_squared_lengths(diagram, seeds, edges);
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return squared[a] > squared[b]; });
+    order.resize(room);
   }
-  for (const DualEdge& edge : edges) {
+  for (const std::size_t k : order) {
+    const DualEdge& edge = edges[k];
     const Vec3 a = seeds[edge.a], b = seeds[edge.b], middle = 0.5 * (a + b);
     // On a smooth surface the middle is the better start; where the edge crosses elsewhere, it may be off the sheet.
     const bool near = norm2(middle - edge.crossing) < kNearMiddle * kNearMiddle * norm2(b - a);
@@ -106,7 +125,7 @@ PlacedSeeds refine(const Diagram& diagram, const PlacedSeeds& coarse, const Feat
   std::erase_if(edges, [&](const DualEdge& e) {
     return std::binary_search(along.begin(), along.end(), std::array<Index, 2>{e.a, e.b});
   });
-  add_midpoints(diagram, coarse, std::move(edges), count, finer);
+  add_midpoints(diagram, coarse, edges, count, finer);
   return finer;
 }
 
@@ -184,11 +203,9 @@ void set_count(const Diagram& diagram, std::size_t count, PlacedSeeds& seeds) {
   if (seeds.size() < count) seeds.add(insertion_points(diagram, seeds, count - seeds.size()));
   if (seeds.size() <= count) return;
   const std::vector<DualEdge> edges = extract_dual_edges(diagram.polygons, seeds.positions());
-  std::vector<double> squared(edges.size());
+  const std::vector<double> squared = relative_squared_lengths(diagram, seeds.positions(), edges);
   std::vector<std::size_t> order(edges.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  for (std::size_t k = 0; k < edges.size(); ++k)
-    squared[k] = norm2(seeds.position(edges[k].a) - seeds.position(edges[k].b));
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return squared[a] < squared[b]; });
   std::vector<char> removed(seeds.size(), 0);
   std::size_t left = seeds.size();

@@ -16,6 +16,14 @@ void add_dual(Diagram& diagram) {
 
 }  // namespace
 
+RunTotals& operator+=(RunTotals& a, const RunTotals& b) {
+  a.iterations += b.iterations;
+  a.evaluations += b.evaluations;
+  a.seconds += b.seconds;
+  a.seconds_lbfgs += b.seconds_lbfgs;
+  return a;
+}
+
 void CvtRun::localise(bool on) {
   if (localised_ == on) return;
   localised_ = on;

@@ -19,6 +19,8 @@ struct RunTotals {
   double seconds_lbfgs = 0;  // of the optimiser outside the diagrams
 };
 
+RunTotals& operator+=(RunTotals& a, const RunTotals& b);
+
 // A diagram, how it came about, and the positions it is of.
 struct DiagramOfSeeds {
   Diagram diagram;
@@ -73,12 +75,12 @@ class CvtRun {
   friend class Descent;
   friend struct CvtGradient complete(CvtRun& run, bool constrained);
 
-  Backend* backend_;
-  const FeatureCurves& curves_;
-  const Context& context_;
   Localiser& localiser();
   void leave_out_strays(DiagramOfSeeds& known);
 
+  Backend* backend_;
+  const FeatureCurves& curves_;
+  const Context& context_;
   DiagramOfSeeds diagram_;
   bool localised_ = false;
   std::unique_ptr<Localiser> localiser_;  // of the surface, once there was need of it

@@ -14,7 +14,8 @@ namespace bisector {
 
 namespace {
 
-// Half of what a gap must grow per length from the corner of its curves to be an angle, and no strip.
+// Half of what a gap must grow per length from the corner of its curves to be an angle, and no strip: a little less
+// than edges may grow away from a strip (kDetailGradation), so that sizes follow every strip up to its corner.
 constexpr double kAcute = 0.15;
 
 }  // namespace

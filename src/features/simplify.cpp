@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <unordered_map>
 #include <utility>
 
@@ -27,6 +28,8 @@ constexpr double kBeside = 0.5;
 constexpr double kLoopEdges = 4;
 // A curve that comes back to its corner is one if it is longer than so many widths.
 constexpr double kLoopWidths = 3;
+// What two curves may share at a corner, in widths: edges are at least twice as long.
+constexpr double kShared = 0.25;
 // Two curves at a corner where no other ends are one if they turn by less than this, in radians.
 constexpr double kStraight = 50 * kRadiansPerDegree;
 
@@ -293,6 +296,95 @@ class Kept {
   std::map<Index, std::vector<Index>> at_;  // candidates that stay and end at a corner
 };
 
+// Arc lengths from the start of a chain to each of its vertices.
+std::vector<double> arc_lengths(const std::vector<Index>& chain, const std::vector<Vec3>& vertices) {
+  std::vector<double> at(chain.size(), 0);
+  for (std::size_t k = 1; k < chain.size(); ++k) at[k] = at[k - 1] + norm(vertices[chain[k]] - vertices[chain[k - 1]]);
+  return at;
+}
+
+// Divides a chain at some of its vertices.
+std::vector<std::vector<Index>> divided(const std::vector<Index>& chain, const std::vector<std::size_t>& at) {
+  std::vector<std::vector<Index>> parts;
+  std::size_t begin = 0;
+  const auto end_at = [&](std::size_t k) {
+    parts.emplace_back(chain.begin() + static_cast<std::ptrdiff_t>(begin),
+                       chain.begin() + static_cast<std::ptrdiff_t>(k + 1));
+    begin = k;
+  };
+  for (const std::size_t k : at) end_at(k);
+  end_at(chain.size() - 1);
+  return parts;
+}
+
+// Ways to the same corner may run along the same edges. Where that is more than the corner's cell can hold, the edges
+// are left to the first curve, and the others end where they meet it, which becomes a corner.
+std::vector<FeatureCurve> without_overlaps(const std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices,
+                                           double width) {
+  const double limit = kShared * width;
+  std::set<std::array<Index, 2>> taken;
+  std::vector<FeatureCurve> own;
+  for (const FeatureCurve& curve : curves) {
+    std::vector<Index> chain = curve.vertices;
+    if (curve.closed) chain.push_back(chain.front());
+    const std::vector<double> at = arc_lengths(chain, vertices);
+    // Divided where stretches that others have begin and end; these are then left out.
+    std::vector<std::size_t> cuts;
+    std::vector<char> is_others{0};
+    for (std::size_t k = 1; k < chain.size(); ++k) {
+      const auto [a, b] = std::minmax(chain[k - 1], chain[k]);
+      const bool others = !taken.insert({a, b}).second;
+      if (k == 1) is_others[0] = others;
+      else if (others != static_cast<bool>(is_others.back())) {
+        cuts.push_back(k - 1);
+        is_others.push_back(others);
+      }
+    }
+    if (!curve.closed && !cuts.empty() && is_others.back() && at.back() - at[cuts.back()] <= limit) {
+      cuts.pop_back();
+      is_others.pop_back();
+    }
+    if (!curve.closed && !cuts.empty() && is_others.front() && at[cuts.front()] <= limit) {
+      cuts.erase(cuts.begin());
+      is_others.erase(is_others.begin());
+    }
+    if (cuts.empty()) {
+      if (!is_others[0]) own.push_back(curve);
+      continue;
+    }
+    const std::vector<std::vector<Index>> parts = divided(chain, cuts);
+    for (std::size_t k = 0; k < parts.size(); ++k)
+      if (!is_others[k]) own.push_back({parts[k], false, curve.kind});
+  }
+
+  std::map<Index, std::size_t> uses;
+  std::set<Index> ends;
+  for (const FeatureCurve& curve : own) {
+    for (const Index v : curve.vertices) ++uses[v];
+    if (!curve.closed) ends.insert({curve.vertices.front(), curve.vertices.back()});
+  }
+  std::vector<FeatureCurve> separate;
+  for (FeatureCurve& curve : own) {
+    std::vector<Index> chain = std::move(curve.vertices);
+    const auto meets = [&](Index v) { return uses[v] > 1 || (curve.closed && ends.contains(v)); };
+    if (curve.closed) {
+      const auto first = std::find_if(chain.begin(), chain.end(), meets);
+      if (first == chain.end()) {
+        separate.push_back({std::move(chain), true, curve.kind});
+        continue;
+      }
+      std::rotate(chain.begin(), first, chain.end());
+      chain.push_back(chain.front());
+    }
+    const std::vector<double> at = arc_lengths(chain, vertices);
+    std::vector<std::size_t> cuts;
+    for (std::size_t k = 1; k + 1 < chain.size(); ++k)
+      if (meets(chain[k]) && at[k] > limit && at.back() - at[k] > limit) cuts.push_back(k);
+    for (std::vector<Index>& part : divided(chain, cuts)) separate.push_back({std::move(part), false, curve.kind});
+  }
+  return separate;
+}
+
 // The direction in which a curve leaves the corner at one of its ends, over a length of about `width`.
 Vec3 leaving(const FeatureCurve& curve, bool from_start, const std::vector<Vec3>& vertices, double width) {
   const std::size_t count = curve.vertices.size();
@@ -305,7 +397,7 @@ Vec3 leaving(const FeatureCurve& curve, bool from_start, const std::vector<Vec3>
   return at(count - 1) - at(0);
 }
 
-// Joins curves where just two end and they run on.
+// Joins curves where just two end, and they run on or one of them is shorter than the width.
 void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices, double width) {
   std::map<Index, std::vector<std::size_t>> at;
   for (std::size_t c = 0; c < curves.size(); ++c)
@@ -317,8 +409,10 @@ void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& v
     std::size_t a = ends[0], b = ends[1];
     if (a == b || curves[a].kind != curves[b].kind) continue;
     const bool a_starts = curves[a].vertices.front() == corner, b_starts = curves[b].vertices.front() == corner;
+    const auto is_short = [&](std::size_t c) { return length_of(curves[c].vertices, false, vertices) < width; };
     const Vec3 u = leaving(curves[a], a_starts, vertices, width), v = leaving(curves[b], b_starts, vertices, width);
-    if (-dot(u, v) < std::cos(kStraight) * norm(u) * norm(v)) continue;
+    const bool straight = -dot(u, v) >= std::cos(kStraight) * norm(u) * norm(v);
+    if (!straight && !is_short(a) && !is_short(b)) continue;
     std::vector<Index> first = curves[a].vertices, second = curves[b].vertices;
     if (a_starts) first = reversed_vertices(std::move(first));
     if (!b_starts) second = reversed_vertices(std::move(second));
@@ -429,6 +523,7 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   for (Index k = 0; k < graph.corners.size(); ++k)
     if (!on_curve[k] && !kept.is_near(vertices[graph.corners[k]])) result.graph.corners.push_back(graph.corners[k]);
 
+  left = without_overlaps(left, vertices, width);
   join_straight(left, vertices, width);
   for (const FeatureCurve& curve : left)
     if (!curve.closed)

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "cvt/multilevel.h"
+#include "cvt/optimise_around.h"
 #include "voronoi/dual.h"
 
 namespace bisector {
@@ -31,6 +32,8 @@ constexpr double kRoomToSnap = 0.4, kSmallest = 0.05, kTiniest = 0.002, kShortLi
 // seeds are at least kLeastStep edges apart, and so many at most.
 constexpr double kAcute = 0.8, kLeastStep = 0.3;
 constexpr std::size_t kMostShells = 1000;
+// Of the stretch of a curve in a corner's cell: how near the curve passes the corner then.
+constexpr double kPassing = 0.2;
 // A cell that holds less is pushed away from the curve by this share of its seed's distance.
 constexpr double kPush = 0.3;
 
@@ -59,6 +62,16 @@ std::map<std::array<Index, 2>, Index> dual_edge_counts(const Dual& dual, const s
   return counts;
 }
 
+// Whether a curve passes the corner of others so closely that the corner's seed may stand on it: two seeds as near to
+// each other as that would make slivers.
+bool passes_corner(const FeatureCurves& curves, const CurveInterval& interval, Index curve, const SeedPlace& place) {
+  if (place.corner == kNone) return false;
+  const Vec3 corner = curves.corner(place.corner);
+  const double length = interval.to - interval.from, middle = curves.wrap(curve, 0.5 * (interval.from + interval.to));
+  const Vec3 nearest = curves.point(curve, curves.nearest(curve, corner, middle, length));
+  return norm(nearest - corner) <= kPassing * length;
+}
+
 Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
                   const Diagram& diagram) {
   const std::vector<std::vector<CurveInterval>> traces = trace.trace(diagram.polygons);
@@ -66,6 +79,10 @@ Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const 
   Found found;
   std::map<std::array<Index, 2>, Index> taken;  // the curve that has an edge of the dual
   std::vector<Index> visits(places.size(), 0);
+  const auto has_link = [&](Index a, Index b, Index curve) {
+    const auto in_dual = dual_edges.find({std::min(a, b), std::max(a, b)});
+    return in_dual != dual_edges.end() && in_dual->second >= trace.sheets(curve);
+  };
   for (Index c = 0; c < traces.size(); ++c) {
     const std::vector<CurveInterval>& intervals = traces[c];
     const std::size_t before = found.faults.size(), count = intervals.size();
@@ -79,7 +96,10 @@ Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const 
       const bool corner =
           !closed && place.corner != kNone &&
           ((k == 0 && place.corner == curves.ends(c)[0]) || (k + 1 == count && place.corner == curves.ends(c)[1]));
-      valid[k] = own || corner;
+      // The corner of another part of the surface is no vertex of this one.
+      const bool joined = k > 0 && k + 1 < count && has_link(intervals[k - 1].cell, i.cell, c) &&
+                          has_link(i.cell, intervals[k + 1].cell, c);
+      valid[k] = own || corner || (joined && passes_corner(curves, i, c, place));
       if (!valid[k]) {
         found.faults.push_back({c, i.from, i.to, i.cell});
         continue;
@@ -95,8 +115,7 @@ Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const 
       if (i.cell == j.cell || !valid[k] || !valid[(k + 1) % count]) continue;
       const std::array<Index, 2> edge{std::min(i.cell, j.cell), std::max(i.cell, j.cell)};
       found.report.edges.push_back(edge);
-      const auto in_dual = dual_edges.find(edge);
-      const bool missing = in_dual == dual_edges.end() || in_dual->second < trace.sheets(c);
+      const bool missing = !has_link(i.cell, j.cell, c);
       const auto [other, fresh] = taken.insert({edge, c});
       if (!missing && fresh) continue;
       const auto middle = [](const CurveInterval& x) { return 0.5 * (x.from + x.to); };
@@ -137,16 +156,17 @@ double position_at_radius(const FeatureCurves& curves, Index curve, int end, dou
   return end == 0 ? curves.length(curve) : 0;
 }
 
-// Where on the curve to meet a foreign seed: as far from the corner they share as that seed, else across from it; in
-// the middle of the fault where that is elsewhere.
+// Where on the curve to meet a seed of other features: as far from the corner they share as that seed, else across from
+// it; in the middle of the fault where that is elsewhere.
 double meeting_position(const FeatureCurves& curves, const PlacedSeeds& seeds, const Fault& fault) {
   const double middle = 0.5 * (fault.from + fault.to), length = fault.to - fault.from;
-  if (fault.cell == kNone || seeds.place(fault.cell).curve == kNone) return middle;
+  if (fault.cell == kNone || seeds.on_surface(fault.cell)) return middle;
   const Index foreign = seeds.place(fault.cell).curve;
   double position = middle, nearest = std::numeric_limits<double>::infinity();
   for (int end : {0, 1}) {
     const Index corner = curves.ends(fault.curve)[end];
-    if (corner == kNone || (corner != curves.ends(foreign)[0] && corner != curves.ends(foreign)[1])) continue;
+    if (foreign == kNone || corner == kNone || (corner != curves.ends(foreign)[0] && corner != curves.ends(foreign)[1]))
+      continue;
     const double radius = norm(seeds.position(fault.cell) - curves.corner(corner));
     if (radius > nearest) continue;
     nearest = radius;
@@ -323,10 +343,10 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
     }
     if (fault.cell == kNone && meeting && last) continue;
     // Where curves cross another sheet no seed helps.
-    const double least = last ? kTiniest : fault.cell == kNone ? kShortLink : kSmallest;
+    const bool meets = fault.cell != kNone;
+    const double least = last ? kTiniest : meets ? kSmallest : kShortLink;
     if (length < least * measure.edge_length(fault.curve, position, c)) continue;
     changed = true;
-    const bool meets = fault.cell != kNone;
     if (meets) seeds.edit_places()[fault.cell].kind = Kind::fixed;
     seeds.add(Vec3{});
     removed.push_back(0);
@@ -353,16 +373,19 @@ void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& 
   const std::size_t count = seeds.size();
   options.iterations = kClearingSteps;
   for (int round = 0; round < kClearingRounds; ++round) {
-    std::vector<char> removed(seeds.size(), 0);
-    for (const std::vector<CurveInterval>& intervals : trace.trace(run.diagram(Want::polygons).polygons))
-      for (const CurveInterval& i : intervals)
-        if (seeds.on_surface(i.cell)) removed[i.cell] = 1;
+    const SeedsBefore before = seeds_before(run);
+    const std::vector<std::vector<CurveInterval>> traces = trace.trace(run.diagram(Want::polygons).polygons);
+    std::vector<char> removed(seeds.size(), 0), crossed(curves.size(), 0);
+    for (Index c = 0; c < traces.size(); ++c)
+      for (const CurveInterval& i : traces[c])
+        if (seeds.on_surface(i.cell)) removed[i.cell] = crossed[c] = 1;
     seeds.remove(removed);
-    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
-    for (Index c = 0; c < on.size(); ++c) space_evenly(curves, measure, c, on[c], seeds);
     if (seeds.size() == count) return;
+    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
+    for (Index c = 0; c < curves.size(); ++c)
+      if (crossed[c]) space_evenly(curves, measure, c, on[c], seeds);
     set_count(run.diagram(Want::polygons), count, seeds);
-    optimise(run, options);
+    optimise_around(run, before, options);
   }
 }
 
@@ -383,14 +406,20 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
       best = run.seeds;
     }
     const bool last = round >= kMovingRounds;
-    if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most ||
-        !mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, run.seeds))
-      break;
+    const SeedsBefore before = seeds_before(run);
+    if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most) break;
+    const bool changed = mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, run.seeds);
+    if (last && !changed) break;
     if (last) continue;
+    if (!changed) {
+      // What is left is too small for all but the last rounds.
+      round = kMovingRounds - 1;
+      continue;
+    }
     if (run.seeds.size() != count) set_count(run.diagram(Want::polygons), count, run.seeds);
     options.phase = "features, round " + std::to_string(round + 1);
     options.iterations = kFirstSteps + (kLastSteps - kFirstSteps) * round / (kMovingRounds - 1);
-    optimise(run, options);
+    optimise_around(run, before, options);
   }
   // Sheets that intersect, or curves that cross another sheet, cannot all be had.
   run.seeds = std::move(best);

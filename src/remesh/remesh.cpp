@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "bisector/error.h"
@@ -68,6 +69,12 @@ void check_options(const RemeshOptions& options) {
   if (options.edge_length == 0 || !options.seeds.empty()) check_plan(plan_of(options));
 }
 
+// What runs took.
+struct Spent {
+  RunTotals totals;
+  RemeshSeconds seconds;
+};
+
 // Seeds level by level, coarse to fine, those on features moving along them from the first; then what makes a good mesh
 // of their dual.
 class Pipeline {
@@ -85,9 +92,12 @@ class Pipeline {
   // Where cells are still no disks then, and how long edges should be there. Empty if topology is not enforced, or if
   // so many cells fail that the seeds are too few.
   SizeBounds crowded();
-  const RunTotals& totals() const { return run_.totals; }
-  // Counts what was done before in vain.
-  void count(const RunTotals& totals) { run_.totals = totals; }
+  Spent spent() const { return {run_.totals, result_.seconds}; }
+  // Counts what earlier runs took.
+  void count(const Spent& before) {
+    run_.totals = before.totals;
+    result_.seconds = before.seconds;
+  }
   // Mends and improves what place() left.
   RemeshResult finish();
 
@@ -184,8 +194,9 @@ void Pipeline::optimise_levels() {
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
     optimise(run_, step_);
-    if (may_localise && run_.strays() > 0) {
-      run_.localise(true);
+    if (may_localise) run_.localise(true);
+    if (may_localise && run_.strays() == 0) run_.localise(false);
+    if (run_.localises()) {
       step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
       optimise(run_, step_);
     }
@@ -289,7 +300,7 @@ void Pipeline::improve_quality() {
     complete(run_, plan_.constrained);
     result_.improved = {};
   }
-  result_.seconds.improve = watch.seconds();
+  result_.seconds.improve += watch.seconds();
 }
 
 void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
@@ -344,7 +355,7 @@ void Pipeline::fit() {
   fit.min_angle = std::min(quality.theta_min, plan_.min_angle);
   fit.min_quality = std::min(quality.q_min, kFitQuality);
   result_.fitted = fit_to_surface(surface_.mesh, result_.mesh, fit, run_.context());
-  result_.seconds.fit = watch.seconds();
+  result_.seconds.fit += watch.seconds();
 }
 
 void Pipeline::place() {
@@ -399,6 +410,29 @@ RemeshResult Pipeline::finish() {
   return std::move(result_);
 }
 
+// A context for runs one after the other, whose progress never goes back.
+class RunProgress {
+ public:
+  explicit RunProgress(const Context& context) : context_(context) {
+    if (context.progress)
+      context_.progress = [this, tell = context.progress](Progress p) {
+        p.phase = run_ + p.phase;
+        p.fraction = fraction_ = std::max(fraction_, p.fraction);
+        tell(p);
+      };
+  }
+  RunProgress(const RunProgress&) = delete;
+  RunProgress& operator=(const RunProgress&) = delete;
+
+  const Context& context() const { return context_; }
+  void start_again(const char* why) { run_ = std::string(why) + ", "; }
+
+ private:
+  Context context_;
+  std::string run_;
+  double fraction_ = 0;
+};
+
 }  // namespace
 
 RemeshPlan plan_of(const RemeshOptions& options) {
@@ -424,9 +458,10 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   Preparation preparation(input, options, context);
   Compute compute(options.compute, context);
   double preparing = watch.seconds();
-  RunTotals totals;
   // Once for cells that are no disks, and once for slivers, the run starts again with shorter edges there.
   bool may_shorten = options.seeds.empty() && options.detail != DetailMode::off, may_refine = may_shorten;
+  Spent before;
+  RunProgress progress(context);
   std::optional<RemeshResult> best;
   for (;;) {
     const Stopwatch laying_down;
@@ -437,14 +472,15 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     const Surface surface(std::move(prepared.mesh), prepared.density);
     preparing += laying_down.seconds();
     const std::unique_ptr<Backend> backend = compute.backend(surface);
-    Pipeline pipeline(*backend, prepared.features, plan, context);
-    pipeline.count(totals);
+    Pipeline pipeline(*backend, prepared.features, plan, progress.context());
+    pipeline.count(before);
     pipeline.place();
     if (std::exchange(may_shorten, false)) {
       const SizeBounds crowded = pipeline.crowded();
       if (!crowded.points.empty()) {
         preparation.bound(crowded);
-        totals = pipeline.totals();
+        before = pipeline.spent();
+        progress.start_again("shorter edges for topology");
         continue;
       }
     }
@@ -452,18 +488,20 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
+    before = {pipeline.spent().totals, result.seconds};
     const Slivers slivers = find_slivers(result.mesh);
     if (!best || is_better(result, *best)) best = std::move(result);
-    best->iterations = pipeline.totals().iterations;
-    best->evaluations = pipeline.totals().evaluations;
-    if (std::exchange(may_refine, false) && plan.constrained && plan.min_angle > 0 && slivers.too_many) {
+    if (std::exchange(may_refine, false) && plan.constrained && plan.min_angle > 0 && slivers.worth_another_run) {
       preparation.bound(slivers.bounds);
-      totals = pipeline.totals();
+      progress.start_again("shorter edges for angles");
       continue;
     }
-    best->welded = preparation.welded();
+    best->iterations = before.totals.iterations;
+    best->evaluations = before.totals.evaluations;
+    best->seconds = before.seconds;
     best->seconds.prepare = preparing;
     best->seconds.total = watch.seconds();
+    best->welded = preparation.welded();
     return *std::move(best);
   }
 }

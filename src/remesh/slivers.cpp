@@ -10,10 +10,10 @@
 namespace bisector {
 namespace {
 
-// Degrees below which a triangle is a sliver; one of the second, or more than that share of slivers, is too many.
+// Degrees below which a triangle is a sliver; one below the second, or more than that share of slivers, is too many.
 constexpr double kSliver = 30, kWorst = 25;
 constexpr double kShare = 1e-3;
-// Of the triangles; where more are slivers, it is not for the edge lengths.
+// Of the triangles; where more are slivers, other edge lengths are no help.
 constexpr double kHopeless = 0.05;
 // Edges to be had in a sliver's place, by its height, and at least this part of its own: equilateral triangles have
 // 1.15 times their height as edges.
@@ -24,6 +24,7 @@ constexpr double kPerHeight = 1.15, kLeast = 0.5;
 Slivers find_slivers(const TriangleMesh& mesh) {
   Slivers found;
   std::size_t count = 0;
+  bool has_bad_one = false;
   const ShapeGoal goal = shape_goal(kSliver, 180);
   for (const Triangle& t : mesh.triangles) {
     std::array<Vec3, 3> p;
@@ -41,7 +42,7 @@ Slivers find_slivers(const TriangleMesh& mesh) {
     }
     if (features >= 2) continue;
     ++count;
-    found.too_many |= kSliver - under < kWorst;
+    has_bad_one |= kSliver - under < kWorst;
     const double height = longest > 0 ? norm(twice_area_normal(p[0], p[1], p[2])) / longest : 0;
     for (const Vec3& corner : p) {
       found.bounds.points.push_back(corner);
@@ -50,7 +51,7 @@ Slivers find_slivers(const TriangleMesh& mesh) {
   }
   const double share =
       static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(mesh.triangles.size(), 1));
-  found.too_many = (found.too_many || share > kShare) && share < kHopeless;
+  found.worth_another_run = (has_bad_one || share > kShare) && share < kHopeless;
   return found;
 }
 

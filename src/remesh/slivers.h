@@ -7,8 +7,9 @@
 namespace bisector {
 
 struct Slivers {
-  SizeBounds bounds;      // for better triangles in their places
-  bool too_many = false;  // for a mesh that anyone would call good, but few enough to be mended
+  SizeBounds bounds;  // for better triangles in their places
+  // More than a mesh has that anyone would call good, but so few that they are for the edge lengths.
+  bool worth_another_run = false;
 };
 
 // Of a result with its feature edges. Triangles between two feature edges do not count: what is acute stays so.

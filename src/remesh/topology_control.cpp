@@ -212,12 +212,6 @@ std::vector<char> failing_seeds(const BallReport& report, std::size_t count) {
   return failing;
 }
 
-void mark_neighbours(const std::vector<DualEdge>& edges, std::vector<char>& marked) {
-  const std::vector<char> before = marked;
-  for (const DualEdge& e : edges)
-    if (before[e.a] || before[e.b]) marked[e.a] = marked[e.b] = 1;
-}
-
 class Control {
  public:
   Control(CvtRun& run, OptimiseOptions options)

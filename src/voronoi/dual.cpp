@@ -90,4 +90,10 @@ std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, con
   return edges;
 }
 
+void mark_neighbours(const std::vector<DualEdge>& edges, std::vector<char>& marked) {
+  const std::vector<char> before = marked;
+  for (const DualEdge& e : edges)
+    if (before[e.a] || before[e.b]) marked[e.a] = marked[e.b] = 1;
+}
+
 }  // namespace bisector

@@ -22,4 +22,7 @@ struct DualEdge {
 // All such pairs, sorted.
 std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds);
 
+// Marks the neighbours of marked seeds as well.
+void mark_neighbours(const std::vector<DualEdge>& edges, std::vector<char>& marked);
+
 }  // namespace bisector

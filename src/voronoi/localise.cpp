@@ -27,6 +27,10 @@ constexpr int kRounds = 16;
 constexpr std::size_t kDivisions = 4;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
+// Where fewer than one cell in so many have strays, lists of neighbours are made one by one, of a radius of so many
+// mean widths of a cell at first.
+constexpr std::size_t kFewStrays = 10;
+constexpr double kFirstList = 1.6;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
 
 using Triangles = std::vector<Index>;  // ascending
@@ -122,12 +126,12 @@ struct Localiser::Work {
     if (const RestrictedPolygons* anew = clipped.find(triangle)) return {anew, 0, anew->pairs.size()};
     return {raw, first[triangle], first[triangle + 1]};
   }
-  Triangles triangles_of(Index cell) const;
+  std::span<const Index> triangles_of(Index cell) const;
 
   Clipper& clipper();
   void take(const Row& on, std::size_t polygon, Clipper& clipper) const;
   double squared_distance(Index triangle, Index cell, Clipper& clipper) const;
-  std::vector<std::size_t> nearest_to_seed(Index cell, const Triangles& triangles);
+  std::vector<std::size_t> nearest_to_seed(Index cell, std::span<const Index> triangles);
   std::vector<Triangles> find_strays(Index cell);
   void find_strays(const std::vector<Index>& cells);
   bool is_own(Index triangle, Index cell) const;
@@ -174,7 +178,8 @@ Localiser::Work::Work(const Surface& s) : surface(s) {
   });
 }
 
-Triangles Localiser::Work::triangles_of(Index cell) const {
+// Until one is added to the cells that changed.
+std::span<const Index> Localiser::Work::triangles_of(Index cell) const {
   if (const Triangles* changed = cell_triangles.find(cell)) return *changed;
   return {raw_triangles->begin(cell), raw_triangles->end(cell)};
 }
@@ -211,7 +216,7 @@ double Localiser::Work::squared_distance(Index triangle, Index cell, Clipper& cl
 
 // Which of a cell's triangles hold the polygons nearest to its seed; several where it is on all of them. A polygon is
 // no nearer than its triangle.
-std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, const Triangles& triangles) {
+std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, std::span<const Index> triangles) {
   const Vec3& seed = seeds.x[seeds.slot[cell]];
   const double same = kSamePoint * seeds.extent;
   std::vector<double> bounds;
@@ -238,7 +243,7 @@ std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, const Tria
 
 // The components of a cell but for that nearest to its seed, or those that it is on.
 std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
-  const Triangles triangles = triangles_of(cell);
+  const std::span<const Index> triangles = triangles_of(cell);
   const std::size_t count = triangles.size();
   if (count < 2) return {};
   std::vector<Index>& place = places.local();
@@ -431,8 +436,8 @@ std::vector<Index> Localiser::Work::clip_anew(const Triangles& triangles) {
   sort_unique(cells);
   for (const Index cell : cells)
     if (!cell_triangles.find(cell)) {
-      Triangles now = triangles_of(cell);
-      cell_triangles[cell] = std::move(now);
+      const std::span<const Index> now = triangles_of(cell);
+      cell_triangles[cell].assign(now.begin(), now.end());
     }
   for (std::size_t k = 0; k < triangles.size(); ++k) {
     const Index t = triangles[k];
@@ -526,7 +531,9 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
 std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
   const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
-  neighbours.build(seeds, NeighbourSource::nearest);
+  if (count * kFewStrays < given.size())
+    neighbours.build_on_demand(seeds, kFirstList * std::sqrt(surface.area / static_cast<double>(given.size())));
+  else neighbours.build(seeds, NeighbourSource::nearest);
   std::size_t divided = 0;
   for (int round = 0; round < kRounds && divided < kDivisions * surface.facets.size(); ++round) {
     const Triangles triangles = leave_out();

@@ -562,6 +562,29 @@ TEST(Multilevel, SetCountComesAsNearAsOneSeedPerCellAllows) {
   }
 }
 
+// Seeds go where they are dense for the density, not where they are dense.
+TEST(Multilevel, SetCountKeepsToTheDensity) {
+  const TriangleMesh mesh = grid_patch(16, 16);
+  std::vector<double> density;
+  for (const Vec3& p : mesh.vertices) density.push_back(p.x < 8 ? 1 : 256);
+  const Surface surface(mesh, density);
+  CpuBackend backend(surface, NeighbourSource::nearest);
+  OptimiseOptions options;
+  options.iterations = 60;
+  FreeRun free(backend, initial_seeds(surface, 500, 3));
+  optimise(free.run, options);
+  const auto share = [](const std::vector<Vec3>& seeds) {
+    std::size_t dense = 0;
+    for (const Vec3& x : seeds) dense += x.x > 8;
+    return static_cast<double>(dense) / static_cast<double>(seeds.size());
+  };
+  const double before = share(free.seeds());
+  EXPECT_GT(before, 0.85);
+  set_count(free.run.diagram(Want::polygons), 420, free.run.seeds);
+  EXPECT_EQ(free.run.seeds.size(), 420u);
+  EXPECT_NEAR(share(free.seeds()), before, 0.05);
+}
+
 // One call removes what the dual edges allow; on a connected surface repeating it gets to any count.
 TEST(Multilevel, SetCountGetsFarByRepetition) {
   const TriangleMesh mesh = torus(24, 16);

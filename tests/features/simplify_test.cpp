@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <set>
 
@@ -69,43 +70,41 @@ TEST(CurveGaps, AreNoneAroundACircleOrAtARightAngle) {
     EXPECT_EQ(gap, kInfinity);
 }
 
-// Two straight curves that leave a corner at an angle, in radians.
-CurveNetwork wedge(double angle) {
+// Calls body with the distance from the corner and the gap for each point of two straight curves, 2 long, that leave a
+// corner at an angle in radians.
+template <class Body>
+void for_gaps_of_wedge(double angle, double reach, const Body& body) {
   Chains corner;
   const Index tip = corner.corner({0, 0, 0});
   corner.curve(tip, corner.corner({2, 0, 0}));
   corner.curve(tip, corner.corner({2 * std::cos(angle), 2 * std::sin(angle), 0}));
-  return CurveNetwork(FeatureCurves(corner.graph, corner.points), 0.005);
+  const CurveNetwork network(FeatureCurves(corner.graph, corner.points), 0.005);
+  const std::vector<double> gaps = gaps_of(network, reach);
+  for (Index p = 0; p < gaps.size(); ++p) body(norm(network.points()[p]), gaps[p]);
 }
 
 // Of the other curve only what is far along it counts near the corner; beyond, the gap grows with the distance.
 TEST(CurveGaps, AtAnAcuteAngleBeginAwayFromTheCorner) {
   const double angle = 0.4, reach = 0.3;
-  const CurveNetwork network = wedge(angle);
-  const std::vector<double> gaps = gaps_of(network, reach);
-  for (Index p = 0; p < gaps.size(); ++p) {
-    const double along = norm(network.points()[p]);
+  for_gaps_of_wedge(angle, reach, [&](double along, double gap) {
     const double other = std::max(along * std::cos(angle), kDetour * reach - along);
-    const double gap = std::hypot(other * std::cos(angle) - along, other * std::sin(angle));
-    if (gap > 1.05 * reach) {
-      EXPECT_EQ(gaps[p], kInfinity);
-    } else if (gap < 0.95 * reach && along < 1.8) {
-      EXPECT_NEAR(gaps[p], gap, 0.01);
+    const double expected = std::hypot(other * std::cos(angle) - along, other * std::sin(angle));
+    if (expected > 1.05 * reach) {
+      EXPECT_EQ(gap, kInfinity);
+    } else if (expected < 0.95 * reach && along < 1.8) {
+      EXPECT_NEAR(gap, expected, 0.01);
     }
-  }
+  });
 }
 
 // A strip that ends in a corner is one up to there.
 TEST(CurveGaps, OfAStripReachTheCorner) {
-  const double angle = 0.1, reach = 0.3;
-  const CurveNetwork network = wedge(angle);
-  const std::vector<double> gaps = gaps_of(network, reach);
-  for (Index p = 0; p < gaps.size(); ++p) {
-    const double along = norm(network.points()[p]);
+  const double angle = 0.1;
+  for_gaps_of_wedge(angle, 0.3, [&](double along, double gap) {
     if (along > 0 && along < 1.9) {
-      EXPECT_NEAR(gaps[p], along * std::sin(angle), 0.01);
+      EXPECT_NEAR(gap, along * std::sin(angle), 0.003);
     }
-  }
+  });
 }
 
 // Every curve runs along edges of the input's features, its ends are corners, and corners are apart.
@@ -181,6 +180,39 @@ TEST(SimplifiedFeatures, OfParallelCreasesTheHeavierStays) {
     ASSERT_EQ(left.graph.curves.size(), 1u);
     EXPECT_EQ(lines.points[left.graph.curves[0].vertices[0]].y, heavier == 0 ? 0 : 0.1);
     EXPECT_EQ(left.merged, 1u);
+  }
+}
+
+// Curves that are led to the same corner along the same edges: as long as these fit into the corner's cell they share
+// them; else one has them, and the others end where they meet it.
+TEST(SimplifiedFeatures, DoNotRunAlongTheSameEdges) {
+  const double width = 0.5;
+  for (const double shared : {0.1, 0.3}) {
+    Chains net;
+    const Index a = net.corner({0, 0, 0}), b = net.corner({0, shared, 0});
+    const std::vector<Vec3> far{{-3, 0, 0}, {3, 0, 0}, {-1, 3, 0}, {1, 3, 0}, {3, 2, 0}};
+    std::vector<double> weights{0.1};
+    net.curve(a, b);
+    for (std::size_t k = 0; k < far.size(); ++k) {
+      net.curve(k < 2 ? a : b, net.corner(far[k]));
+      weights.push_back(3 + static_cast<double>(k));
+    }
+    const SimplifiedFeatures left = simplify_features(net.graph, net.points, weights, width);
+    expect_sound(left.graph, net.graph);
+    EXPECT_EQ(left.merged, 1u);
+    std::map<std::array<Index, 2>, int> uses;
+    std::set<Index> corners;
+    for (const FeatureCurve& curve : left.graph.curves) {
+      corners.insert({curve.vertices.front(), curve.vertices.back()});
+      for (std::size_t k = 1; k < curve.vertices.size(); ++k) {
+        const auto [u, v] = std::minmax(curve.vertices[k - 1], curve.vertices[k]);
+        ++uses[{u, v}];
+      }
+    }
+    const bool fits = shared < 0.25 * width;
+    for (const auto& [edge, count] : uses) EXPECT_TRUE(count == 1 || fits) << edge[0] << " " << edge[1];
+    EXPECT_EQ(corners.contains(a) && corners.contains(b), !fits);
+    EXPECT_EQ(left.graph.curves.size(), fits ? 5u : 6u);
   }
 }
 

@@ -21,7 +21,7 @@ TriangleMesh acute(double degrees) {
 
 TEST(Slivers, AreBelow30DegreesAndTooManyBelow25) {
   EXPECT_TRUE(find_slivers(acute(60)).bounds.points.empty());
-  EXPECT_FALSE(find_slivers(icosphere(3)).too_many);
+  EXPECT_FALSE(find_slivers(icosphere(3)).worth_another_run);
   EXPECT_TRUE(find_slivers(acute(31)).bounds.points.empty());
   TriangleMesh sphere = icosphere(5);
   const auto first = static_cast<Index>(sphere.vertices.size());
@@ -31,7 +31,7 @@ TEST(Slivers, AreBelow30DegreesAndTooManyBelow25) {
     mesh.vertices.insert(mesh.vertices.end(), triangle.vertices.begin(), triangle.vertices.end());
     mesh.triangles.push_back({first, first + 1, first + 2});
     EXPECT_EQ(find_slivers(mesh).bounds.points.size(), 3u);
-    EXPECT_EQ(find_slivers(mesh).too_many, degrees < 25);
+    EXPECT_EQ(find_slivers(mesh).worth_another_run, degrees < 25);
   }
 }
 
@@ -39,9 +39,9 @@ TEST(Slivers, BetweenTwoFeatureEdgesAreNone) {
   TriangleMesh mesh = acute(10);
   mesh.feature_edges = {{0, 1}};
   EXPECT_EQ(find_slivers(mesh).bounds.points.size(), 3u);
-  EXPECT_FALSE(find_slivers(mesh).too_many);  // all there are: that is for other reasons
+  EXPECT_FALSE(find_slivers(mesh).worth_another_run);  // all there are: that is for other reasons
   mesh.feature_edges = {{0, 1}, {0, 2}};
-  EXPECT_FALSE(find_slivers(mesh).too_many);
+  EXPECT_FALSE(find_slivers(mesh).worth_another_run);
   EXPECT_TRUE(find_slivers(mesh).bounds.points.empty());
 }
 

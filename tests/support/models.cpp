@@ -161,6 +161,14 @@ TriangleMesh collinear_among_good() {
   return mesh;
 }
 
+double enclosed_volume(const TriangleMesh& mesh) {
+  double six = 0;
+  for (const auto& [a, b, c] : mesh.triangles)
+    six += dot(mesh.vertices[a] - mesh.vertices[0],
+               cross(mesh.vertices[b] - mesh.vertices[0], mesh.vertices[c] - mesh.vertices[0]));
+  return six / 6;
+}
+
 std::string shared_model(const char* name) {
   const std::filesystem::path path =
       std::filesystem::path(BISECTOR_SOURCE_DIR) / ".." / "shared" / "data" / "surface" / name;

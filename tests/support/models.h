@@ -41,6 +41,8 @@ TriangleMesh duplicated_triangles();                              // a square wh
 TriangleMesh needles();                                           // a fan of triangles with aspect ratios up to 2^40
 TriangleMesh collinear_among_good();                              // 1 is exactly collinear, 3 has a repeated corner
 
+double enclosed_volume(const TriangleMesh& mesh);  // of a closed mesh; positive if it is oriented outward
+
 // Path of a model in the shared data folder beside the sources, empty where there is none.
 std::string shared_model(const char* name);
 std::string shared_scan(const char* name);  // the same for the points of a tree

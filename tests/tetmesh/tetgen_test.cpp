@@ -44,13 +44,6 @@ TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
   return a;
 }
 
-double enclosed_volume(const TriangleMesh& mesh) {
-  double volume = 0;
-  for (const Triangle& t : mesh.triangles)
-    volume += dot(mesh.vertices[t[0]], cross(mesh.vertices[t[1]], mesh.vertices[t[2]])) / 6;
-  return volume;
-}
-
 void expect_error(const std::function<void()>& body, const std::string& part) {
   try {
     body();

@@ -16,15 +16,8 @@
 namespace bisector {
 namespace {
 
+using test::enclosed_volume;
 using test::SplitMix64;
-
-double volume(const TriangleMesh& mesh) {
-  double six = 0;
-  for (const auto& [a, b, c] : mesh.triangles)
-    six += dot(mesh.vertices[a] - mesh.vertices[0],
-               cross(mesh.vertices[b] - mesh.vertices[0], mesh.vertices[c] - mesh.vertices[0]));
-  return six / 6;
-}
 
 void expect_closed_tube(const TriangleMesh& mesh) {
   const MeshTopology topology = analyse_topology(mesh.triangles, mesh.vertices.size());
@@ -33,7 +26,7 @@ void expect_closed_tube(const TriangleMesh& mesh) {
   EXPECT_TRUE(topology.oriented);
   EXPECT_EQ(topology.euler, 2);
   EXPECT_EQ(topology.components, 1u);
-  EXPECT_GT(volume(mesh), 0);
+  EXPECT_GT(enclosed_volume(mesh), 0);
   for (const Vec3& p : mesh.vertices) ASSERT_TRUE(std::isfinite(norm2(p)));
   for (const auto& [a, b, c] : mesh.triangles)
     EXPECT_GT(norm(cross(mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a])), 0);
@@ -152,7 +145,7 @@ TEST(Loft, CylinderAndConeHaveTheirVolumes) {
     const double frustum = M_PI * length * (base * base + base * tip + tip * tip) / 3;
     const double cap = 2 * M_PI * tip * tip * tip / 3;
     // Sections within 0.1 % of circles, chords within the tolerance of them.
-    EXPECT_NEAR(volume(mesh), frustum + cap, (0.002 + 2 * tolerance / tip) * (frustum + cap));
+    EXPECT_NEAR(enclosed_volume(mesh), frustum + cap, (0.002 + 2 * tolerance / tip) * (frustum + cap));
   }
 }
 
@@ -230,7 +223,7 @@ TEST(Loft, FarFromTheOriginItIsTheSame) {
   const TriangleMesh near = branch_mesh(loft_branch(points, radii, 0.02), 0.01);
   const TriangleMesh far = branch_mesh(loft_branch(moved, radii, 0.02), 0.01);
   expect_closed_tube(far);
-  EXPECT_NEAR(volume(far), volume(near), 1e-3 * volume(near));
+  EXPECT_NEAR(enclosed_volume(far), enclosed_volume(near), 1e-3 * enclosed_volume(near));
 }
 
 TEST(Loft, BadInputIsRefused) {

@@ -1,0 +1,129 @@
+#include "cvt/optimise_around.h"
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "backend/cpu_backend.h"
+
+namespace bisector {
+namespace {
+
+// Rings of seeds around those that changed that move with them; beyond, the change is hardly felt.
+constexpr int kRings = 3;
+// Where more than one triangle in so many is in the piece, the whole surface is as good.
+constexpr std::size_t kLargePiece = 3;
+
+// Positions in lexicographic order, to look others up.
+class PositionIndex {
+ public:
+  explicit PositionIndex(const std::vector<Vec3>& positions) : positions_(positions), order_(positions.size()) {
+    std::iota(order_.begin(), order_.end(), Index{0});
+    std::sort(order_.begin(), order_.end(), [&](Index a, Index b) { return key(positions_[a]) < key(positions_[b]); });
+  }
+  // A seed at this very position, or kNone.
+  Index find(const Vec3& p) const {
+    const auto at = std::lower_bound(order_.begin(), order_.end(), p,
+                                     [&](Index i, const Vec3& q) { return key(positions_[i]) < key(q); });
+    return at != order_.end() && positions_[*at] == p ? *at : kNone;
+  }
+
+ private:
+  static std::tuple<double, double, double> key(const Vec3& p) { return {p.x, p.y, p.z}; }
+
+  const std::vector<Vec3>& positions_;
+  std::vector<Index> order_;
+};
+
+// Marks seeds that are new or were neighbours of one that is gone.
+std::vector<char> changed_seeds(const SeedsBefore& before, const std::vector<Vec3>& now) {
+  const PositionIndex old_seeds(before.positions), new_seeds(now);
+  std::vector<char> changed(now.size(), 0);
+  for (std::size_t i = 0; i < now.size(); ++i) changed[i] = old_seeds.find(now[i]) == kNone;
+  for (const DualEdge& edge : before.edges)
+    for (const auto& [gone, left] : {std::pair(edge.a, edge.b), std::pair(edge.b, edge.a)}) {
+      if (new_seeds.find(before.positions[gone]) != kNone) continue;
+      if (const Index i = new_seeds.find(before.positions[left]); i != kNone) changed[i] = 1;
+    }
+  return changed;
+}
+
+// The marked triangles as a domain of their own, and the seeds with cells on them.
+struct Piece {
+  Surface surface;
+  std::vector<Index> seeds;  // of the run, ascending
+};
+
+Surface marked_surface(const Surface& whole, const std::vector<char>& marked) {
+  TriangleMesh mesh;
+  std::vector<double> density;
+  std::vector<Index> vertex(whole.mesh.vertices.size(), kNone);
+  for (std::size_t t = 0; t < marked.size(); ++t)
+    if (marked[t])
+      for (const Index v : whole.mesh.triangles[t]) vertex[v] = 0;
+  // Vertices and triangles keep their order, by which ties are broken.
+  for (std::size_t v = 0; v < vertex.size(); ++v) {
+    if (vertex[v] == kNone) continue;
+    vertex[v] = static_cast<Index>(mesh.vertices.size());
+    mesh.vertices.push_back(whole.mesh.vertices[v]);
+    if (!whole.density.empty()) density.push_back(whole.density[v]);
+  }
+  for (std::size_t t = 0; t < marked.size(); ++t) {
+    const auto& [a, b, c] = whole.mesh.triangles[t];
+    if (marked[t]) mesh.triangles.push_back({vertex[a], vertex[b], vertex[c]});
+  }
+  return Surface(std::move(mesh), std::move(density));
+}
+
+std::vector<Index> seeds_on(const RestrictedPolygons& polygons, const std::vector<char>& triangles, std::size_t count) {
+  std::vector<char> present(count, 0);
+  for (const auto& [triangle, cell] : polygons.pairs)
+    if (triangles[triangle]) present[cell] = 1;
+  std::vector<Index> seeds;
+  for (Index i = 0; i < count; ++i)
+    if (present[i]) seeds.push_back(i);
+  return seeds;
+}
+
+void optimise_piece(CvtRun& run, const Piece& piece, const std::vector<char>& free, const OptimiseOptions& options) {
+  CpuBackend backend(piece.surface, NeighbourSource::nearest);
+  CvtRun part(backend, run.curves(), run.context());
+  for (const Index i : piece.seeds) {
+    SeedPlace place = run.seeds.place(i);
+    if (!free[i]) place.kind = SeedPlace::Kind::fixed;
+    part.seeds.add(run.seeds.position(i), place);
+  }
+  part.localise(run.localises());
+  optimise(part, options);
+  for (std::size_t k = 0; k < piece.seeds.size(); ++k)
+    if (free[piece.seeds[k]]) run.seeds.put(piece.seeds[k], part.seeds.position(k), part.seeds.place(k));
+  run.totals += part.totals;
+}
+
+}  // namespace
+
+SeedsBefore seeds_before(CvtRun& run) {
+  return {run.seeds.positions(), extract_dual_edges(run.diagram(Want::polygons).polygons, run.seeds.positions())};
+}
+
+void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options) {
+  std::vector<char> free = changed_seeds(before, run.seeds.positions());
+  if (std::find(free.begin(), free.end(), 1) == free.end()) return;
+  const Diagram& diagram = run.diagram(Want::polygons);
+  const std::vector<DualEdge> edges = extract_dual_edges(diagram.polygons, run.seeds.positions());
+  for (int ring = 0; ring < kRings; ++ring) mark_neighbours(edges, free);
+  std::vector<char> inner = free;
+  mark_neighbours(edges, inner);
+
+  const Csr<Index>& cells = diagram.moments.triangles;
+  std::vector<char> triangles(run.surface().mesh.triangles.size(), 0);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < inner.size(); ++i)
+    for (const Index* t = cells.begin(i); inner[i] && t != cells.end(i); ++t) count += !std::exchange(triangles[*t], 1);
+  if (count == 0 || count * kLargePiece > triangles.size()) return optimise(run, options);
+  const std::vector<Index> seeds = seeds_on(diagram.polygons, triangles, run.seeds.size());
+  optimise_piece(run, {marked_surface(run.surface(), triangles), seeds}, free, options);
+}
+
+}  // namespace bisector

@@ -1,0 +1,25 @@
+// Optimising where seeds have changed, at a cost that follows the change and not the surface.
+#pragma once
+
+#include <vector>
+
+#include "cvt/optimise.h"
+#include "voronoi/dual.h"
+
+namespace bisector {
+
+// What a run's seeds were before some were added, removed or moved.
+struct SeedsBefore {
+  std::vector<Vec3> positions;
+  std::vector<DualEdge> edges;
+};
+
+// The run's seeds as they are.
+SeedsBefore seeds_before(CvtRun& run);
+
+// Optimises the seeds a few rings around those that changed since, with the others where they are: on the piece of the
+// surface that their cells and those around them cover, which the CPU's backend evaluates. Where much has changed, or
+// triangles are so large that the piece is no smaller than the surface, that is optimise().
+void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options);
+
+}  // namespace bisector
