@@ -156,17 +156,16 @@ double position_at_radius(const FeatureCurves& curves, Index curve, int end, dou
   return end == 0 ? curves.length(curve) : 0;
 }
 
-// Where on the curve to meet a seed of other features: as far from the corner they share as that seed, else across from
-// it; in the middle of the fault where that is elsewhere.
+// Where on the curve to meet a foreign seed: as far from the corner they share as that seed, else across from it; in
+// the middle of the fault where that is elsewhere.
 double meeting_position(const FeatureCurves& curves, const PlacedSeeds& seeds, const Fault& fault) {
   const double middle = 0.5 * (fault.from + fault.to), length = fault.to - fault.from;
-  if (fault.cell == kNone || seeds.on_surface(fault.cell)) return middle;
+  if (fault.cell == kNone || seeds.place(fault.cell).curve == kNone) return middle;
   const Index foreign = seeds.place(fault.cell).curve;
   double position = middle, nearest = std::numeric_limits<double>::infinity();
   for (int end : {0, 1}) {
     const Index corner = curves.ends(fault.curve)[end];
-    if (foreign == kNone || corner == kNone || (corner != curves.ends(foreign)[0] && corner != curves.ends(foreign)[1]))
-      continue;
+    if (corner == kNone || (corner != curves.ends(foreign)[0] && corner != curves.ends(foreign)[1])) continue;
     const double radius = norm(seeds.position(fault.cell) - curves.corner(corner));
     if (radius > nearest) continue;
     nearest = radius;
@@ -374,16 +373,14 @@ void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& 
   options.iterations = kClearingSteps;
   for (int round = 0; round < kClearingRounds; ++round) {
     const SeedsBefore before = seeds_before(run);
-    const std::vector<std::vector<CurveInterval>> traces = trace.trace(run.diagram(Want::polygons).polygons);
-    std::vector<char> removed(seeds.size(), 0), crossed(curves.size(), 0);
-    for (Index c = 0; c < traces.size(); ++c)
-      for (const CurveInterval& i : traces[c])
-        if (seeds.on_surface(i.cell)) removed[i.cell] = crossed[c] = 1;
+    std::vector<char> removed(seeds.size(), 0);
+    for (const std::vector<CurveInterval>& intervals : trace.trace(run.diagram(Want::polygons).polygons))
+      for (const CurveInterval& i : intervals)
+        if (seeds.on_surface(i.cell)) removed[i.cell] = 1;
     seeds.remove(removed);
-    if (seeds.size() == count) return;
     const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
-    for (Index c = 0; c < curves.size(); ++c)
-      if (crossed[c]) space_evenly(curves, measure, c, on[c], seeds);
+    for (Index c = 0; c < on.size(); ++c) space_evenly(curves, measure, c, on[c], seeds);
+    if (seeds.size() == count) return;
     set_count(run.diagram(Want::polygons), count, seeds);
     optimise_around(run, before, options);
   }
