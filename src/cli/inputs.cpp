@@ -32,6 +32,10 @@ std::vector<Vec3> read_seeds(const std::string& path, std::size_t count) {
   return seeds;
 }
 
+void leave_out_folds(const WrapOption& wrap, FeatureOptions& features) {
+  if (wrap.on && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
+}
+
 Json wrap_if_asked(const WrapOption& option, const TriangleMesh& mesh, std::size_t vertices, double edge_length,
                    Console& console, TriangleMesh& wrapped) {
   if (!option.on) return nullptr;

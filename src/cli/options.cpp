@@ -20,6 +20,11 @@ std::optional<Number> number_in(const std::string& text) {
   return value;
 }
 
+std::optional<double> positive_number_in(const std::string& text) {
+  const std::optional<double> value = number_in<double>(text);
+  return value && *value > 0 && std::isfinite(*value) ? value : std::nullopt;
+}
+
 CLI::Validator not_empty() {
   return CLI::Validator([](std::string& text) { return std::string(text.empty() ? "the name is empty" : ""); }, "");
 }
@@ -115,9 +120,7 @@ CLI::Validator number_below(double most) {
 CLI::Validator number_above_zero() {
   return CLI::Validator(
       [](std::string& text) -> std::string {
-        const std::optional<double> value = number_in<double>(text);
-        if (value && *value > 0 && std::isfinite(*value)) return {};
-        return "'" + text + "' is not a positive number";
+        return positive_number_in(text) ? "" : "'" + text + "' is not a positive number";
       },
       "");
 }
@@ -233,8 +236,8 @@ void add_wrap(CLI::App* app, WrapOption& wrap) {
          [&wrap](const std::string& word) {
            wrap.on = true;
            if (word.empty()) return;
-           const std::optional<double> alpha = number_in<double>(word);
-           if (!alpha || !(*alpha > 0 && std::isfinite(*alpha)))
+           const std::optional<double> alpha = positive_number_in(word);
+           if (!alpha)
              throw CLI::ValidationError("--wrap: '" + word + "' is no number above 0; put files before the option");
            wrap.alpha = *alpha;
          },

@@ -139,8 +139,7 @@ RemeshOptions remesh_options(const RemeshCommand& command, const TriangleMesh& i
   if (command.edge_length_relative > 0)
     options.edge_length = command.edge_length_relative * bounding_box(input.vertices).diagonal();
   if (command.weld >= 0) options.weld = command.weld;
-  // Folds of a wrap are those of its own triangles.
-  if (command.wrap.on && options.features.mode == FeatureMode::automatic) options.features.mode = FeatureMode::none;
+  leave_out_folds(command.wrap, options.features);
   options.threads = command.common.threads;
   if (!command.seeds.empty()) {
     options.seeds = read_seeds(command.seeds, options.vertices);

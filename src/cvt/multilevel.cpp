@@ -83,7 +83,7 @@ std::vector<double> relative_squared_lengths(const Diagram& diagram, const std::
   for (std::size_t p = 0; p < polygons.pairs.size(); ++p) area[polygons.pairs[p].cell] += polygon_area(polygons, p);
   const std::vector<Moments>& cells = diagram.moments.cells;
   for (std::size_t k = 0; k < edges.size(); ++k) {
-    const auto [a, b] = std::pair(edges[k].a, edges[k].b);
+    const Index a = edges[k].a, b = edges[k].b;
     const double areas = area[a] + area[b], density = areas > 0 ? (cells[a].mass + cells[b].mass) / areas : 1;
     squared[k] = norm2(seeds[a] - seeds[b]) * std::sqrt(density);
   }

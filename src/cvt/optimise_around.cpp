@@ -41,11 +41,13 @@ std::vector<char> changed_seeds(const SeedsBefore& before, const std::vector<Vec
   const PositionIndex old_seeds(before.positions), new_seeds(now);
   std::vector<char> changed(now.size(), 0);
   for (std::size_t i = 0; i < now.size(); ++i) changed[i] = old_seeds.find(now[i]) == kNone;
-  for (const DualEdge& edge : before.edges)
-    for (const auto& [gone, left] : {std::pair(edge.a, edge.b), std::pair(edge.b, edge.a)}) {
-      if (new_seeds.find(before.positions[gone]) != kNone) continue;
-      if (const Index i = new_seeds.find(before.positions[left]); i != kNone) changed[i] = 1;
-    }
+  std::vector<Index> is_now(before.positions.size());
+  for (std::size_t i = 0; i < is_now.size(); ++i) is_now[i] = new_seeds.find(before.positions[i]);
+  for (const DualEdge& edge : before.edges) {
+    const Index a = is_now[edge.a], b = is_now[edge.b];
+    if (a == kNone && b != kNone) changed[b] = 1;
+    if (b == kNone && a != kNone) changed[a] = 1;
+  }
   return changed;
 }
 

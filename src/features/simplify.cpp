@@ -317,28 +317,23 @@ std::vector<std::vector<Index>> divided(const std::vector<Index>& chain, const s
   return parts;
 }
 
-// Ways to the same corner may run along the same edges. Where that is more than the corner's cell can hold, the edges
-// are left to the first curve, and the others end where they meet it, which becomes a corner.
-std::vector<FeatureCurve> without_overlaps(const std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices,
-                                           double width) {
-  const double limit = kShared * width;
+// Leaves each edge to the first curve that has it, but for stretches of at most `limit` at the ends of others.
+std::vector<FeatureCurve> without_shared_edges(const std::vector<FeatureCurve>& curves,
+                                               const std::vector<Vec3>& vertices, double limit) {
   std::set<std::array<Index, 2>> taken;
   std::vector<FeatureCurve> own;
   for (const FeatureCurve& curve : curves) {
     std::vector<Index> chain = curve.vertices;
     if (curve.closed) chain.push_back(chain.front());
     const std::vector<double> at = arc_lengths(chain, vertices);
-    // Divided where stretches that others have begin and end; these are then left out.
-    std::vector<std::size_t> cuts;
-    std::vector<char> is_others{0};
+    std::vector<std::size_t> cuts;  // where stretches that others have begin and end
+    std::vector<char> is_others;    // of each stretch
     for (std::size_t k = 1; k < chain.size(); ++k) {
       const auto [a, b] = std::minmax(chain[k - 1], chain[k]);
-      const bool others = !taken.insert({a, b}).second;
-      if (k == 1) is_others[0] = others;
-      else if (others != static_cast<bool>(is_others.back())) {
-        cuts.push_back(k - 1);
-        is_others.push_back(others);
-      }
+      const char others = !taken.insert({a, b}).second;
+      if (!is_others.empty() && others == is_others.back()) continue;
+      if (k > 1) cuts.push_back(k - 1);
+      is_others.push_back(others);
     }
     if (!curve.closed && !cuts.empty() && is_others.back() && at.back() - at[cuts.back()] <= limit) {
       cuts.pop_back();
@@ -356,21 +351,23 @@ std::vector<FeatureCurve> without_overlaps(const std::vector<FeatureCurve>& curv
     for (std::size_t k = 0; k < parts.size(); ++k)
       if (!is_others[k]) own.push_back({parts[k], false, curve.kind});
   }
+  return own;
+}
 
+// Divides curves where others meet them, more than `limit` from their ends.
+std::vector<FeatureCurve> divided_where_they_meet(const std::vector<FeatureCurve>& curves,
+                                                  const std::vector<Vec3>& vertices, double limit) {
   std::map<Index, std::size_t> uses;
-  std::set<Index> ends;
-  for (const FeatureCurve& curve : own) {
+  for (const FeatureCurve& curve : curves)
     for (const Index v : curve.vertices) ++uses[v];
-    if (!curve.closed) ends.insert({curve.vertices.front(), curve.vertices.back()});
-  }
-  std::vector<FeatureCurve> separate;
-  for (FeatureCurve& curve : own) {
-    std::vector<Index> chain = std::move(curve.vertices);
-    const auto meets = [&](Index v) { return uses[v] > 1 || (curve.closed && ends.contains(v)); };
+  const auto meets = [&](Index v) { return uses[v] > 1; };
+  std::vector<FeatureCurve> parts;
+  for (const FeatureCurve& curve : curves) {
+    std::vector<Index> chain = curve.vertices;
     if (curve.closed) {
       const auto first = std::find_if(chain.begin(), chain.end(), meets);
       if (first == chain.end()) {
-        separate.push_back({std::move(chain), true, curve.kind});
+        parts.push_back(curve);
         continue;
       }
       std::rotate(chain.begin(), first, chain.end());
@@ -380,9 +377,9 @@ std::vector<FeatureCurve> without_overlaps(const std::vector<FeatureCurve>& curv
     std::vector<std::size_t> cuts;
     for (std::size_t k = 1; k + 1 < chain.size(); ++k)
       if (meets(chain[k]) && at[k] > limit && at.back() - at[k] > limit) cuts.push_back(k);
-    for (std::vector<Index>& part : divided(chain, cuts)) separate.push_back({std::move(part), false, curve.kind});
+    for (std::vector<Index>& part : divided(chain, cuts)) parts.push_back({std::move(part), false, curve.kind});
   }
-  return separate;
+  return parts;
 }
 
 // The direction in which a curve leaves the corner at one of its ends, over a length of about `width`.
@@ -523,7 +520,9 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   for (Index k = 0; k < graph.corners.size(); ++k)
     if (!on_curve[k] && !kept.is_near(vertices[graph.corners[k]])) result.graph.corners.push_back(graph.corners[k]);
 
-  left = without_overlaps(left, vertices, width);
+  // Ways to the same corner may run along the same edges: more of them than the corner's cell can hold no seeds mend.
+  const double limit = kShared * width;
+  left = divided_where_they_meet(without_shared_edges(left, vertices, limit), vertices, limit);
   join_straight(left, vertices, width);
   for (const FeatureCurve& curve : left)
     if (!curve.closed)

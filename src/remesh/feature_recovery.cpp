@@ -372,15 +372,19 @@ void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& 
   const std::size_t count = seeds.size();
   options.iterations = kClearingSteps;
   for (int round = 0; round < kClearingRounds; ++round) {
-    const SeedsBefore before = seeds_before(run);
     std::vector<char> removed(seeds.size(), 0);
+    bool clear = true;
     for (const std::vector<CurveInterval>& intervals : trace.trace(run.diagram(Want::polygons).polygons))
       for (const CurveInterval& i : intervals)
-        if (seeds.on_surface(i.cell)) removed[i.cell] = 1;
+        if (seeds.on_surface(i.cell)) {
+          removed[i.cell] = 1;
+          clear = false;
+        }
+    const SeedsBefore before = clear ? SeedsBefore{} : seeds_before(run);
     seeds.remove(removed);
     const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
     for (Index c = 0; c < on.size(); ++c) space_evenly(curves, measure, c, on[c], seeds);
-    if (seeds.size() == count) return;
+    if (clear) return;
     set_count(run.diagram(Want::polygons), count, seeds);
     optimise_around(run, before, options);
   }
@@ -403,7 +407,7 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
       best = run.seeds;
     }
     const bool last = round >= kMovingRounds;
-    const SeedsBefore before = seeds_before(run);
+    const SeedsBefore before = last ? SeedsBefore{} : seeds_before(run);
     if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most) break;
     const bool changed = mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, run.seeds);
     if (last && !changed) break;

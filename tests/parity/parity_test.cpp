@@ -236,6 +236,7 @@ void expect_parity(const Problem& problem, const Setup& setup) {
     SCOPED_TRACE(set.name);
     Evaluated found = diagram_of(*backend, set.seeds);
     expect_parity(problem.surface, set.reference, found, setup.processor);
+    // One density is enough: what makes a run repeat itself does not depend on it.
     if (&set == &problem.sets.front() && problem.surface.density.empty()) {
       SCOPED_TRACE("a fresh object and one thread");
       const ThreadLimit limit(1);
