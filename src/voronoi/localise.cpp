@@ -27,10 +27,6 @@ constexpr int kRounds = 16;
 constexpr std::size_t kDivisions = 4;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
-// Where fewer than one cell in so many have strays, lists of neighbours are made one by one, of a radius of so many
-// mean widths of a cell at first.
-constexpr std::size_t kFewStrays = 10;
-constexpr double kFirstList = 1.6;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
 
 using Triangles = std::vector<Index>;  // ascending
@@ -531,9 +527,7 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
 std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
   const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
-  if (count * kFewStrays < given.size())
-    neighbours.build_on_demand(seeds, kFirstList * std::sqrt(surface.area / static_cast<double>(given.size())));
-  else neighbours.build(seeds, NeighbourSource::nearest);
+  neighbours.build(seeds, NeighbourSource::nearest);
   std::size_t divided = 0;
   for (int round = 0; round < kRounds && divided < kDivisions * surface.facets.size(); ++round) {
     const Triangles triangles = leave_out();

@@ -265,6 +265,25 @@ TEST(RemeshHard, ATipThatNearlyTouchesAnEdgeMakesNoSlivers) {
   EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
 }
 
+// A curve in a plane ends just beside another one: a seed for each would be slivers.
+TEST(RemeshHard, ACurveThatPassesACornerGoesThroughIt) {
+  for (const double gap : {0.003, 0.02}) {
+    SCOPED_TRACE(gap);
+    TriangleMesh mesh;
+    mesh.vertices = {{-3, -3, 0}, {3, -3, 0}, {3, 3, 0}, {-3, 3, 0}, {-2, 0, 0}, {2, 0, 0}, {0, gap, 0}, {0, 2, 0}};
+    mesh.triangles = {{0, 1, 5}, {0, 5, 4}, {0, 4, 3}, {1, 2, 5}, {4, 5, 6},
+                      {6, 5, 7}, {5, 2, 7}, {7, 2, 3}, {4, 6, 7}, {4, 7, 3}};
+    RemeshOptions options = options_for(200);
+    options.features.given = {{4, 5}, {6, 7}};
+    options.detail = DetailMode::off;
+    const RemeshResult result = remesh(mesh, options);
+    EXPECT_EQ(result.features.curves, 6u);
+    EXPECT_EQ(result.features.broken, 0u);
+    EXPECT_EQ(result.mesh.vertices.size(), 200u);
+    EXPECT_GT(measure_quality(result.mesh).theta_min, 35);
+  }
+}
+
 // A needle-like cone: the tip is a corner, but its cell must not be wrapped by two others.
 TEST(RemeshHard, AThinTipKeepsTheTopology) {
   TriangleMesh cone;
