@@ -53,7 +53,8 @@ class CvtRun {
   // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other
   // positions, or lacks something. The reference is good until the next call that computes one.
   const Diagram& diagram(Want want = Want::moments);
-  // Whether diagrams are those of cells without stray parts (voronoi/localise.h).
+  // Whether diagrams are those of cells without stray parts (voronoi/localise.h). Once sheets turn out to cross, they
+  // are those of whole cells from then on.
   void localise(bool on);
   bool localises() const { return localised_; }
   // How many cells have such parts, or had them where they are left out, with the seeds as they are.
@@ -82,7 +83,7 @@ class CvtRun {
   const FeatureCurves& curves_;
   const Context& context_;
   DiagramOfSeeds diagram_;
-  bool localised_ = false;
+  bool localised_ = false, sheets_cross_ = false;
   std::unique_ptr<Localiser> localiser_;  // of the surface, once there was need of it
   // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.
   std::vector<Vec3> normals_;

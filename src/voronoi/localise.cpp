@@ -21,8 +21,8 @@
 namespace bisector {
 namespace {
 
-// Pieces across a wall come to light one behind the other. Where sheets cross there is no end to it, and it is given up
-// after so many rounds, or when each triangle has been divided so often on average.
+// Pieces across a wall come to light one behind the other, for so many rounds at most. Where sheets cross there is no
+// end to it, and it is given up when each triangle has been divided so often on average.
 constexpr int kRounds = 16;
 constexpr std::size_t kDivisions = 4;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
@@ -83,7 +83,7 @@ struct Localiser::Work {
   std::vector<char> direct;  // of each half-edge: there is no such triangle between
 
   SortedSeeds seeds;
-  Neighbours neighbours;
+  Neighbours neighbours{ListLength{}, false};
   ThreadLocal<Clipper> clippers;           // of these seeds
   ThreadLocal<std::vector<Index>> places;  // of triangles in the list of one cell; anything for others
   const RestrictedPolygons* raw = nullptr;
@@ -98,7 +98,7 @@ struct Localiser::Work {
 
   // Both return how many cells have strays.
   std::size_t find_all_strays(const std::vector<Vec3>& given, const Diagram& diagram);
-  std::size_t localise(const std::vector<Vec3>& given, Diagram& diagram);
+  std::optional<std::size_t> localise(const std::vector<Vec3>& given, Diagram& diagram);
 
  private:
   // The polygons on a triangle as they are now.
@@ -135,7 +135,8 @@ struct Localiser::Work {
   bool is_left_out(Index triangle, Index cell) const;
   bool has_own_at(std::size_t half_edge) const;
   Triangles leave_out();
-  Triangles put_back_torn();
+  Triangles put_back_torn(const Triangles& among);
+  Triangles beside(const Triangles& triangles) const;
   std::vector<Index> clip_anew(const Triangles& triangles);
   RestrictedPolygons clip(Index triangle, Clipper& clipper) const;
   Index nearest_but(const Vec3& q, std::span<const Index> without, Clipper& clipper) const;
@@ -346,22 +347,26 @@ Triangles Localiser::Work::leave_out() {
   return triangles;
 }
 
-// Where a cell ends at a mesh edge because it is left out beyond, it is put back there. Returns the triangles.
-Triangles Localiser::Work::put_back_torn() {
+// Where a cell ends at a mesh edge because it is left out beyond, it is put back there. Looks at some triangles only.
+// Returns those where one was put back.
+Triangles Localiser::Work::put_back_torn(const Triangles& among) {
   Triangles triangles;
   std::vector<std::pair<Index, Index>> torn;
-  for (const auto& [triangle, slots] : left_out)
+  for (const Index triangle : among) {
+    const auto slots = left_out.find(triangle);
+    if (slots == left_out.end()) continue;
     for (Index k = 0; k < 3; ++k) {
       const std::size_t h = std::size_t{3} * triangle + k;
       if (!direct[h]) continue;
       for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
         const Row there = row(static_cast<Index>(*other / 3));
-        for (const Index slot : slots)
+        for (const Index slot : slots->second)
           if (const std::size_t q = there.find(seeds.id[slot]);
               q < there.end && there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)))
             torn.push_back({triangle, slot});
       }
     }
+  }
   for (const auto& [triangle, slot] : torn) {
     std::erase(left_out[triangle], slot);
     if (!contains(back[triangle], slot)) back[triangle].push_back(slot);
@@ -369,6 +374,16 @@ Triangles Localiser::Work::put_back_torn() {
   }
   sort_unique(triangles);
   return triangles;
+}
+
+Triangles Localiser::Work::beside(const Triangles& triangles) const {
+  Triangles found;
+  for (const Index t : triangles)
+    for (std::size_t h = std::size_t{3} * t; h < std::size_t{3} * t + 3; ++h)
+      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other)
+        found.push_back(static_cast<Index>(*other / 3));
+  sort_unique(found);
+  return found;
 }
 
 // A slot with a cell on the facet that the clipper is at, some being left out.
@@ -524,18 +539,23 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
   return strays.size();
 }
 
-std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
+std::optional<std::size_t> Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
   const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
   neighbours.build(seeds, NeighbourSource::nearest);
   std::size_t divided = 0;
-  for (int round = 0; round < kRounds && divided < kDivisions * surface.facets.size(); ++round) {
+  for (int round = 0; round < kRounds; ++round) {
     const Triangles triangles = leave_out();
     if (triangles.empty()) break;
     divided += triangles.size();
+    if (divided > kDivisions * surface.facets.size()) return {};
     find_strays(clip_anew(triangles));
   }
-  for (Triangles torn = put_back_torn(); !torn.empty(); torn = put_back_torn()) clip_anew(torn);
+  Triangles all;
+  for (const auto& at : left_out) all.push_back(at.first);
+  sort_unique(all);
+  // What else is torn then lies beside what changed.
+  for (Triangles torn = put_back_torn(all); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);
   if (clipped.items.empty()) return 0;
   sum(diagram);
   diagram.polygons = splice();
@@ -545,7 +565,7 @@ std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& d
 Localiser::Localiser(const Surface& surface) : work_(std::make_unique<Work>(surface)) {}
 Localiser::~Localiser() = default;
 
-std::size_t Localiser::localise(const std::vector<Vec3>& seeds, Diagram& diagram) {
+std::optional<std::size_t> Localiser::localise(const std::vector<Vec3>& seeds, Diagram& diagram) {
   return work_->localise(seeds, diagram);
 }
 

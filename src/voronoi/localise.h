@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/geometry.h"
@@ -26,8 +27,9 @@ class Localiser {
   // Gives each component of a cell that is not the one nearest to the seed, and that borders on other cells' own
   // components, to those. `diagram` is that of the seeds, with its polygons; these and the moments become those of the
   // localised cells. The result depends on seeds and labels alone, and polygons tile the surface as before. Returns how
-  // many cells had such components.
-  std::size_t localise(const std::vector<Vec3>& seeds, Diagram& diagram);
+  // many cells had such components; nothing, with the diagram as it was, where sheets cross so that there is no end to
+  // it.
+  std::optional<std::size_t> localise(const std::vector<Vec3>& seeds, Diagram& diagram);
   // That number alone.
   std::size_t count_strays(const std::vector<Vec3>& seeds, const Diagram& diagram);
 

@@ -44,7 +44,9 @@ inline constexpr ListLength kListsInSpace{88, 72, 1.0 / 3, 3};
 
 class Neighbours {
  public:
-  explicit Neighbours(ListLength length = {});
+  // Lists that had to grow long end as Delaunay rings, which certify whole diagrams only. Where some seeds are taken
+  // not to be there, as in localised cells, lists without rings grow until they hold all seeds.
+  explicit Neighbours(ListLength length = {}, bool rings = true);
   ~Neighbours();
 
   // Builds the lists of all slots. `seeds` must outlive their use.
@@ -80,6 +82,7 @@ class Neighbours {
   const SortedSeeds* seeds_ = nullptr;
   SeedTree tree_;
   ListLength length_;
+  bool may_have_rings_ = true;
   std::vector<Index> first_;          // room for length_.most per slot
   std::vector<unsigned char> count_;  // of the lists of first_
   std::vector<double> radius_;

@@ -97,6 +97,26 @@ TEST(LocalisedCells, OfTwoSheetsAreThoseOfEachSheetAlone) {
   }
 }
 
+// A seed whose neighbours in space are all on the other sheet has others on its own, far beyond them.
+TEST(LocalisedCells, BesideAClusterOnTheOtherSheetTileIt) {
+  const TriangleMesh lower = grid_patch(9, 9);
+  const auto first = static_cast<Index>(lower.vertices.size());
+  const Vec3 up{0, 0, 0.03};
+  TriangleMesh sheets = lower;
+  for (const Vec3& v : lower.vertices) sheets.vertices.push_back(v + up);
+  for (const Triangle& t : lower.triangles) sheets.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  std::vector<Vec3> seeds = random_seeds(lower, 60, 5);
+  const std::vector<Vec3> beneath = seeds;
+  for (const Vec3& x : random_seeds(lower, 60, 6)) seeds.push_back(x + up);
+  for (Index near = 0; near < 60; near += 20)
+    for (int k = 0; k < 60; ++k)
+      seeds.push_back(beneath[near] + up + 0.007 * std::sqrt(k) * Vec3{std::cos(2.4 * k), std::sin(2.4 * k), 0});
+  const Surface surface(sheets);
+  Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+  EXPECT_GT(Localiser(surface).localise(seeds, diagram), 0u);
+  expect_diagram(surface, diagram);
+}
+
 // A sheet without a seed of its own keeps the cells of the sheet across.
 TEST(LocalisedCells, OfASheetWithoutSeedStay) {
   TriangleMesh mesh = grid_patch(5, 5);
@@ -151,6 +171,25 @@ TEST(LocalisedCells, OfAWedgeHaveItsSurfaceAsDual) {
     EXPECT_LT(2 * after.failures(), before);
     EXPECT_EQ(after.euler, 2);
   }
+}
+
+// Of sheets that cross, every cell has pieces of several, and behind each piece is another cell's.
+TEST(LocalisedCells, OfManyCrossingSheetsAreGivenUp) {
+  const TriangleMesh sheet = grid_patch(12, 12);
+  TriangleMesh sheets;
+  for (int k = 0; k < 16; ++k) {
+    const auto first = static_cast<Index>(sheets.vertices.size());
+    for (const Vec3& v : sheet.vertices)
+      sheets.vertices.push_back(v + Vec3{0, 0, 0.02 * std::sin(3.0 * k) * (v.x - 6) + 0.02 * std::cos(5.0 * k) * v.y});
+    for (const Triangle& t : sheet.triangles) sheets.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  const Surface surface(sheets);
+  const std::vector<Vec3> seeds = random_seeds(sheets, 400, 5);
+  const Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+  Diagram localised = diagram;
+  EXPECT_FALSE(Localiser(surface).localise(seeds, localised).has_value());
+  EXPECT_EQ(localised.polygons.labels, diagram.polygons.labels);
+  EXPECT_TRUE(same_bits(localised.moments.cells, diagram.moments.cells));
 }
 
 TEST(LocalisedCells, AreTheSameWithAnyNumberOfThreads) {
