@@ -22,9 +22,10 @@ namespace bisector {
 namespace {
 
 // Pieces across a wall come to light one behind the other, for so many rounds at most. Where sheets cross there is no
-// end to it, and it is given up when each triangle has been divided so often on average.
+// end to it, and it is given up when each triangle has been divided so often on average, or more than one cell in so
+// many has strays after all rounds.
 constexpr int kRounds = 16;
-constexpr std::size_t kDivisions = 4;
+constexpr std::size_t kDivisions = 4, kManyLeft = 10;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
@@ -544,13 +545,15 @@ std::optional<std::size_t> Localiser::Work::localise(const std::vector<Vec3>& gi
   if (count == 0) return 0;
   neighbours.build(seeds, NeighbourSource::nearest);
   std::size_t divided = 0;
-  for (int round = 0; round < kRounds; ++round) {
+  int round = 0;
+  for (; round < kRounds; ++round) {
     const Triangles triangles = leave_out();
     if (triangles.empty()) break;
     divided += triangles.size();
     if (divided > kDivisions * surface.facets.size()) return {};
     find_strays(clip_anew(triangles));
   }
+  if (round == kRounds && strays.size() * kManyLeft > given.size()) return {};
   Triangles all;
   for (const auto& at : left_out) all.push_back(at.first);
   sort_unique(all);
