@@ -47,7 +47,8 @@ void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const 
   if (welded.split_edges) line += fmt::format(", split {} at cracks", plural(welded.split_edges, "edge"));
   if (welded.degenerate_triangles + welded.duplicate_triangles)
     line += fmt::format(", removed {}", plural(welded.degenerate_triangles + welded.duplicate_triangles, "triangle"));
-  line += fmt::format("; {} of {} left", welded.border_after, plural(welded.border_before, "border edge"));
+  if (welded.border_before)
+    line += fmt::format("; {} of {} left", welded.border_after, plural(welded.border_before, "border edge"));
   if (!options.weld) line += "; a weld tolerance sets how far vertices may be apart";
   context.warn(line);
 }
@@ -73,10 +74,13 @@ SizingTarget target_of(const RemeshOptions& options) {
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
   if (tolerance) return weld(input, *tolerance);
   const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
-  if (topology.boundary_edges == 0) return keep_apart(input, 0);
+  if (topology.boundary_edges + topology.non_manifold_edges == 0) return keep_apart(input, 0);
   WeldResult welded = weld(input, 0);
-  const bool useful =
-      welded.border_after < welded.border_before && non_manifold_edges(welded.mesh) <= topology.non_manifold_edges;
+  // Welding may close cracks and, where triangles are there twice, make sheets of edges with many; not the one at the
+  // price of the other.
+  const std::size_t crowded = non_manifold_edges(welded.mesh);
+  const bool useful = welded.border_after <= welded.border_before && crowded <= topology.non_manifold_edges &&
+                      (welded.border_after < welded.border_before || crowded < topology.non_manifold_edges);
   return useful ? welded : keep_apart(input, topology.boundary_edges);
 }
 

@@ -13,6 +13,7 @@
 #include "bisector/quality.h"
 #include "core/geometry.h"
 #include "cvt/constrain.h"
+#include "remesh/topology_control.h"
 #include "support/diagram.h"
 #include "support/models.h"
 
@@ -265,6 +266,20 @@ TEST(RemeshHard, ATipThatNearlyTouchesAnEdgeMakesNoSlivers) {
   EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
 }
 
+// Files hold triangles twice, in either order of their corners: that is one sheet.
+TEST(RemeshHard, RepeatedTrianglesAreTakenOnce) {
+  TriangleMesh mesh = box(2);
+  const MeshTopology once = analyse_topology(mesh.triangles, mesh.vertices.size());
+  for (std::size_t t = 0; t < 6; ++t) {
+    const Triangle v = mesh.triangles[t];
+    mesh.triangles.push_back(t % 2 ? v : Triangle{v[1], v[0], v[2]});
+  }
+  const RemeshResult result = remesh(mesh, options_for(300));
+  EXPECT_TRUE(same_topology(result.input_topology, once));
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
+}
+
 // A curve in a plane ends just beside another one: a seed for each would be slivers.
 TEST(RemeshHard, ACurveThatPassesACornerGoesThroughIt) {
   for (const double gap : {0.003, 0.02}) {
@@ -296,7 +311,7 @@ TEST(RemeshHard, AThinTipKeepsTheTopology) {
   }
   cone.vertices.push_back({0, 0, 20});
   cone.vertices.push_back({0, 0, 0});
-  const RemeshResult result = remesh(cone, options_for(400));
+  const RemeshResult result = remesh(cone, options_for(250));
   EXPECT_TRUE(result.topology_matches);
   EXPECT_TRUE(result.ball_property);
   EXPECT_EQ(result.features.broken, 0u);
