@@ -237,8 +237,7 @@ void Descent::accept() {
 }
 
 void Descent::hand_back() {
-  run_.seeds = std::move(now_.seeds);
-  run_.diagram_ = std::move(now_.known);
+  run_.adopt(std::move(now_.seeds), std::move(now_.known));
   run_.normals_ = std::move(now_.normals);
   run_.energy = now_.energy;
   run_.gradient_norm = now_.gradient_norm;

@@ -44,9 +44,11 @@ Localiser& CvtRun::localiser() {
 void CvtRun::leave_out_strays(DiagramOfSeeds& known) {
   const Stopwatch watch;
   const std::optional<std::size_t> strays = localiser().localise(known.positions, known.diagram);
-  sheets_cross_ = !strays;
-  localised_ = !sheets_cross_;
   known.strays = strays.value_or(0);
+  if (!strays) {
+    localise(false);
+    sheets_cross_ = true;
+  }
   if (known.strays > 0 && includes(known.diagram.has, Want::dual)) add_dual(known.diagram);
   known.report.seconds.clip += watch.seconds();
   totals.seconds.clip += watch.seconds();
@@ -87,6 +89,8 @@ DiagramOfSeeds CvtRun::take_diagram(Want want) {
 void CvtRun::adopt(PlacedSeeds placed, DiagramOfSeeds known) {
   seeds = std::move(placed);
   diagram_ = std::move(known);
+  // It may be from before sheets turned out to cross.
+  if (!localised_ && diagram_.strays > 0) diagram_ = {};
 }
 
 bool CvtRun::covers(const Diagram& diagram) const {

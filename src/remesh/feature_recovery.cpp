@@ -407,8 +407,8 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
       best = run.seeds;
     }
     const bool last = round >= kMovingRounds;
-    const SeedsBefore before = last ? SeedsBefore{} : seeds_before(run);
     if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most) break;
+    const SeedsBefore before = last ? SeedsBefore{} : seeds_before(run);
     const bool changed = mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, run.seeds);
     if (last && !changed) break;
     if (last) continue;

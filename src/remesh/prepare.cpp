@@ -40,16 +40,18 @@ std::string plural(std::size_t count, const char* word) {
 }
 
 void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const Context& context) {
-  if (welded.merged_vertices + welded.split_edges + welded.degenerate_triangles + welded.duplicate_triangles == 0)
-    return;
-  std::string line =
-      fmt::format("welded {} {}", welded.merged_vertices, welded.merged_vertices == 1 ? "vertex" : "vertices");
-  if (welded.split_edges) line += fmt::format(", split {} at cracks", plural(welded.split_edges, "edge"));
-  if (welded.degenerate_triangles + welded.duplicate_triangles)
-    line += fmt::format(", removed {}", plural(welded.degenerate_triangles + welded.duplicate_triangles, "triangle"));
+  const std::size_t removed = welded.degenerate_triangles + welded.duplicate_triangles;
+  std::vector<std::string> done;
+  if (welded.merged_vertices)
+    done.push_back(
+        fmt::format("welded {} {}", welded.merged_vertices, welded.merged_vertices == 1 ? "vertex" : "vertices"));
+  if (welded.split_edges) done.push_back(fmt::format("split {} at cracks", plural(welded.split_edges, "edge")));
+  if (removed) done.push_back(fmt::format("removed {}", plural(removed, "triangle")));
+  if (done.empty()) return;
+  std::string line = fmt::format("{}", fmt::join(done, ", "));
   if (welded.border_before)
     line += fmt::format("; {} of {} left", welded.border_after, plural(welded.border_before, "border edge"));
-  if (!options.weld) line += "; a weld tolerance sets how far vertices may be apart";
+  if (!options.weld && welded.border_after) line += "; a weld tolerance sets how far vertices may be apart";
   context.warn(line);
 }
 
@@ -76,11 +78,9 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
   if (topology.boundary_edges + topology.non_manifold_edges == 0) return keep_apart(input, 0);
   WeldResult welded = weld(input, 0);
-  // Welding may close cracks and, where triangles are there twice, make sheets of edges with many; not the one at the
-  // price of the other.
-  const std::size_t crowded = non_manifold_edges(welded.mesh);
-  const bool useful = welded.border_after <= welded.border_before && crowded <= topology.non_manifold_edges &&
-                      (welded.border_after < welded.border_before || crowded < topology.non_manifold_edges);
+  const std::size_t borders = welded.border_after, non_manifold = non_manifold_edges(welded.mesh);
+  const bool useful = borders <= topology.boundary_edges && non_manifold <= topology.non_manifold_edges &&
+                      borders + non_manifold < topology.boundary_edges + topology.non_manifold_edges;
   return useful ? welded : keep_apart(input, topology.boundary_edges);
 }
 

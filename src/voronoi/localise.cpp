@@ -84,7 +84,7 @@ struct Localiser::Work {
   std::vector<char> direct;  // of each half-edge: there is no such triangle between
 
   SortedSeeds seeds;
-  Neighbours neighbours{ListLength{}, false};
+  Neighbours neighbours{ListLength{}, LongLists::all_seeds};
   ThreadLocal<Clipper> clippers;           // of these seeds
   ThreadLocal<std::vector<Index>> places;  // of triangles in the list of one cell; anything for others
   const RestrictedPolygons* raw = nullptr;
@@ -348,8 +348,8 @@ Triangles Localiser::Work::leave_out() {
   return triangles;
 }
 
-// Where a cell ends at a mesh edge because it is left out beyond, it is put back there. Looks at some triangles only.
-// Returns those where one was put back.
+// Where a cell ends at a mesh edge because it is left out on one of these triangles beyond, it is put back there.
+// Returns the triangles where one was.
 Triangles Localiser::Work::put_back_torn(const Triangles& among) {
   Triangles triangles;
   std::vector<std::pair<Index, Index>> torn;
@@ -377,6 +377,7 @@ Triangles Localiser::Work::put_back_torn(const Triangles& among) {
   return triangles;
 }
 
+// Those that have an edge with any of these.
 Triangles Localiser::Work::beside(const Triangles& triangles) const {
   Triangles found;
   for (const Index t : triangles)
@@ -554,11 +555,10 @@ std::optional<std::size_t> Localiser::Work::localise(const std::vector<Vec3>& gi
     find_strays(clip_anew(triangles));
   }
   if (round == kRounds && strays.size() * kManyLeft > given.size()) return {};
-  Triangles all;
-  for (const auto& at : left_out) all.push_back(at.first);
-  sort_unique(all);
-  // What else is torn then lies beside what changed.
-  for (Triangles torn = put_back_torn(all); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);
+  Triangles changed;
+  for (const auto& at : left_out) changed.push_back(at.first);
+  // What else is torn then lies beside what is clipped anew.
+  for (Triangles torn = put_back_torn(changed); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);
   if (clipped.items.empty()) return 0;
   sum(diagram);
   diagram.polygons = splice();

@@ -109,7 +109,7 @@ struct Neighbours::LastRung {
   std::optional<Csr<Index>> rings;  // by slot, ascending distance
 };
 
-Neighbours::Neighbours(ListLength length, bool rings) : length_(length), may_have_rings_(rings) {}
+Neighbours::Neighbours(ListLength length, LongLists long_lists) : length_(length), long_lists_(long_lists) {}
 Neighbours::~Neighbours() { drop_grown(); }
 
 void Neighbours::drop_grown() {
@@ -327,7 +327,7 @@ std::unique_ptr<Neighbours::Grown> Neighbours::grow(Index slot, int level, doubl
 
 const Neighbours::LastRung& Neighbours::last_rung() const {
   std::call_once(last_rung_->once, [&] {
-    if (may_have_rings_) last_rung_->rings = delaunay_neighbours(seeds_->x);
+    if (long_lists_ == LongLists::rings) last_rung_->rings = delaunay_neighbours(seeds_->x);
     if (!last_rung_->rings) return;
     // A parallel loop in here could run a body that waits for this very call.
     auto& rings = *last_rung_->rings;
