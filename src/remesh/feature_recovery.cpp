@@ -132,6 +132,10 @@ Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const 
       for (int part = 0; part < 3; ++part)
         found.faults.push_back({c, curves.length(c) * part / 3, curves.length(c) * (part + 1) / 3, kNone});
     if (found.faults.size() > before) found.report.broken.push_back(c);
+    for (std::size_t k = before; k < found.faults.size(); ++k) {
+      const double middle = 0.5 * (found.faults[k].from + found.faults[k].to);
+      found.report.faults.push_back({c, curves.point(c, curves.wrap(c, middle))});
+    }
   }
   std::sort(found.report.edges.begin(), found.report.edges.end());
   found.report.edges.erase(std::unique(found.report.edges.begin(), found.report.edges.end()), found.report.edges.end());

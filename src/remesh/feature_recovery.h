@@ -20,6 +20,11 @@ namespace bisector {
 struct FeatureReport {
   std::vector<std::array<Index, 2>> edges;  // pairs of seeds along the curves, lower first, sorted
   std::vector<Index> broken;                // curves that are not in the dual, ascending
+  struct Fault {
+    Index curve;
+    Vec3 at;
+  };
+  std::vector<Fault> faults;  // where they are not
 };
 
 // `diagram` is that of seeds with these places, with polygons and dual.

@@ -34,12 +34,19 @@ constexpr std::size_t kPoorTried = 30, kPoorShare = 30;
 // In average costs of a triangle: the price of each triangle at a seed beyond or short of six; by how much a trial may
 // be worse after the first sweeps; and what the right number of seeds may cost, per seed.
 constexpr double kIrregular = 10, kTrialSlack = 4, kPrice = 20;
+// Triangles with a smaller angle, in degrees, that are left are searched for: changes of up to so many steps, of which
+// the best are gone on from after each.
+constexpr double kBadAngle = 30;
+constexpr int kSearchSteps = 3;
+constexpr std::size_t kSearchWidth = 4;
+constexpr double kSearchGain = 4;  // average costs of a triangle that a result must save
+constexpr int kSearches = 4;       // of results that are tried in turn, where the diagram does not bear them out
 // Edge flips that are tried per patch.
 constexpr std::size_t kFlips = 2;
 // Patches that are tried for each seed that is missing or too many, and the share of the number of seeds by which it
 // may be off on the way.
 constexpr std::size_t kTriesToRestore = 8;
-constexpr double kDrift = 0.005;
+constexpr double kDrift = 0.005, kSearchDrift = 0.02;
 // Diagrams that are computed to find out which changes hold together.
 constexpr int kReverts = 4;
 
@@ -132,6 +139,7 @@ struct Change {
   std::vector<Index> curves;  // that it could break
   double gain = 0;
   std::size_t added = 0;
+  bool searched = false;  // for a bad angle
   int growth() const { return static_cast<int>(added) - static_cast<int>(removed.size()); }
 };
 
@@ -142,8 +150,10 @@ class Improver {
   ImproveReport run();
 
  private:
-  enum class Aim { better, fewer, more };
+  enum class Aim { better, no_bad_angles, fewer, more };
 
+  // Whether the number of seeds is the aim.
+  static bool counts(Aim aim) { return aim == Aim::fewer || aim == Aim::more; }
   bool has_curves() const { return run_.curves().size() > 0; }
   double irregular_price() const { return kIrregular * now_.average; }
   std::size_t wanted() const { return options_.vertices ? options_.vertices : run_.seeds.size(); }
@@ -151,11 +161,27 @@ class Improver {
   ShapeExcess worst_excess(const Snapshot& s, Index seed) const;
   bool as_good(const Snapshot& next) const;
   bool newly_broken(const Snapshot& next, Index curve) const;
+  // The places where curves break, of a change in particular.
+  std::vector<Vec3> new_faults(const Snapshot& next) const;
+  bool breaks_curve(const Snapshot& next, const Change& change) const;
+  // By how many degrees the smallest angle of a seed's triangles is less than it should be, where it is not imposed.
+  double angle_missing(Index seed) const;
+  // What a search may leave where the worst triangles were such.
+  ShapeExcess allowed(ShapeExcess worst) const {
+    worst.under = std::max(worst.under, bad_excess());
+    return worst;
+  }
+  // A smaller angle is bad that misses the goal by more than so many degrees.
+  double bad_excess() const { return std::max(0.0, options_.min_angle - kBadAngle); }
   // The seeds up to kRings edges away, nearest first.
   std::vector<Index> seeds_around(Index middle) const;
   PatchVertex vertex_of(Index seed, const CellMap& map) const;
   ImprovePatch patch_of(const std::vector<Index>& seeds, const CellMap& map) const;
+  // The curve that two seeds are neighbours on; kNone if there is none, or more than one between two corners.
+  Index curve_between(Index a, Index b) const;
   Change best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const;
+  std::optional<ImprovePatch> try_one(const ImprovePatch& start, Aim aim, std::size_t& trials) const;
+  std::optional<ImprovePatch> search(const ImprovePatch& start, std::size_t rank, std::size_t& trials) const;
   std::vector<Index> choose_middles(Aim aim);
   std::vector<char> choose_changes(const std::vector<Change>& changes, Aim aim) const;
   // Makes changes around some seeds; returns how many hold.
@@ -165,6 +191,8 @@ class Improver {
                     std::vector<std::vector<Index>>& seeds_of) const;
   bool holds(const Snapshot& next, const Change& change, const std::vector<Index>& index,
              const std::vector<Index>& seeds) const;
+  // What a change must save for that.
+  double least_gain(const Change& change) const;
   void drop_nearest_to_damage(const Snapshot& next, const std::vector<Change>& changes, const std::vector<Index>& index,
                               std::vector<char>& on) const;
   // Makes those of the changes that hold; `on` tells which.
@@ -179,7 +207,7 @@ class Improver {
   ShapeGoal goal_;
   std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
   std::size_t poor_left_ = 0;                      // poor seeds that may still be tried
-  std::vector<char> done_;                         // by seed: tried in vain, and nothing near it has changed since
+  std::vector<char> tried_;                        // by seed: how often in vain since something near it has changed
   Snapshot now_;
   ImproveReport report_;
 };
@@ -243,6 +271,41 @@ bool Improver::newly_broken(const Snapshot& next, Index curve) const {
   return in(next) && !in(now_);
 }
 
+std::vector<Vec3> Improver::new_faults(const Snapshot& next) const {
+  std::vector<Vec3> places;
+  for (const FeatureReport::Fault& fault : next.features.faults)
+    if (newly_broken(next, fault.curve)) places.push_back(fault.at);
+  return places;
+}
+
+bool Improver::breaks_curve(const Snapshot& next, const Change& change) const {
+  const Vec3& middle = now_.seeds.position(change.middle);
+  double reach = 0;
+  for (const Index v : change.footprint) reach = std::max(reach, norm2(now_.seeds.position(v) - middle));
+  return std::any_of(next.features.faults.begin(), next.features.faults.end(), [&](const FeatureReport::Fault& fault) {
+    return newly_broken(next, fault.curve) && norm2(fault.at - middle) <= reach &&
+           std::find(change.curves.begin(), change.curves.end(), fault.curve) != change.curves.end();
+  });
+}
+
+double Improver::angle_missing(Index seed) const {
+  double missing = 0;
+  const auto& edges = now_.features.edges;
+  for (const Index* t = now_.stars.begin(seed); t != now_.stars.end(seed); ++t) {
+    if (now_.excess[*t].under <= missing) continue;
+    const Triangle& v = now_.dual().triangles[*t];
+    std::array<Vec3, 3> x;
+    std::array<bool, 3> locked;
+    for (int m = 0; m < 3; ++m) {
+      x[m] = now_.seeds.position(v[m]);
+      const auto [a, b] = std::minmax(v[m], v[(m + 1) % 3]);
+      locked[m] = std::binary_search(edges.begin(), edges.end(), std::array<Index, 2>{a, b});
+    }
+    if (!angle_is_imposed(x, locked)) missing = now_.excess[*t].under;
+  }
+  return missing;
+}
+
 std::vector<Index> Improver::seeds_around(Index middle) const {
   std::vector<Index> seeds{middle};
   for (std::size_t ring = 0, begin = 0; ring < kRings; ++ring) {
@@ -267,6 +330,23 @@ PatchVertex Improver::vertex_of(Index seed, const CellMap& map) const {
   return vertex;
 }
 
+Index Improver::curve_between(Index a, Index b) const {
+  const SeedPlace &u = now_.seeds.place(a), &v = now_.seeds.place(b);
+  if (u.curve != kNone || v.curve != kNone) {
+    const Index curve = u.curve != kNone ? u.curve : v.curve;
+    return v.curve == kNone || v.curve == curve ? curve : kNone;
+  }
+  if (u.corner == kNone || v.corner == kNone) return kNone;
+  Index found = kNone;
+  for (const Index curve : corner_curves_[u.corner]) {
+    const auto [first, last] = run_.curves().ends(curve);
+    if (first == last || (first != v.corner && last != v.corner)) continue;
+    if (found != kNone) return kNone;
+    found = curve;
+  }
+  return found;
+}
+
 // The seeds given and their triangles; the seeds come first and are free, as far as they may be.
 ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& map) const {
   std::vector<Index> triangles;
@@ -276,7 +356,7 @@ ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& 
   ImprovePatch patch(map, &run_.curves(), goal_);
   std::vector<Index> members = seeds;
   for (const Index v : seeds) patch.add_vertex(vertex_of(v, map));
-  std::vector<std::array<Index, 2>> locked;
+  std::vector<LockedEdge> locked;
   for (const Index t : triangles) {
     const Triangle& corners = now_.dual().triangles[t];
     Triangle local;
@@ -293,7 +373,8 @@ ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& 
     for (int m = 0; m < 3; ++m) {
       const auto [a, b] = std::minmax({corners[m], corners[(m + 1) % 3]});
       if (std::binary_search(now_.features.edges.begin(), now_.features.edges.end(), std::array<Index, 2>{a, b}))
-        locked.push_back({std::min(local[m], local[(m + 1) % 3]), std::max(local[m], local[(m + 1) % 3])});
+        locked.push_back(
+            {std::min(local[m], local[(m + 1) % 3]), std::max(local[m], local[(m + 1) % 3]), curve_between(a, b)});
     }
   }
   for (std::size_t k = 0; k < members.size(); ++k)
@@ -302,14 +383,10 @@ ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& 
   return patch;
 }
 
-// The trial that costs least, if that is less than now. Where the count is the aim, it may cost more.
-Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const {
-  Change change;
-  change.middle = middle;
-  change.footprint = seeds_around(middle);
-  const ImprovePatch start = patch_of(change.footprint, map);
-  const double before = start.cost(now_.average, irregular_price());
-  double least = aim == Aim::better ? before + kTrialSlack * now_.average : std::numeric_limits<double>::infinity();
+// The trial that costs least, if that is not much more than now. Where the count is the aim, it may cost more.
+std::optional<ImprovePatch> Improver::try_one(const ImprovePatch& start, Aim aim, std::size_t& trials) const {
+  double least = std::numeric_limits<double>::infinity();
+  if (aim == Aim::better) least = start.cost(now_.average, irregular_price()) + kTrialSlack * now_.average;
   std::optional<ImprovePatch> best;
   const auto attempt = [&](const auto& operation) {
     ImprovePatch patch = start;
@@ -333,17 +410,78 @@ Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::siz
     attempt([&](ImprovePatch& patch) { return patch.split(v, patch.farthest_neighbour(v)); });
     attempt([&](ImprovePatch& patch) { return patch.insert(patch.largest_triangle(v)); });
   }
+  return best;
+}
+
+// A beam search: what several changes at the worst triangle lead to. Of all results the one that costs least but for
+// `rank` others, if it costs less than now.
+std::optional<ImprovePatch> Improver::search(const ImprovePatch& start, std::size_t rank, std::size_t& trials) const {
+  struct State {
+    ImprovePatch patch;
+    double cost;
+  };
+  const auto same = [&](const State& a, const State& b) { return std::abs(a.cost - b.cost) < now_.average; };
+  const auto keep_best = [&](std::vector<State>& states, std::size_t count) {
+    std::stable_sort(states.begin(), states.end(), [](const State& s, const State& t) { return s.cost < t.cost; });
+    states.erase(std::unique(states.begin(), states.end(), same), states.end());
+    if (states.size() > count) states.erase(states.begin() + static_cast<std::ptrdiff_t>(count), states.end());
+  };
+  const double before = start.cost(now_.average, irregular_price());
+  const std::size_t encroachments = start.encroachments();
+  const ShapeExcess worst = allowed(start.worst());
+  std::vector<State> beam{{start, before}}, best;
+  for (int step = 0; step < kSearchSteps; ++step) {
+    std::vector<State> next;
+    for (const State& state : beam) {
+      const auto attempt = [&](const auto& operation) {
+        ImprovePatch patch = state.patch;
+        if (!operation(patch)) return;
+        ++trials;
+        patch.relax_all(kSweeps);
+        const double cost = patch.cost(now_.average, irregular_price());
+        next.push_back({std::move(patch), cost});
+      };
+      std::vector<Index> vertices;
+      for (const auto& [a, b] : state.patch.edges_at_worst()) {
+        attempt([&](ImprovePatch& patch) { return patch.split(a, b); });
+        attempt([&](ImprovePatch& patch) { return patch.flip(a, b); });
+        for (const Index v : {a, b})
+          if (std::find(vertices.begin(), vertices.end(), v) == vertices.end()) vertices.push_back(v);
+      }
+      for (const Index v : vertices) attempt([&](ImprovePatch& patch) { return patch.remove(v); });
+    }
+    keep_best(next, kSearchWidth);
+    for (const State& state : next)
+      if (state.cost < before - kSearchGain * now_.average && state.patch.worst().within(worst) &&
+          state.patch.encroachments() <= encroachments)
+        best.push_back(state);
+    keep_best(best, rank + 1);
+    beam = std::move(next);
+  }
+  if (best.size() <= rank) return {};
+  return std::move(best[rank].patch);
+}
+
+Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const {
+  Change change;
+  change.middle = middle;
+  change.searched = aim == Aim::no_bad_angles;
+  change.footprint = seeds_around(middle);
+  const ImprovePatch start = patch_of(change.footprint, map);
+  const double before = start.cost(now_.average, irregular_price());
+  std::optional<ImprovePatch> best =
+      change.searched ? search(start, tried_[middle], trials) : try_one(start, aim, trials);
   if (!best) return change;
   best->relax_all(kMoreSweeps);
   change.gain = before - best->cost(now_.average, irregular_price());
-  if (!(change.gain > (aim == Aim::better ? 0 : -kPrice * now_.average))) return change;
+  if (!(change.gain > (counts(aim) ? -kPrice * now_.average : 0))) return change;
   for (Index k = 0; k < best->vertices().size(); ++k) {
     const PatchVertex& vertex = best->vertices()[k];
     if (vertex.place.curve != kNone) change.curves.push_back(vertex.place.curve);
     if (const Index corner = vertex.place.corner; corner != kNone && has_curves())
       change.curves.insert(change.curves.end(), corner_curves_[corner].begin(), corner_curves_[corner].end());
     if (vertex.removed) {
-      change.removed.push_back(vertex.seed);
+      if (vertex.seed != kNone) change.removed.push_back(vertex.seed);
     } else if (vertex.seed == kNone || !(vertex.x == now_.seeds.position(vertex.seed))) {
       change.moved.push_back({vertex.seed, vertex.x, vertex.place});
       change.added += vertex.seed == kNone;
@@ -360,15 +498,19 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
   };
   std::vector<Candidate> candidates;
   for (Index v = 0; v < now_.seeds.size(); ++v) {
-    if (done_[v] || now_.stars.size(v) == 0 || now_.kinds[v] == Star::other) continue;
+    if (tried_[v] >= (aim == Aim::no_bad_angles ? kSearches : 1) || now_.stars.size(v) == 0 ||
+        now_.kinds[v] == Star::other)
+      continue;
     double sum = 0, worst = 0;
     for (const Index* t = now_.stars.begin(v); t != now_.stars.end(v); ++t) {
       sum += now_.costs[*t];
       worst = std::max(worst, now_.costs[*t]);
     }
-    const Candidate candidate{v, aim == Aim::better ? worst_excess(now_, v).most() : 0,
-                              sum / static_cast<double>(now_.stars.size(v)) + worst};
-    if (aim != Aim::better || candidate.excess > 0 || candidate.cost > 2 * kPoor * now_.average)
+    const bool searches = aim == Aim::no_bad_angles;
+    if (searches && !(angle_missing(v) > bad_excess())) continue;
+    const double excess = searches ? angle_missing(v) : counts(aim) ? 0 : worst_excess(now_, v).most();
+    const Candidate candidate{v, excess, sum / static_cast<double>(now_.stars.size(v)) + worst};
+    if (counts(aim) || candidate.excess > 0 || candidate.cost > 2 * kPoor * now_.average)
       candidates.push_back(candidate);
   }
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
@@ -376,7 +518,7 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
   });
   const auto missing = static_cast<long long>(wanted()) - static_cast<long long>(now_.seeds.size());
   const std::size_t most =
-      aim == Aim::better ? now_.seeds.size() : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
+      !counts(aim) ? now_.seeds.size() : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
   std::vector<char> taken(now_.dual().triangles.size(), 0);
   std::vector<Index> middles;
   for (const Candidate& candidate : candidates) {
@@ -404,13 +546,14 @@ std::vector<char> Improver::choose_changes(const std::vector<Change>& changes, A
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return changes[a].gain > changes[b].gain; });
   const auto count = static_cast<long long>(wanted());
-  const auto drift = aim == Aim::better ? static_cast<long long>(kDrift * static_cast<double>(count)) : 0;
+  const double share = aim == Aim::no_bad_angles ? kSearchDrift : counts(aim) ? 0 : kDrift;
+  const auto drift = static_cast<long long>(share * static_cast<double>(count));
   long long off = static_cast<long long>(now_.seeds.size()) - count;
   std::vector<char> on(changes.size(), 0);
   for (const std::size_t k : order) {
     if (changes[k].moved.empty() && changes[k].removed.empty()) continue;
     const long long then = off + changes[k].growth();
-    if (std::abs(then) > std::max(drift, std::abs(off)) || (aim != Aim::better && off == 0)) continue;
+    if (std::abs(then) > std::max(drift, std::abs(off)) || (counts(aim) && off == 0)) continue;
     on[k] = 1;
     off = then;
   }
@@ -433,21 +576,21 @@ std::size_t Improver::batch(Aim aim) {
   // The marks follow the seeds.
   std::vector<char> removed(before, 0);
   std::size_t made = 0;
-  for (const Index v : middles) done_[v] = 1;
+  for (const Index v : middles) ++tried_[v];
   for (std::size_t k = 0; k < changes.size(); ++k) {
     if (!on[k]) continue;
     ++made;
     report_.inserted += changes[k].added;
     report_.removed += changes[k].removed.size();
-    for (const Index v : changes[k].footprint) done_[v] = 0;
+    for (const Index v : changes[k].footprint) tried_[v] = 0;
     for (const Index v : changes[k].removed) removed[v] = 1;
   }
   report_.made += made;
   std::size_t kept = 0;
   for (std::size_t v = 0; v < before; ++v)
-    if (!removed[v]) done_[kept++] = done_[v];
-  done_.resize(kept);
-  done_.resize(now_.seeds.size(), 0);
+    if (!removed[v]) tried_[kept++] = tried_[v];
+  tried_.resize(kept);
+  tried_.resize(now_.seeds.size(), 0);
   return made;
 }
 
@@ -500,33 +643,40 @@ double cost_at(const Snapshot& s, std::vector<Index> seeds, double average, doub
   return sum;
 }
 
+double Improver::least_gain(const Change& change) const {
+  if (change.gain < 0) return 2 * change.gain;  // the price of the right count
+  return change.searched ? kSearchGain * now_.average : 0;
+}
+
 bool Improver::holds(const Snapshot& next, const Change& change, const std::vector<Index>& index,
                      const std::vector<Index>& seeds) const {
   const double before = cost_at(now_, change.footprint, now_.average, irregular_price());
   const double after = cost_at(next, seeds, now_.average, irregular_price());
-  const double price = change.gain < 0 ? -2 * change.gain : 0;  // of the right count
-  if (!(after < before + price)) return false;
+  if (!(after < before - least_gain(change))) return false;
   ShapeExcess worst_before, worst_after;
   for (const Index v : change.footprint) worst_before.take(worst_excess(now_, v));
   for (const Index v : seeds) {
     worst_after.take(worst_excess(next, v));
     if (next.kinds[v] == Star::other) return false;
   }
-  if (!worst_after.within(worst_before)) return false;
+  if (!worst_after.within(change.searched ? allowed(worst_before) : worst_before)) return false;
   for (const Index v : change.footprint)
     for (const Index* j = now_.rings.begin(v); j != now_.rings.end(v); ++j)
       if (index[*j] != kNone && now_.kinds[*j] != next.kinds[index[*j]]) return false;
-  return std::none_of(change.curves.begin(), change.curves.end(), [&](Index c) { return newly_broken(next, c); });
+  return !breaks_curve(next, change);
 }
 
-// Of cells across a thin wall the seeds that moved are no neighbours: the change that spoils their stars is
-// taken to be the nearest.
+// Of cells across a thin wall the seeds that moved are no neighbours: the change that spoils their stars, or a curve
+// beside them, is taken to be the nearest.
 void Improver::drop_nearest_to_damage(const Snapshot& next, const std::vector<Change>& changes,
                                       const std::vector<Index>& index, std::vector<char>& on) const {
+  std::vector<Vec3> damage = new_faults(next);
   for (Index v = 0; v < index.size(); ++v) {
     if (index[v] == kNone) continue;
     if (next.kinds[index[v]] == now_.kinds[v] && worst_excess(next, index[v]).within(now_.worst)) continue;
-    const Vec3& x = now_.seeds.position(v);
+    damage.push_back(now_.seeds.position(v));
+  }
+  for (const Vec3& x : damage) {
     std::size_t nearest = changes.size();
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t c = 0; c < changes.size(); ++c) {
@@ -667,13 +817,16 @@ ImproveReport Improver::run() {
   drop_idle();
   const double average = now_.average;
   poor_left_ = kPoorTried + now_.seeds.size() / kPoorShare;
-  done_.assign(now_.seeds.size(), 0);
+  tried_.assign(now_.seeds.size(), 0);
   smooth();
   for (int round = 0; round < kBatches; ++round) {
     run_.context().report({"improving", round + 1, kBatches, now_.moments().energy, 0, 1});
     if (batch(Aim::better) == 0) break;
   }
-  done_.assign(now_.seeds.size(), 0);
+  tried_.assign(now_.seeds.size(), 0);
+  for (int round = 0; round < kBatches && !choose_middles(Aim::no_bad_angles).empty(); ++round)
+    batch(Aim::no_bad_angles);
+  tried_.assign(now_.seeds.size(), 0);
   for (int round = 0; round < kBatches && now_.seeds.size() != wanted(); ++round)
     batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
   if (report_.made > 0) smooth();

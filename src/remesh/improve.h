@@ -5,7 +5,8 @@
 // Each change is tried on a small patch of the dual (improve_patch.h). The best ones of patches that do not overlap are
 // made together and one diagram of all seeds says which of them hold: a change stays if its triangles cost less in the
 // dual itself, none of them is worse than the worst before unless it meets the goal, and topology and feature curves
-// are as before.
+// are as before. Angles below 30 degrees that are left then, and that no two curves impose, are searched for: changes
+// of several steps, which may make other angles smaller as long as they are not bad.
 #pragma once
 
 #include "bisector/remesh.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "cvt/constrain.h"
 
@@ -18,6 +19,8 @@ constexpr double kLinear = 10, kQuadratic = 200;       // of what is beyond the 
 constexpr double kMargin = 2;                          // degrees within the goal, from where on it is felt
 constexpr double kHold = 6;                            // in a patch, for cells of about equal size
 constexpr double kFolded = 20;                         // cost of a triangle that turned over
+constexpr double kEncroached = 20;                     // cost of a vertex whose cell cuts a locked edge
+constexpr std::size_t kSamples = 5;                    // of a curve between two vertices; one is in the middle
 constexpr double kFacing = 0.2;                        // least cosine between a triangle and what it replaces
 constexpr double kFirstStep = 0.1, kLastStep = 0.003;  // of the mean edge length
 constexpr double kDelaunaySlack = 1e-9;
@@ -25,6 +28,8 @@ constexpr int kFlipPasses = 8;
 constexpr int kFlipEvery = 3;  // sweeps
 
 double beyond(double excess) { return excess > 0 ? excess * (kLinear + kQuadratic * excess) : 0; }
+
+bool before(const LockedEdge& e, const LockedEdge& f) { return std::pair(e.a, e.b) < std::pair(f.a, f.b); }
 
 std::array<Index, 2> key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 
@@ -86,6 +91,16 @@ ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const Shap
   return {std::max(0.0, goal.min_angle - angle(shape.smallest)), std::max(0.0, angle(shape.largest) - goal.max_angle)};
 }
 
+bool angle_is_imposed(const std::array<Vec3, 3>& corners, const std::array<bool, 3>& locked) {
+  int least = 0;
+  std::array<double, 3> squared;
+  for (int m = 0; m < 3; ++m) {
+    squared[m] = norm2(corners[(m + 1) % 3] - corners[m]);
+    if (squared[m] < squared[least]) least = m;
+  }
+  return locked[(least + 1) % 3] && locked[(least + 2) % 3];
+}
+
 Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
   double nearest = norm2(seeds_[owner] - p);
   for (Index last = kNone; last != owner;) {
@@ -127,9 +142,11 @@ void ImprovePatch::add_triangle(const Triangle& t) {
   for (const Index v : t) stars_[v].push_back(index);
 }
 
-void ImprovePatch::lock(std::vector<std::array<Index, 2>> edges) {
+void ImprovePatch::lock(std::vector<LockedEdge> edges) {
   locked_ = std::move(edges);
-  std::sort(locked_.begin(), locked_.end());
+  std::sort(locked_.begin(), locked_.end(), before);
+  const auto same = [](const LockedEdge& e, const LockedEdge& f) { return !before(e, f) && !before(f, e); };
+  locked_.erase(std::unique(locked_.begin(), locked_.end(), same), locked_.end());
 }
 
 std::vector<Triangle> ImprovePatch::triangles() const {
@@ -146,7 +163,54 @@ double ImprovePatch::cost(double average, double irregular) const {
   for (Index v = 0; v < vertices_.size(); ++v)
     if (vertices_[v].place.kind == Kind::surface && !vertices_[v].removed)
       sum += irregular * std::abs(excess_degree(v));
-  return sum;
+  return sum + kEncroached * static_cast<double>(encroachments());
+}
+
+ShapeExcess ImprovePatch::worst() const {
+  ShapeExcess worst;
+  for (const PatchTriangle& t : triangles_)
+    if (t.alive) worst.take(shape_excess(vertices_[t.v[0]].x, vertices_[t.v[1]].x, vertices_[t.v[2]].x, goal_));
+  return worst;
+}
+
+std::size_t ImprovePatch::encroachments() const {
+  std::size_t count = 0;
+  for (const LockedEdge& edge : locked_) {
+    if (edge.curve == kNone) continue;
+    const Vec3 &a = vertices_[edge.a].x, &b = vertices_[edge.b].x;
+    const auto [from, to] = stretch(edge);
+    std::array<Vec3, kSamples> points;
+    std::array<double, kSamples> squared;
+    for (std::size_t k = 0; k < kSamples; ++k) {
+      const double share = static_cast<double>(k + 1) / (kSamples + 1);
+      points[k] = curves_->point(edge.curve, curves_->wrap(edge.curve, from + share * (to - from)));
+      squared[k] = std::min(norm2(points[k] - a), norm2(points[k] - b));
+    }
+    for (Index v = 0; v < vertices_.size(); ++v) {
+      if (v == edge.a || v == edge.b || vertices_[v].removed) continue;
+      bool cuts = false;
+      for (std::size_t k = 0; k < kSamples; ++k) cuts |= norm2(points[k] - vertices_[v].x) < squared[k];
+      count += cuts;
+    }
+  }
+  return count;
+}
+
+std::array<double, 2> ImprovePatch::stretch(const LockedEdge& edge) const {
+  const SeedPlace &u = vertices_[edge.a].place, &v = vertices_[edge.b].place;
+  const double length = curves_->length(edge.curve);
+  const double on = u.curve == edge.curve ? u.position : v.position;
+  const auto position = [&](const SeedPlace& place) {
+    if (place.curve == edge.curve) return place.position;
+    const auto [first, last] = curves_->ends(edge.curve);
+    if (first == last) return on < 0.5 * length ? 0.0 : length;
+    return place.corner == first ? 0.0 : length;
+  };
+  const double from = position(u);
+  double to = position(v);
+  if (curves_->closed(edge.curve) && to - from > 0.5 * length) to -= length;
+  if (curves_->closed(edge.curve) && from - to > 0.5 * length) to += length;
+  return {from, to};
 }
 
 int ImprovePatch::excess_degree(Index v) const { return static_cast<int>(stars_[v].size() + vertices_[v].outside) - 6; }
@@ -162,15 +226,19 @@ double ImprovePatch::star_cost(Index v) const {
   return sum;
 }
 
-bool ImprovePatch::is_locked(Index a, Index b) const {
-  return std::binary_search(locked_.begin(), locked_.end(), key(a, b));
+const LockedEdge* ImprovePatch::locked_edge(Index a, Index b) const {
+  const LockedEdge edge{std::min(a, b), std::max(a, b), kNone};
+  const auto place = std::lower_bound(locked_.begin(), locked_.end(), edge, before);
+  return place != locked_.end() && !before(edge, *place) ? &*place : nullptr;
 }
 
-void ImprovePatch::set_locked(Index a, Index b, bool locked) {
-  const auto place = std::lower_bound(locked_.begin(), locked_.end(), key(a, b));
-  const bool there = place != locked_.end() && *place == key(a, b);
-  if (locked && !there) locked_.insert(place, key(a, b));
-  if (!locked && there) locked_.erase(place);
+void ImprovePatch::set_locked(Index a, Index b, Index curve) {
+  const LockedEdge edge{std::min(a, b), std::max(a, b), curve};
+  if (!is_locked(a, b)) locked_.insert(std::lower_bound(locked_.begin(), locked_.end(), edge, before), edge);
+}
+
+void ImprovePatch::unlock(Index a, Index b) {
+  std::erase_if(locked_, [&](const LockedEdge& edge) { return edge.a == std::min(a, b) && edge.b == std::max(a, b); });
 }
 
 bool ImprovePatch::triangles_at(Index a, Index b, std::size_t& left, std::size_t& right) const {
@@ -294,13 +362,14 @@ bool ImprovePatch::remove(Index v) {
       if (locked) along.push_back(w);
       if (surface || locked) ends.push_back({norm2(vertices_[w].x - vertices_[v].x), w});
     }
-  if (!surface && along.size() != 2) return false;
+  // The stretches on both sides of it become one.
+  if (!surface && (along.size() != 2 || is_locked(along[0], along[1]))) return false;
   std::sort(ends.begin(), ends.end());
   for (const auto& [squared, to] : ends) {
     if (!collapse(v, to)) continue;
     vertices_[v].removed = true;
-    for (const Index w : along) set_locked(v, w, false);
-    if (!surface) set_locked(along[0], along[1], true);
+    for (const Index w : along) unlock(v, w);
+    if (!surface) set_locked(along[0], along[1], vertices_[v].place.curve);
     return true;
   }
   return false;
@@ -313,27 +382,16 @@ PatchVertex ImprovePatch::between(Index a, Index b) const {
   middle.free = true;
   middle.x = 0.5 * (u.x + v.x);
   Index owner = u.owner;
-  if (!is_locked(a, b)) {
+  const LockedEdge* locked = locked_edge(a, b);
+  if (!locked) {
     middle.x = map_->project(middle.x, owner, middle.normal);
     middle.owner = owner;
     return middle;
   }
-  const Index curve = u.place.curve != kNone ? u.place.curve : v.place.curve;
-  if (curve == kNone || (v.place.curve != kNone && v.place.curve != curve)) return middle;
-  const double length = curves_->length(curve);
-  const auto position = [&](const SeedPlace& place, double near) {
-    if (place.curve == curve) return place.position;
-    const auto [first, last] = curves_->ends(curve);
-    if (first == last) return near < 0.5 * length ? 0.0 : length;
-    return place.corner == first ? 0.0 : length;
-  };
-  const double on = u.place.curve == curve ? u.place.position : v.place.position;
-  const double from = position(u.place, on);
-  double to = position(v.place, on);
-  if (curves_->closed(curve) && to - from > 0.5 * length) to -= length;
-  if (curves_->closed(curve) && from - to > 0.5 * length) to += length;
-  middle.place = {Kind::curve, curve, kNone, curves_->wrap(curve, 0.5 * (from + to))};
-  middle.x = curves_->point(curve, middle.place.position);
+  if (locked->curve == kNone) return middle;
+  const auto [from, to] = stretch(*locked);
+  middle.place = {Kind::curve, locked->curve, kNone, curves_->wrap(locked->curve, 0.5 * (from + to))};
+  middle.x = curves_->point(locked->curve, middle.place.position);
   middle.owner = owner;
   return middle;
 }
@@ -357,9 +415,9 @@ bool ImprovePatch::split(Index a, Index b) {
     triangles_.back().facing = facing;
   }
   if (locked) {
-    set_locked(a, b, false);
-    set_locked(a, m, true);
-    set_locked(m, b, true);
+    unlock(a, b);
+    set_locked(a, m, middle.place.curve);
+    set_locked(m, b, middle.place.curve);
   }
   return true;
 }
@@ -402,6 +460,33 @@ std::vector<std::array<Index, 2>> ImprovePatch::wanted_flips(Index v) const {
             [](const Flip& f, const Flip& g) { return f.gain != g.gain ? f.gain > g.gain : f.edge < g.edge; });
   std::vector<std::array<Index, 2>> edges;
   for (const Flip& f : flips) edges.push_back(f.edge);
+  return edges;
+}
+
+std::vector<std::array<Index, 2>> ImprovePatch::edges_at_worst() const {
+  const PatchTriangle* worst = nullptr;
+  for (const PatchTriangle& t : triangles_) {
+    if (!t.alive || (worst && t.cost <= worst->cost)) continue;
+    std::array<Vec3, 3> x;
+    std::array<bool, 3> locked;
+    for (int m = 0; m < 3; ++m) {
+      x[m] = vertices_[t.v[m]].x;
+      locked[m] = is_locked(t.v[m], t.v[(m + 1) % 3]);
+    }
+    const bool free = std::any_of(t.v.begin(), t.v.end(), [&](Index v) { return vertices_[v].free; });
+    if (free && !angle_is_imposed(x, locked)) worst = &t;
+  }
+  std::vector<std::array<Index, 2>> edges;
+  if (!worst) return edges;
+  const auto shared = [&](const Triangle& t) {
+    return std::count_if(t.begin(), t.end(), [&](Index v) { return has(worst->v, v); });
+  };
+  for (const Index v : worst->v)
+    for (const Index t : stars_[v])
+      if (const Triangle& w = triangles_[t].v; shared(w) > 1)
+        for (int m = 0; m < 3; ++m) edges.push_back(key(w[m], w[(m + 1) % 3]));
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   return edges;
 }
 

@@ -36,6 +36,10 @@ struct ShapeExcess {
 };
 ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
 
+// Whether the smallest angle is between two locked edges, which curves give it. `locked` tells of the edges from each
+// corner to the next.
+bool angle_is_imposed(const std::array<Vec3, 3>& corners, const std::array<bool, 3>& locked);
+
 // The surface by the cells of a diagram: the nearest seed of a point owns the piece of the surface that the point goes
 // to, which keeps points on their sheet.
 class CellMap {
@@ -67,6 +71,12 @@ struct PatchVertex {
   Vec3 start;         // where it was before that
 };
 
+// An edge that stays, lower vertex first, and the curve that it follows; kNone if that is not known.
+struct LockedEdge {
+  Index a, b;
+  Index curve = kNone;
+};
+
 class ImprovePatch {
  public:
   // `curves` may be null if no vertex is on one. Both must outlive the object, and its copies.
@@ -79,14 +89,20 @@ class ImprovePatch {
   void set_outside(Index v, std::size_t degree) {
     vertices_[v].outside = static_cast<Index>(degree - stars_[v].size());
   }
-  // Edges that stay, lower vertex first, each pair once; in any order.
-  void lock(std::vector<std::array<Index, 2>> edges);
+  // In any order; an edge may be there more than once.
+  void lock(std::vector<LockedEdge> edges);
 
   const std::vector<PatchVertex>& vertices() const { return vertices_; }
   std::vector<Triangle> triangles() const;
-  // Sum of the triangles' costs, each less `average`, and so much for each triangle that a vertex on the surface has
-  // more or fewer than six.
+  // How many vertices are nearer to a locked edge's stretch of its curve than the edge's ends: their cells cut the
+  // curve.
+  std::size_t encroachments() const;
+  // Sum of the triangles' costs, each less `average`; so much for each triangle that a vertex on the surface has more
+  // or fewer than six; and a high price for each encroachment.
   double cost(double average, double irregular) const;
+
+  // By how much the worst triangles miss the goal.
+  ShapeExcess worst() const;
 
   // Each is false, and nothing is changed, if the triangulation has no room for it.
   bool remove(Index v);               // corners and what is not free stay
@@ -96,6 +112,8 @@ class ImprovePatch {
 
   // The edges at v and opposite to it whose flip brings the degrees nearest to six, best first.
   std::vector<std::array<Index, 2>> wanted_flips(Index v) const;
+  // The edges of the costliest triangle that has a free vertex and whose angle is not imposed, and of those beside it.
+  std::vector<std::array<Index, 2>> edges_at_worst() const;
   // The vertex at the far end of v's longest edge, and the triangle at v of the largest area.
   Index farthest_neighbour(Index v) const;
   std::size_t largest_triangle(Index v) const;
@@ -119,8 +137,12 @@ class ImprovePatch {
   double cost_of(const PatchTriangle& t) const;
   double star_cost(Index v) const;
   int excess_degree(Index v) const;
-  bool is_locked(Index a, Index b) const;
-  void set_locked(Index a, Index b, bool locked);
+  const LockedEdge* locked_edge(Index a, Index b) const;  // null if it is not locked
+  bool is_locked(Index a, Index b) const { return locked_edge(a, b); }
+  void set_locked(Index a, Index b, Index curve);
+  void unlock(Index a, Index b);
+  // The positions of an edge's ends on its curve; beyond the ends of a closed one if the edge leads over its start.
+  std::array<double, 2> stretch(const LockedEdge& edge) const;
   // The triangles at an edge; false unless there are two that agree in orientation.
   bool triangles_at(Index a, Index b, std::size_t& left, std::size_t& right) const;
   void replace(std::size_t t, const Triangle& corners, const Vec3& facing);
@@ -134,8 +156,8 @@ class ImprovePatch {
   ShapeGoal goal_;
   std::vector<PatchVertex> vertices_;
   std::vector<PatchTriangle> triangles_;
-  std::vector<std::vector<Index>> stars_;     // triangles at each vertex
-  std::vector<std::array<Index, 2>> locked_;  // sorted
+  std::vector<std::vector<Index>> stars_;  // triangles at each vertex
+  std::vector<LockedEdge> locked_;         // sorted
 };
 
 }  // namespace bisector

@@ -25,9 +25,11 @@ namespace {
 constexpr double kSmallestFeature = 0.25;  // of the uniform edge length: smaller ones do not show in the result
 constexpr double kSamplesPerVertex = 32;   // of the surface for lfs: their spacing is then that smallest feature
 constexpr double kMostSamples = 300'000;
-constexpr double kLongest = 2;               // edge length by h above which an edge is bisected
-constexpr double kSteepest = 3;              // ratio of densities above which it is
+constexpr double kSteepest = 3;              // ratio of densities above which an edge is bisected
 constexpr double kShortest = 0.7;            // edge length by h below which it is not for the sake of that ratio
+constexpr double kLong = 2;                  // edge length by h above which h is looked at between the ends
+constexpr double kLongest = 32;              // edge length by h above which an edge is bisected whatever h is there
+constexpr double kFarthest = 1.2;            // ratio of the density to the linear one above which an edge is bisected
 constexpr std::size_t kTriangles = 400'000;  // refinement stops there
 constexpr double kMostVertices = 1e8;        // that an edge length may ask for
 constexpr int kRounds = 8;                   // of refinement and calibration
@@ -211,6 +213,12 @@ class Field {
     if (bound_) bounds_.push_back((*bound_)(p));
   }
 
+  // Whether the field may differ from the one that is linear between vertices.
+  bool varies() const { return kind_ == DensityKind::lfs || bound_; }
+  // The field and its bound at p, where it would be `linear` if it were linear.
+  double value(const Vec3& p, double linear) const { return kind_ == DensityKind::lfs ? from_size(p) : linear; }
+  double bound(const Vec3& p) const { return bound_ ? (*bound_)(p) : std::numeric_limits<double>::infinity(); }
+
  private:
   double from_size(const Vec3& p) const { return std::pow(std::clamp((*size_)(p) / unit_, least_, 1.0), -exponent_); }
 
@@ -330,6 +338,7 @@ class Refiner {
   bool run() {
     const EdgeTable table = edge_table(mesh_.triangles, mesh_.vertices.size());
     for (const auto& [a, b] : table.edges) push(a, b);
+    for (const Triangle& triangle : mesh_.triangles) push_longest(triangle);
     if (queue_.empty()) return false;
     triangles_at_.reserve(2 * table.edges.size());
     for (std::size_t e = 0; e < table.edges.size(); ++e) {
@@ -390,14 +399,65 @@ class Refiner {
     const auto [least, largest] = std::minmax(lengths_[a], lengths_[b]);
     const double ratio = largest / least;
     const bool steep = ratio * ratio * ratio * ratio > kSteepest && length > kShortest * least;
-    if (length > kLongest * least || steep) queue_.push(e);
+    if (steep || length > kLongest * least || (length > kLong * least && differs_along(a, b, length / least)))
+      queue_.push(e);
+  }
+
+  // The longest edge of a triangle inside which h differs.
+  void push_longest(const Triangle& v) {
+    if (!field_.varies()) return;
+    const Edge longest = std::max({edge(v[0], v[1]), edge(v[1], v[2]), edge(v[2], v[0])}, Later());
+    const double length = std::sqrt(std::get<0>(longest));
+    const double least = std::min({lengths_[v[0]], lengths_[v[1]], lengths_[v[2]]});
+    const double area = triangle_area(mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]);
+    // Where all of a triangle is near its edges, they tell enough. Longer ones are bisected anyway.
+    if (!(length > kLong * least) || length > kLongest * least || 2 * area < least * length) return;
+    const int n = static_cast<int>(std::ceil(length / least));
+    for (int i = 1; i + 1 < n; ++i)
+      for (int j = 1; i + j < n; ++j)
+        if (differs(v, {static_cast<double>(i) / n, static_cast<double>(j) / n, static_cast<double>(n - i - j) / n})) {
+          queue_.push(longest);
+          return;
+        }
+  }
+
+  // Looks at points about as far from each other as h, which changes little from one to the next.
+  bool differs_along(Index a, Index b, double length) const {
+    if (!field_.varies()) return false;
+    const int n = static_cast<int>(std::ceil(length));
+    for (int i = 1; i < n; ++i) {
+      const double w = static_cast<double>(i) / n;
+      if (differs({a, b, b}, {1 - w, w, 0})) return true;
+    }
+    return false;
+  }
+
+  // Whether h at a point of a triangle is far from what the density gives that is linear between its corners.
+  bool differs(const Triangle& v, const std::array<double, 3>& weights) const {
+    Vec3 p{};
+    double linear = 0, density = 0;
+    for (int k = 0; k < 3; ++k) {
+      p += weights[k] * mesh_.vertices[v[k]];
+      linear += weights[k] * field_.values()[v[k]];
+      density += weights[k] / power4(lengths_[v[k]]);
+    }
+    double h = bounded(factor_ / fourth_root(field_.value(p, linear)), field_.bound(p));
+    if (options_.gradation > 0)
+      for (const Index k : v) h = std::min(h, lengths_[k] + options_.gradation * norm(p - mesh_.vertices[k]));
+    const double ratio = density * power4(h);
+    return ratio > kFarthest || ratio * kFarthest < 1;
+  }
+
+  static double power4(double x) { return x * x * (x * x); }
+
+  double bounded(double h, double bound) const {
+    h = std::max(std::min(h, bound), options_.min_edge);
+    return options_.max_edge > 0 ? std::min(h, options_.max_edge) : h;
   }
 
   double raw_length(Index v) const {
-    double h = factor_ / fourth_root(field_.values()[v]);
-    if (!field_.bounds().empty()) h = std::min(h, field_.bounds()[v]);
-    h = std::max(h, options_.min_edge);
-    return options_.max_edge > 0 ? std::min(h, options_.max_edge) : h;
+    return bounded(factor_ / fourth_root(field_.values()[v]),
+                   field_.bounds().empty() ? std::numeric_limits<double>::infinity() : field_.bounds()[v]);
   }
 
   // Lets two vertices limit each other. The next calibration does so for all; until then this keeps a finer place that
@@ -441,6 +501,8 @@ class Refiner {
       std::vector<Index>& between = triangles_at_[key(m, c)];
       between.insert(between.end(), {t, added});
       push(m, c);
+      push_longest(mesh_.triangles[t]);
+      push_longest(mesh_.triangles[added]);
     }
     push(a, m);
     push(m, b);

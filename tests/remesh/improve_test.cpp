@@ -72,6 +72,23 @@ TEST(ShapeExcess, IsTheAnglesBeyondTheGoal) {
   }
 }
 
+TEST(ShapeExcess, IsImposedBetweenLockedEdges) {
+  for (const double apex : {5.0, 20.0, 59.0, 61.0, 110.0}) {
+    const double half = apex / 2 * std::numbers::pi / 180;
+    const std::array<Vec3, 3> t{
+        Vec3{0, 0, 0}, {std::cos(half), -std::sin(half), 0}, {std::cos(half), std::sin(half), 0}};
+    for (int locked = 0; locked < 8; ++locked) {
+      const bool legs = (locked & 1) && (locked & 4), base = locked & 2;
+      const bool imposed = apex < 60 ? legs : base && (locked & 5);
+      const auto told = angle_is_imposed(t, {(locked & 1) != 0, base, (locked & 4) != 0});
+      // Of equal legs either is the shortest.
+      if (apex < 60 || legs || !base) {
+        EXPECT_EQ(told, imposed) << apex << ' ' << locked;
+      }
+    }
+  }
+}
+
 // --- The patch ---
 
 Csr<Index> rings_of(const Dual& dual, std::size_t seeds) {
@@ -150,6 +167,61 @@ TEST(ImprovePatch, LockedEdgesStay) {
   const Triangle& t = whole.dual.triangles[100];
   whole.patch.lock({{std::min(t[0], t[1]), std::max(t[0], t[1])}});
   EXPECT_FALSE(whole.patch.flip(t[0], t[1]));
+}
+
+// On a straight curve, seeds in the balls around its links have cells that cut it, or are behind such a cell.
+TEST(ImprovePatch, EncroachmentsTellOfCellsThatCutTheCurve) {
+  const TriangleMesh mesh = grid_patch(4, 4);
+  const Box box = bounding_box(mesh.vertices);
+  FeatureGraph graph;
+  graph.corners = {0, 4};
+  for (Index v = 0; v < 4; ++v) graph.edges.push_back({v, v + 1});
+  graph.curves = {{{0, 1, 2, 3, 4}, false}};
+  const Surface surface(mesh);
+  const FeatureCurves curves(graph, mesh.vertices);
+  ASSERT_EQ(curves.size(), 1u);
+  const FeatureTrace trace(surface, curves);
+  int broken = 0, whole = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    SplitMix64 random(seed);
+    PlacedSeeds seeds;
+    for (const Index corner : {0, 1}) seeds.add(curves.corner(corner), {Kind::fixed, kNone, corner, 0});
+    const Index links = 5;
+    for (Index k = 1; k < links; ++k) {
+      const double position = curves.length(0) * k / links;
+      seeds.add(curves.point(0, position), {Kind::curve, 0, kNone, position});
+    }
+    for (int k = 0; k < 12; ++k) {
+      Vec3 x = box.lo;
+      for (int m = 0; m < 3; ++m) x[m] += random.unit() * (box.hi[m] - box.lo[m]);
+      seeds.add(x, {});
+    }
+    const Diagram diagram = diagram_of(surface, seeds.positions(), NeighbourSource::nearest);
+    const Csr<Index> rings = rings_of(diagram.dual, seeds.size());
+    const CellMap map(surface, seeds.positions(), diagram.moments.triangles, rings);
+    ImprovePatch patch(map, &curves, kGoal);
+    for (Index v = 0; v < seeds.size(); ++v) {
+      PatchVertex vertex;
+      vertex.x = seeds.position(v);
+      vertex.place = seeds.place(v);
+      vertex.owner = vertex.seed = v;
+      patch.add_vertex(vertex);
+    }
+    std::vector<LockedEdge> chain;
+    for (Index k = 0; k < links; ++k) {
+      const Index a = k == 0 ? 0 : k + 1, b = k + 1 == links ? 1 : k + 2;
+      chain.push_back({std::min(a, b), std::max(a, b), 0});
+    }
+    patch.lock(chain);
+    std::size_t strangers = 0;
+    const std::vector<CurveInterval> intervals = trace.trace(diagram.polygons)[0];
+    for (const CurveInterval& i : intervals) strangers += seeds.on_surface(i.cell);
+    EXPECT_GE(patch.encroachments(), strangers) << seed;
+    EXPECT_EQ(patch.encroachments() > 0, strangers > 0) << seed;
+    ++(strangers > 0 ? broken : whole);
+  }
+  EXPECT_GT(broken, 10);
+  EXPECT_GT(whole, 10);
 }
 
 TEST(ImprovePatch, OperationsKeepASphereASphere) {
