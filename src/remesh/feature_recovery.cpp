@@ -17,9 +17,11 @@ namespace {
 
 using Kind = SeedPlace::Kind;
 
-// Rounds of mending. The first keep to the number of seeds that a curve should have; all of kMovingRounds end with an
-// optimisation, of kFirstSteps in the first to kLastSteps in the last; kInsertingRounds follow in which nothing moves.
+// Rounds of mending, at most. The first keep to the number of seeds that a curve should have; all of kMovingRounds end
+// with an optimisation, of kFirstSteps in the first to kLastSteps in the last; kInsertingRounds follow in which nothing
+// moves. What comes next begins at once when a round leaves more than this share of the faults.
 constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
+constexpr double kWorthARound = 0.75;
 constexpr int kFirstSteps = 20, kLastSteps = 4;
 // Rounds of clearing curves at the end of a level, and steps after each.
 constexpr int kClearingRounds = 4, kClearingSteps = 15;
@@ -401,7 +403,8 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   const std::size_t count = run.seeds.size(), most = count + count / 4 + kMostAdded;
   protect_acute_corners(curves, measure, c, run.seeds);
   PlacedSeeds best;
-  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  std::size_t fewest = std::numeric_limits<std::size_t>::max(), previous = fewest;
+  bool crowd = false;
   for (int round = 0;; ++round) {
     run.context().check();
     const Found found = find_faults(trace, curves, run.seeds.places(), run.diagram(kChains));
@@ -410,10 +413,14 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
       fewest = found.faults.size();
       best = run.seeds;
     }
+    const bool stuck = static_cast<double>(found.faults.size()) > kWorthARound * static_cast<double>(previous);
+    previous = found.faults.size();
+    if (stuck && crowd) round = std::max(round, kMovingRounds);
+    crowd = crowd || stuck || round >= kRelocatingRounds;
     const bool last = round >= kMovingRounds;
     if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most) break;
     const SeedsBefore before = last ? SeedsBefore{} : seeds_before(run);
-    const bool changed = mend(curves, measure, c, found.faults, round >= kRelocatingRounds, last, run.seeds);
+    const bool changed = mend(curves, measure, c, found.faults, crowd, last, run.seeds);
     if (last && !changed) break;
     if (last) continue;
     if (!changed) {

@@ -213,11 +213,9 @@ class Field {
     if (bound_) bounds_.push_back((*bound_)(p));
   }
 
-  // Whether the field may differ from the one that is linear between vertices.
-  bool varies() const { return kind_ == DensityKind::lfs || bound_; }
-  // The field and its bound at p, where it would be `linear` if it were linear.
-  double value(const Vec3& p, double linear) const { return kind_ == DensityKind::lfs ? from_size(p) : linear; }
-  double bound(const Vec3& p) const { return bound_ ? (*bound_)(p) : std::numeric_limits<double>::infinity(); }
+  // Whether the field between vertices is not known before there is one. Other fields are linear.
+  bool measured() const { return kind_ == DensityKind::lfs; }
+  const SizeField* bound() const { return bound_; }
 
  private:
   double from_size(const Vec3& p) const { return std::pow(std::clamp((*size_)(p) / unit_, least_, 1.0), -exponent_); }
@@ -405,7 +403,7 @@ class Refiner {
 
   // The longest edge of a triangle inside which h differs.
   void push_longest(const Triangle& v) {
-    if (!field_.varies()) return;
+    if (field_.measured() || !field_.bound()) return;
     const Edge longest = std::max({edge(v[0], v[1]), edge(v[1], v[2]), edge(v[2], v[0])}, Later());
     const double length = std::sqrt(std::get<0>(longest));
     const double least = std::min({lengths_[v[0]], lengths_[v[1]], lengths_[v[2]]});
@@ -423,7 +421,8 @@ class Refiner {
 
   // Looks at points about as far from each other as h, which changes little from one to the next.
   bool differs_along(Index a, Index b, double length) const {
-    if (!field_.varies()) return false;
+    if (field_.measured()) return true;
+    if (!field_.bound()) return false;
     const int n = static_cast<int>(std::ceil(length));
     for (int i = 1; i < n; ++i) {
       const double w = static_cast<double>(i) / n;
@@ -441,7 +440,7 @@ class Refiner {
       linear += weights[k] * field_.values()[v[k]];
       density += weights[k] / power4(lengths_[v[k]]);
     }
-    double h = bounded(factor_ / fourth_root(field_.value(p, linear)), field_.bound(p));
+    double h = bounded(factor_ / fourth_root(linear), (*field_.bound())(p));
     if (options_.gradation > 0)
       for (const Index k : v) h = std::min(h, lengths_[k] + options_.gradation * norm(p - mesh_.vertices[k]));
     const double ratio = density * power4(h);

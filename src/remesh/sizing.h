@@ -56,12 +56,13 @@ struct SizedMesh {
   EdgeSplits splits;
 };
 
-// Bisects edges over which rho changes by more than a factor of 3 unless they are shorter than 0.7 h; those longer than
-// 2 h along which, or in a triangle of which, rho is not within a factor of 1.2 of the linear one, as far as points
-// about h apart tell; and those longer than 32 h. Longer edges of the triangles at such an edge go first (Rivara 1984),
-// and all triangles at an edge are bisected with it, so no T-junction and no ever thinner triangle appears. New
-// vertices are middles as rounded; lfs is measured there, other fields are linear. Stops at 400,000 triangles or the
-// input's number, if that is larger; a uniform density bisects nothing. Throws as compute_sizing.
+// Bisects edges over which rho changes by more than a factor of 3 unless they are shorter than 0.7 h, and those longer
+// than 2 h if rho between vertices is not known (lfs) or, because of `bound`, not within a factor of 1.2 of the linear
+// one, as far as points about h apart tell, along the edge or in its triangles; longer than 32 h, all. Longer edges of
+// the triangles at such an edge go first (Rivara 1984), and all triangles at an edge are bisected with it, so no
+// T-junction and no ever thinner triangle appears. New vertices are middles as rounded; lfs is measured there, other
+// fields are linear. Stops at 400,000 triangles or the input's number, if that is larger; a uniform density bisects
+// nothing. Throws as compute_sizing.
 //
 // `bound`, if there is one, is an upper bound of h beside those of the options. It is not scaled with the field.
 SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target,

@@ -356,7 +356,7 @@ TEST(SizingRefinement, ResolvesTheField) {
   for (const auto& [a, b] : edge_table(sized.mesh.triangles, sized.mesh.vertices.size()).edges) {
     const double length = norm(sized.mesh.vertices[b] - sized.mesh.vertices[a]);
     // The last calibration moves all lengths by what settles them.
-    EXPECT_LE(length, 33 * std::min(h[a], h[b]));
+    EXPECT_LE(length, 2.05 * std::min(h[a], h[b]));
     const double ratio = std::pow(std::max(h[a], h[b]) / std::min(h[a], h[b]), 4);
     EXPECT_TRUE(ratio < 3.1 || length < 0.72 * std::min(h[a], h[b])) << ratio << ' ' << length;
   }
