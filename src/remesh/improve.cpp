@@ -41,6 +41,8 @@ constexpr int kSearchSteps = 3;
 constexpr std::size_t kSearchWidth = 4;
 constexpr double kSearchGain = 4;  // average costs of a triangle that a result must save
 constexpr int kSearches = 4;       // of results that are tried in turn, where the diagram does not bear them out
+// Searches are slow: there are at most so many, and one for so many seeds.
+constexpr std::size_t kMostSearches = 60, kSeedsPerSearch = 100;
 // Edge flips that are tried per patch.
 constexpr std::size_t kFlips = 2;
 // Patches that are tried for each seed that is missing or too many, and the share of the number of seeds by which it
@@ -177,7 +179,8 @@ class Improver {
   std::vector<Index> seeds_around(Index middle) const;
   PatchVertex vertex_of(Index seed, const CellMap& map) const;
   ImprovePatch patch_of(const std::vector<Index>& seeds, const CellMap& map) const;
-  // The curve that two seeds are neighbours on; kNone if there is none, or more than one between two corners.
+  // The curve that two seeds are neighbours on; kNone if it passes one of them, which is the corner of others, or if
+  // there is more than one between two corners.
   Index curve_between(Index a, Index b) const;
   Change best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const;
   std::optional<ImprovePatch> try_one(const ImprovePatch& start, Aim aim, std::size_t& trials) const;
@@ -207,7 +210,8 @@ class Improver {
   ShapeGoal goal_;
   std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
   std::size_t poor_left_ = 0;                      // poor seeds that may still be tried
-  std::vector<char> tried_;                        // by seed: how often in vain since something near it has changed
+  std::size_t searches_left_ = 0;
+  std::vector<char> tried_;  // by seed: how often in vain since something near it has changed
   Snapshot now_;
   ImproveReport report_;
 };
@@ -280,10 +284,11 @@ std::vector<Vec3> Improver::new_faults(const Snapshot& next) const {
 
 bool Improver::breaks_curve(const Snapshot& next, const Change& change) const {
   const Vec3& middle = now_.seeds.position(change.middle);
-  double reach = 0;
-  for (const Index v : change.footprint) reach = std::max(reach, norm2(now_.seeds.position(v) - middle));
+  double squared_reach = 0;
+  for (const Index v : change.footprint)
+    squared_reach = std::max(squared_reach, norm2(now_.seeds.position(v) - middle));
   return std::any_of(next.features.faults.begin(), next.features.faults.end(), [&](const FeatureReport::Fault& fault) {
-    return newly_broken(next, fault.curve) && norm2(fault.at - middle) <= reach &&
+    return newly_broken(next, fault.curve) && norm2(fault.at - middle) <= squared_reach &&
            std::find(change.curves.begin(), change.curves.end(), fault.curve) != change.curves.end();
   });
 }
@@ -334,7 +339,11 @@ Index Improver::curve_between(Index a, Index b) const {
   const SeedPlace &u = now_.seeds.place(a), &v = now_.seeds.place(b);
   if (u.curve != kNone || v.curve != kNone) {
     const Index curve = u.curve != kNone ? u.curve : v.curve;
-    return v.curve == kNone || v.curve == curve ? curve : kNone;
+    const auto on_it = [&](const SeedPlace& place) {
+      const auto [first, last] = run_.curves().ends(curve);
+      return place.curve == curve || (place.corner != kNone && (place.corner == first || place.corner == last));
+    };
+    return on_it(u) && on_it(v) ? curve : kNone;
   }
   if (u.corner == kNone || v.corner == kNone) return kNone;
   Index found = kNone;
@@ -517,8 +526,9 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
     return a.excess != b.excess ? a.excess > b.excess : a.cost != b.cost ? a.cost > b.cost : a.seed < b.seed;
   });
   const auto missing = static_cast<long long>(wanted()) - static_cast<long long>(now_.seeds.size());
-  const std::size_t most =
-      !counts(aim) ? now_.seeds.size() : kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
+  std::size_t most = now_.seeds.size();
+  if (aim == Aim::no_bad_angles) most = searches_left_;
+  if (counts(aim)) most = kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
   std::vector<char> taken(now_.dual().triangles.size(), 0);
   std::vector<Index> middles;
   for (const Candidate& candidate : candidates) {
@@ -563,6 +573,7 @@ std::vector<char> Improver::choose_changes(const std::vector<Change>& changes, A
 std::size_t Improver::batch(Aim aim) {
   const std::vector<Index> middles = choose_middles(aim);
   if (middles.empty()) return 0;
+  if (aim == Aim::no_bad_angles) searches_left_ -= middles.size();
   const CellMap map(run_.surface(), now_.seeds.positions(), now_.moments().triangles, now_.rings);
   std::vector<Change> changes(middles.size());
   std::vector<std::size_t> trials(middles.size(), 0);
@@ -824,8 +835,11 @@ ImproveReport Improver::run() {
     if (batch(Aim::better) == 0) break;
   }
   tried_.assign(now_.seeds.size(), 0);
-  for (int round = 0; round < kBatches && !choose_middles(Aim::no_bad_angles).empty(); ++round)
+  searches_left_ = kMostSearches + now_.seeds.size() / kSeedsPerSearch;
+  for (int round = 0; round < kBatches && !choose_middles(Aim::no_bad_angles).empty(); ++round) {
+    run_.context().report({"bad angles", round + 1, kBatches, now_.moments().energy, 0, 1});
     batch(Aim::no_bad_angles);
+  }
   tried_.assign(now_.seeds.size(), 0);
   for (int round = 0; round < kBatches && now_.seeds.size() != wanted(); ++round)
     batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
