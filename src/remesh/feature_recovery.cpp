@@ -39,17 +39,6 @@ constexpr double kPassing = 0.2;
 // A cell that holds less is pushed away from the curve by this share of its seed's distance.
 constexpr double kPush = 0.3;
 
-struct Fault {
-  Index curve;
-  double from, to;  // where: between these positions
-  Index cell;       // that does not belong there; kNone if a seed is missing
-};
-
-struct Found {
-  std::vector<Fault> faults;
-  FeatureReport report;
-};
-
 // Triangles of the dual at each edge between seeds on features, as often as the diagram has them.
 std::map<std::array<Index, 2>, Index> dual_edge_counts(const Dual& dual, const std::vector<SeedPlace>& places) {
   const auto placed = [&](Index seed) { return places[seed].kind != Kind::surface; };
@@ -74,76 +63,6 @@ bool passes_corner(const FeatureCurves& curves, const CurveInterval& interval, I
   return norm(nearest - corner) <= kPassing * length;
 }
 
-Found find_faults(const FeatureTrace& trace, const FeatureCurves& curves, const std::vector<SeedPlace>& places,
-                  const Diagram& diagram) {
-  const std::vector<std::vector<CurveInterval>> traces = trace.trace(diagram.polygons);
-  const std::map<std::array<Index, 2>, Index> dual_edges = dual_edge_counts(diagram.dual, places);
-  Found found;
-  std::map<std::array<Index, 2>, Index> taken;  // the curve that has an edge of the dual
-  std::vector<Index> visits(places.size(), 0);
-  const auto has_link = [&](Index a, Index b, Index curve) {
-    const auto in_dual = dual_edges.find({std::min(a, b), std::max(a, b)});
-    return in_dual != dual_edges.end() && in_dual->second >= trace.sheets(curve);
-  };
-  for (Index c = 0; c < traces.size(); ++c) {
-    const std::vector<CurveInterval>& intervals = traces[c];
-    const std::size_t before = found.faults.size(), count = intervals.size();
-    const bool closed = curves.closed(c);
-    std::vector<char> valid(count, 0);
-    const bool around = closed && count > 1 && intervals.front().cell == intervals.back().cell;
-    for (std::size_t k = 0; k < count; ++k) {
-      const CurveInterval& i = intervals[k];
-      const SeedPlace& place = places[i.cell];
-      const bool own = place.curve == c;
-      const bool corner =
-          !closed && place.corner != kNone &&
-          ((k == 0 && place.corner == curves.ends(c)[0]) || (k + 1 == count && place.corner == curves.ends(c)[1]));
-      // The corner of another part of the surface is no vertex of this one.
-      const bool joined = k > 0 && k + 1 < count && has_link(intervals[k - 1].cell, i.cell, c) &&
-                          has_link(i.cell, intervals[k + 1].cell, c);
-      valid[k] = own || corner || (joined && passes_corner(curves, i, c, place));
-      if (!valid[k]) {
-        found.faults.push_back({c, i.from, i.to, i.cell});
-        continue;
-      }
-      const bool again = visits[i.cell]++ > 0 && !(around && k + 1 == count) && !corner;
-      if (again && !(place.position >= i.from && place.position <= i.to))
-        found.faults.push_back({c, i.from, i.to, kNone});
-    }
-    // A chain of edges that no other curve has, each with a triangle on every sheet.
-    const std::size_t links = count - (closed && !around ? 0 : 1);
-    for (std::size_t k = 0; k < links && count > 0; ++k) {
-      const CurveInterval &i = intervals[k], &j = intervals[(k + 1) % count];
-      if (i.cell == j.cell || !valid[k] || !valid[(k + 1) % count]) continue;
-      const std::array<Index, 2> edge{std::min(i.cell, j.cell), std::max(i.cell, j.cell)};
-      found.report.edges.push_back(edge);
-      const bool missing = !has_link(i.cell, j.cell, c);
-      const auto [other, fresh] = taken.insert({edge, c});
-      if (!missing && fresh) continue;
-      const auto middle = [](const CurveInterval& x) { return 0.5 * (x.from + x.to); };
-      double from = middle(i), to = middle(j);
-      if (places[i.cell].curve == c) from = places[i.cell].position;
-      else if (k == 0 && !closed) from = 0;
-      if (places[j.cell].curve == c) to = places[j.cell].position;
-      else if (k + 2 == count && !closed) to = curves.length(c);
-      if (to < from) to += curves.length(c);
-      found.faults.push_back({c, from, to, kNone});
-    }
-    for (const CurveInterval& i : intervals) visits[i.cell] = 0;
-    if (closed && count < 3 && found.faults.size() == before)
-      for (int part = 0; part < 3; ++part)
-        found.faults.push_back({c, curves.length(c) * part / 3, curves.length(c) * (part + 1) / 3, kNone});
-    if (found.faults.size() > before) found.report.broken.push_back(c);
-    for (std::size_t k = before; k < found.faults.size(); ++k) {
-      const double middle = 0.5 * (found.faults[k].from + found.faults[k].to);
-      found.report.faults.push_back({c, curves.point(c, curves.wrap(c, middle))});
-    }
-  }
-  std::sort(found.report.edges.begin(), found.report.edges.end());
-  found.report.edges.erase(std::unique(found.report.edges.begin(), found.report.edges.end()), found.report.edges.end());
-  return found;
-}
-
 // The first position, from the given end of an open curve, that lies `radius` away from the corner there.
 double position_at_radius(const FeatureCurves& curves, Index curve, int end, double radius) {
   const Vec3 corner = curves.corner(curves.ends(curve)[end]);
@@ -164,7 +83,7 @@ double position_at_radius(const FeatureCurves& curves, Index curve, int end, dou
 
 // Where on the curve to meet a foreign seed: as far from the corner they share as that seed, else across from it; in
 // the middle of the fault where that is elsewhere.
-double meeting_position(const FeatureCurves& curves, const PlacedSeeds& seeds, const Fault& fault) {
+double meeting_position(const FeatureCurves& curves, const PlacedSeeds& seeds, const FeatureFault& fault) {
   const double middle = 0.5 * (fault.from + fault.to), length = fault.to - fault.from;
   if (fault.cell == kNone || seeds.place(fault.cell).curve == kNone) return middle;
   const Index foreign = seeds.place(fault.cell).curve;
@@ -312,7 +231,7 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
 
 // True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved
 // away.
-bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<Fault>& faults,
+bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<FeatureFault>& faults,
           bool crowd, bool last, PlacedSeeds& seeds) {
   std::vector<std::size_t> wanted(curves.size());
   for (Index k = 0; k < curves.size(); ++k) wanted[k] = measure.edges(k, c) - (curves.closed(k) ? 0 : 1);
@@ -321,12 +240,12 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
   std::vector<char> used(seeds.size(), 0), removed(seeds.size(), 0);
   std::set<Index> loosened;
   // Missing links wait until no foreign seed is left to meet: that may be all they need.
-  const bool meeting = std::any_of(faults.begin(), faults.end(), [](const Fault& f) { return f.cell != kNone; });
+  const bool meeting = std::any_of(faults.begin(), faults.end(), [](const FeatureFault& f) { return f.cell != kNone; });
   bool changed = false;
   const auto put = [&](Index seed, Index curve, double position, Kind kind) {
     seeds.put(seed, curves.point(curve, position), {kind, curve, kNone, position});
   };
-  for (const Fault& fault : faults) {
+  for (const FeatureFault& fault : faults) {
     const double position = curves.wrap(fault.curve, meeting_position(curves, seeds, fault));
     const double length = fault.to - fault.from;
     if (fault.cell != kNone && seeds.on_surface(fault.cell)) {
@@ -369,7 +288,68 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
 
 FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves,
                              const std::vector<SeedPlace>& places, const Diagram& diagram) {
-  return find_faults(trace, curves, places, diagram).report;
+  const std::vector<std::vector<CurveInterval>> traces = trace.trace(diagram.polygons);
+  const std::map<std::array<Index, 2>, Index> dual_edges = dual_edge_counts(diagram.dual, places);
+  FeatureReport found;
+  std::map<std::array<Index, 2>, Index> taken;  // the curve that has an edge of the dual
+  std::vector<Index> visits(places.size(), 0);
+  const auto has_link = [&](Index a, Index b, Index curve) {
+    const auto in_dual = dual_edges.find({std::min(a, b), std::max(a, b)});
+    return in_dual != dual_edges.end() && in_dual->second >= trace.sheets(curve);
+  };
+  for (Index c = 0; c < traces.size(); ++c) {
+    const std::vector<CurveInterval>& intervals = traces[c];
+    const std::size_t before = found.faults.size(), count = intervals.size();
+    const bool closed = curves.closed(c);
+    std::vector<char> valid(count, 0);
+    const bool around = closed && count > 1 && intervals.front().cell == intervals.back().cell;
+    for (std::size_t k = 0; k < count; ++k) {
+      const CurveInterval& i = intervals[k];
+      const SeedPlace& place = places[i.cell];
+      const bool own = place.curve == c;
+      const bool corner =
+          !closed && place.corner != kNone &&
+          ((k == 0 && place.corner == curves.ends(c)[0]) || (k + 1 == count && place.corner == curves.ends(c)[1]));
+      // The corner of another part of the surface is no vertex of this one.
+      const bool joined = k > 0 && k + 1 < count && has_link(intervals[k - 1].cell, i.cell, c) &&
+                          has_link(i.cell, intervals[k + 1].cell, c);
+      valid[k] = own || corner || (joined && passes_corner(curves, i, c, place));
+      if (!valid[k]) {
+        found.faults.push_back({c, i.from, i.to, i.cell});
+        continue;
+      }
+      const bool again = visits[i.cell]++ > 0 && !(around && k + 1 == count) && !corner;
+      if (again && !(place.position >= i.from && place.position <= i.to))
+        found.faults.push_back({c, i.from, i.to, kNone});
+    }
+    // A chain of edges that no other curve has, each with a triangle on every sheet.
+    const std::size_t links = count - (closed && !around ? 0 : 1);
+    for (std::size_t k = 0; k < links && count > 0; ++k) {
+      const CurveInterval &i = intervals[k], &j = intervals[(k + 1) % count];
+      if (i.cell == j.cell || !valid[k] || !valid[(k + 1) % count]) continue;
+      const std::array<Index, 2> edge{std::min(i.cell, j.cell), std::max(i.cell, j.cell)};
+      found.edges.push_back(edge);
+      const bool missing = !has_link(i.cell, j.cell, c);
+      const auto [other, fresh] = taken.insert({edge, c});
+      if (!missing && fresh) continue;
+      const auto middle = [](const CurveInterval& x) { return 0.5 * (x.from + x.to); };
+      double from = middle(i), to = middle(j);
+      if (places[i.cell].curve == c) from = places[i.cell].position;
+      else if (k == 0 && !closed) from = 0;
+      if (places[j.cell].curve == c) to = places[j.cell].position;
+      else if (k + 2 == count && !closed) to = curves.length(c);
+      if (to < from) to += curves.length(c);
+      found.faults.push_back({c, from, to, kNone});
+    }
+    for (const CurveInterval& i : intervals) visits[i.cell] = 0;
+    if (closed && count < 3 && found.faults.size() == before)
+      for (int part = 0; part < 3; ++part)
+        found.faults.push_back({c, curves.length(c) * part / 3, curves.length(c) * (part + 1) / 3, kNone});
+    if (found.faults.size() > before) found.broken.push_back(c);
+  }
+  std::sort(found.edges.begin(), found.edges.end());
+  found.edges.erase(std::unique(found.edges.begin(), found.edges.end()), found.edges.end());
+  return found;
 }
 
 void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options) {
@@ -407,8 +387,8 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   bool crowd = false;
   for (int round = 0;; ++round) {
     run.context().check();
-    const Found found = find_faults(trace, curves, run.seeds.places(), run.diagram(kChains));
-    if (found.faults.empty()) return found.report;
+    const FeatureReport found = check_features(trace, curves, run.seeds.places(), run.diagram(kChains));
+    if (found.faults.empty()) return found;
     if (found.faults.size() < fewest) {
       fewest = found.faults.size();
       best = run.seeds;
@@ -435,7 +415,7 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   }
   // Sheets that intersect, or curves that cross another sheet, cannot all be had.
   run.seeds = std::move(best);
-  return find_faults(trace, curves, run.seeds.places(), run.diagram(kChains)).report;
+  return check_features(trace, curves, run.seeds.places(), run.diagram(kChains));
 }
 
 }  // namespace bisector

@@ -17,14 +17,17 @@
 
 namespace bisector {
 
+// A stretch of a curve that is not in the dual.
+struct FeatureFault {
+  Index curve;
+  double from, to;  // positions; beyond the end of a closed curve if it leads over its start
+  Index cell;       // that does not belong there; kNone if a seed is missing
+};
+
 struct FeatureReport {
   std::vector<std::array<Index, 2>> edges;  // pairs of seeds along the curves, lower first, sorted
-  std::vector<Index> broken;                // curves that are not in the dual, ascending
-  struct Fault {
-    Index curve;
-    Vec3 at;
-  };
-  std::vector<Fault> faults;  // where they are not
+  std::vector<FeatureFault> faults;         // by curve
+  std::vector<Index> broken;                // curves with faults, ascending
 };
 
 // `diagram` is that of seeds with these places, with polygons and dual.

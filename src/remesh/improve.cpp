@@ -163,7 +163,11 @@ class Improver {
   ShapeExcess worst_excess(const Snapshot& s, Index seed) const;
   bool as_good(const Snapshot& next) const;
   bool newly_broken(const Snapshot& next, Index curve) const;
-  // The places where curves break, of a change in particular.
+  Vec3 place_of(const FeatureFault& fault) const {
+    const FeatureCurves& curves = run_.curves();
+    return curves.point(fault.curve, curves.wrap(fault.curve, 0.5 * (fault.from + fault.to)));
+  }
+  // Where curves break that did not before, and whether it is a change that breaks them.
   std::vector<Vec3> new_faults(const Snapshot& next) const;
   bool breaks_curve(const Snapshot& next, const Change& change) const;
   // By how many degrees the smallest angle of a seed's triangles is less than it should be, where it is not imposed.
@@ -187,8 +191,11 @@ class Improver {
   std::optional<ImprovePatch> search(const ImprovePatch& start, std::size_t rank, std::size_t& trials) const;
   std::vector<Index> choose_middles(Aim aim);
   std::vector<char> choose_changes(const std::vector<Change>& changes, Aim aim) const;
-  // Makes changes around some seeds; returns how many hold.
-  std::size_t batch(Aim aim);
+  // Changes made around some seeds.
+  struct Batch {
+    std::size_t tried, made;
+  };
+  Batch batch(Aim aim);
   // The seeds after some changes; the new index of each, and the seeds there of each change.
   Snapshot assemble(const std::vector<Change>& changes, const std::vector<char>& on, std::vector<Index>& index,
                     std::vector<std::vector<Index>>& seeds_of) const;
@@ -277,8 +284,8 @@ bool Improver::newly_broken(const Snapshot& next, Index curve) const {
 
 std::vector<Vec3> Improver::new_faults(const Snapshot& next) const {
   std::vector<Vec3> places;
-  for (const FeatureReport::Fault& fault : next.features.faults)
-    if (newly_broken(next, fault.curve)) places.push_back(fault.at);
+  for (const FeatureFault& fault : next.features.faults)
+    if (newly_broken(next, fault.curve)) places.push_back(place_of(fault));
   return places;
 }
 
@@ -287,26 +294,19 @@ bool Improver::breaks_curve(const Snapshot& next, const Change& change) const {
   double squared_reach = 0;
   for (const Index v : change.footprint)
     squared_reach = std::max(squared_reach, norm2(now_.seeds.position(v) - middle));
-  return std::any_of(next.features.faults.begin(), next.features.faults.end(), [&](const FeatureReport::Fault& fault) {
-    return newly_broken(next, fault.curve) && norm2(fault.at - middle) <= squared_reach &&
+  return std::any_of(next.features.faults.begin(), next.features.faults.end(), [&](const FeatureFault& fault) {
+    return newly_broken(next, fault.curve) && norm2(place_of(fault) - middle) <= squared_reach &&
            std::find(change.curves.begin(), change.curves.end(), fault.curve) != change.curves.end();
   });
 }
 
 double Improver::angle_missing(Index seed) const {
   double missing = 0;
-  const auto& edges = now_.features.edges;
   for (const Index* t = now_.stars.begin(seed); t != now_.stars.end(seed); ++t) {
     if (now_.excess[*t].under <= missing) continue;
     const Triangle& v = now_.dual().triangles[*t];
-    std::array<Vec3, 3> x;
-    std::array<bool, 3> locked;
-    for (int m = 0; m < 3; ++m) {
-      x[m] = now_.seeds.position(v[m]);
-      const auto [a, b] = std::minmax(v[m], v[(m + 1) % 3]);
-      locked[m] = std::binary_search(edges.begin(), edges.end(), std::array<Index, 2>{a, b});
-    }
-    if (!angle_is_imposed(x, locked)) missing = now_.excess[*t].under;
+    const std::array<Vec3, 3> x{now_.seeds.position(v[0]), now_.seeds.position(v[1]), now_.seeds.position(v[2])};
+    if (!angle_is_imposed(x, locked_edges(v, now_.features.edges))) missing = now_.excess[*t].under;
   }
   return missing;
 }
@@ -379,11 +379,12 @@ ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& 
       patch.add_vertex(vertex);
     }
     patch.add_triangle(local);
+    const std::array<bool, 3> on_curve = locked_edges(corners, now_.features.edges);
     for (int m = 0; m < 3; ++m) {
-      const auto [a, b] = std::minmax({corners[m], corners[(m + 1) % 3]});
-      if (std::binary_search(now_.features.edges.begin(), now_.features.edges.end(), std::array<Index, 2>{a, b}))
-        locked.push_back(
-            {std::min(local[m], local[(m + 1) % 3]), std::max(local[m], local[(m + 1) % 3]), curve_between(a, b)});
+      const int next = (m + 1) % 3;
+      if (on_curve[m])
+        locked.push_back({std::min(local[m], local[next]), std::max(local[m], local[next]),
+                          curve_between(corners[m], corners[next])});
     }
   }
   for (std::size_t k = 0; k < members.size(); ++k)
@@ -515,9 +516,13 @@ std::vector<Index> Improver::choose_middles(Aim aim) {
       sum += now_.costs[*t];
       worst = std::max(worst, now_.costs[*t]);
     }
-    const bool searches = aim == Aim::no_bad_angles;
-    if (searches && !(angle_missing(v) > bad_excess())) continue;
-    const double excess = searches ? angle_missing(v) : counts(aim) ? 0 : worst_excess(now_, v).most();
+    double excess = 0;
+    if (aim == Aim::no_bad_angles) {
+      excess = angle_missing(v);
+      if (!(excess > bad_excess())) continue;
+    } else if (!counts(aim)) {
+      excess = worst_excess(now_, v).most();
+    }
     const Candidate candidate{v, excess, sum / static_cast<double>(now_.stars.size(v)) + worst};
     if (counts(aim) || candidate.excess > 0 || candidate.cost > 2 * kPoor * now_.average)
       candidates.push_back(candidate);
@@ -570,9 +575,9 @@ std::vector<char> Improver::choose_changes(const std::vector<Change>& changes, A
   return on;
 }
 
-std::size_t Improver::batch(Aim aim) {
+Improver::Batch Improver::batch(Aim aim) {
   const std::vector<Index> middles = choose_middles(aim);
-  if (middles.empty()) return 0;
+  if (middles.empty()) return {0, 0};
   if (aim == Aim::no_bad_angles) searches_left_ -= middles.size();
   const CellMap map(run_.surface(), now_.seeds.positions(), now_.moments().triangles, now_.rings);
   std::vector<Change> changes(middles.size());
@@ -602,7 +607,7 @@ std::size_t Improver::batch(Aim aim) {
     if (!removed[v]) tried_[kept++] = tried_[v];
   tried_.resize(kept);
   tried_.resize(now_.seeds.size(), 0);
-  return made;
+  return {middles.size(), made};
 }
 
 Snapshot Improver::assemble(const std::vector<Change>& changes, const std::vector<char>& on, std::vector<Index>& index,
@@ -635,7 +640,7 @@ Snapshot Improver::assemble(const std::vector<Change>& changes, const std::vecto
   return next;
 }
 
-// What ImprovePatch::cost gives for the triangles at some seeds.
+// What ImprovePatch::cost gives for the triangles at some seeds, without the price of encroachments.
 double cost_at(const Snapshot& s, std::vector<Index> seeds, double average, double irregular) {
   std::vector<Index> triangles;
   for (std::size_t k = 0, count = seeds.size(); k < count; ++k) {
@@ -832,13 +837,13 @@ ImproveReport Improver::run() {
   smooth();
   for (int round = 0; round < kBatches; ++round) {
     run_.context().report({"improving", round + 1, kBatches, now_.moments().energy, 0, 1});
-    if (batch(Aim::better) == 0) break;
+    if (batch(Aim::better).made == 0) break;
   }
   tried_.assign(now_.seeds.size(), 0);
   searches_left_ = kMostSearches + now_.seeds.size() / kSeedsPerSearch;
-  for (int round = 0; round < kBatches && !choose_middles(Aim::no_bad_angles).empty(); ++round) {
+  for (int round = 0; round < kBatches; ++round) {
     run_.context().report({"bad angles", round + 1, kBatches, now_.moments().energy, 0, 1});
-    batch(Aim::no_bad_angles);
+    if (batch(Aim::no_bad_angles).tried == 0) break;
   }
   tried_.assign(now_.seeds.size(), 0);
   for (int round = 0; round < kBatches && now_.seeds.size() != wanted(); ++round)

@@ -37,6 +37,7 @@ constexpr double kMostFactor = 2;            // of lengths beside bounds, in len
 constexpr double kSettled = 1e-3;            // relative error of the calibration
 
 double fourth_root(double x) { return std::sqrt(std::sqrt(x)); }
+double fourth_power(double x) { return x * x * x * x; }
 
 struct Border {
   Index a, b;
@@ -70,10 +71,7 @@ struct Domain {
 // The estimate for densities (unit / h)^4 given by h at the vertices.
 MeshEstimate estimate(const Domain& domain, const std::vector<double>& h) {
   const double unit = *std::max_element(h.begin(), h.end());
-  const auto density = [&](Index v) {
-    const double r = unit / h[v];
-    return r * r * r * r;
-  };
+  const auto density = [&](Index v) { return fourth_power(unit / h[v]); };
   // Over triangles by the rule that is exact for quadratics, over borders by Simpson's.
   const double inverse_square = fixed_sum(domain.areas.size(), [&](std::size_t t) {
     const Triangle& v = domain.triangles[t];
@@ -234,6 +232,11 @@ struct Calibration {
   double factor = 0;
 };
 
+// 0: no bound. A bound of lengths has its own.
+double gradation_of_field(const SizingOptions& options) {
+  return options.kind == DensityKind::uniform ? 0 : options.gradation;
+}
+
 class Calibrator {
  public:
   Calibrator(const SizingOptions& options, const SizingTarget& target) : options_(options), target_(target) {}
@@ -288,8 +291,7 @@ class Calibrator {
                               const std::vector<double>& bounds, double factor) const {
     std::vector<double> h(raw.size());
     for (std::size_t v = 0; v < h.size(); ++v) h[v] = factor * raw[v];
-    if (options_.gradation > 0 && options_.kind != DensityKind::uniform)
-      h = limit_gradation(points, h, options_.gradation);
+    if (const double gradation = gradation_of_field(options_); gradation > 0) h = limit_gradation(points, h, gradation);
     for (std::size_t v = 0; v < bounds.size(); ++v) h[v] = std::min(h[v], bounds[v]);
     for (double& x : h) {
       x = std::max(x, options_.min_edge);
@@ -316,10 +318,7 @@ Sizing to_sizing(const Domain& domain, const std::vector<double>& lengths, const
   Sizing sizing;
   sizing.unit_edge = e.mean_edge;
   sizing.density.resize(lengths.size());
-  for (std::size_t v = 0; v < lengths.size(); ++v) {
-    const double r = e.mean_edge / lengths[v];
-    sizing.density[v] = r * r * r * r;
-  }
+  for (std::size_t v = 0; v < lengths.size(); ++v) sizing.density[v] = fourth_power(e.mean_edge / lengths[v]);
   sizing.vertices = target.vertices ? target.vertices : static_cast<std::size_t>(std::llround(e.vertices));
   return sizing;
 }
@@ -330,7 +329,7 @@ class Refiner {
   // `lengths`: h at the vertices; `factor`: h where the field is 1.
   Refiner(SizedMesh& sized, Field& field, std::vector<double> lengths, double factor, const SizingOptions& options)
       : mesh_(sized.mesh), sized_(sized), field_(field), lengths_(std::move(lengths)), factor_(factor),
-        options_(options) {}
+        options_(options), gradation_(gradation_of_field(options)) {}
 
   // False if nothing had to be bisected.
   bool run() {
@@ -395,8 +394,7 @@ class Refiner {
     const Edge e = edge(a, b);
     const double length = std::sqrt(std::get<0>(e));
     const auto [least, largest] = std::minmax(lengths_[a], lengths_[b]);
-    const double ratio = largest / least;
-    const bool steep = ratio * ratio * ratio * ratio > kSteepest && length > kShortest * least;
+    const bool steep = fourth_power(largest / least) > kSteepest && length > kShortest * least;
     if (steep || length > kLongest * least || (length > kLong * least && differs_along(a, b, length / least)))
       queue_.push(e);
   }
@@ -438,16 +436,14 @@ class Refiner {
     for (int k = 0; k < 3; ++k) {
       p += weights[k] * mesh_.vertices[v[k]];
       linear += weights[k] * field_.values()[v[k]];
-      density += weights[k] / power4(lengths_[v[k]]);
+      density += weights[k] / fourth_power(lengths_[v[k]]);
     }
     double h = bounded(factor_ / fourth_root(linear), (*field_.bound())(p));
-    if (options_.gradation > 0)
-      for (const Index k : v) h = std::min(h, lengths_[k] + options_.gradation * norm(p - mesh_.vertices[k]));
-    const double ratio = density * power4(h);
+    if (gradation_ > 0)
+      for (const Index k : v) h = std::min(h, lengths_[k] + gradation_ * norm(p - mesh_.vertices[k]));
+    const double ratio = density * fourth_power(h);
     return ratio > kFarthest || ratio * kFarthest < 1;
   }
-
-  static double power4(double x) { return x * x * (x * x); }
 
   double bounded(double h, double bound) const {
     h = std::max(std::min(h, bound), options_.min_edge);
@@ -462,8 +458,8 @@ class Refiner {
   // Lets two vertices limit each other. The next calibration does so for all; until then this keeps a finer place that
   // was found from being taken for a steep one.
   void relax(Index a, Index b) {
-    if (!(options_.gradation > 0)) return;
-    const double step = options_.gradation * norm(mesh_.vertices[b] - mesh_.vertices[a]);
+    if (!(gradation_ > 0)) return;
+    const double step = gradation_ * norm(mesh_.vertices[b] - mesh_.vertices[a]);
     lengths_[a] = std::min(lengths_[a], lengths_[b] + step);
     lengths_[b] = std::min(lengths_[b], lengths_[a] + step);
   }
@@ -514,6 +510,7 @@ class Refiner {
   std::vector<double> lengths_;
   double factor_;
   const SizingOptions& options_;
+  double gradation_;
   std::priority_queue<Edge, std::vector<Edge>, Later> queue_;
   std::unordered_map<std::uint64_t, std::vector<Index>> triangles_at_;
 };

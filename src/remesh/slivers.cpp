@@ -31,16 +31,13 @@ Slivers find_slivers(const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) p[k] = mesh.vertices[t[k]];
     const double under = shape_excess(p[0], p[1], p[2], goal).under;
     if (under <= 0) continue;
-    int features = 0;
+    if (angle_is_imposed(p, locked_edges(t, mesh.feature_edges))) continue;
     double longest = 0, perimeter = 0;
     for (int k = 0; k < 3; ++k) {
-      const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
-      features += std::binary_search(mesh.feature_edges.begin(), mesh.feature_edges.end(), std::array<Index, 2>{a, b});
       const double length = norm(p[(k + 1) % 3] - p[k]);
       longest = std::max(longest, length);
       perimeter += length;
     }
-    if (features >= 2) continue;
     ++count;
     has_bad_one |= kSliver - under < kWorst;
     const double height = longest > 0 ? norm(twice_area_normal(p[0], p[1], p[2])) / longest : 0;
