@@ -265,7 +265,7 @@ void Pipeline::mend_features_and_topology() {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
-    topology_ = enforce_topology(run_, result_.input_topology, step_);
+    topology_ = enforce_topology(run_, trace_, result_.input_topology, step_);
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
       step_.iterations = kFreedSteps;
       optimise(run_, step_);

@@ -214,8 +214,8 @@ std::vector<char> failing_seeds(const BallReport& report, std::size_t count) {
 
 class Control {
  public:
-  Control(CvtRun& run, OptimiseOptions options)
-      : run_(run), options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_),
+  Control(CvtRun& run, const FeatureTrace& trace, OptimiseOptions options)
+      : run_(run), trace_(trace), options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_),
         most_(std::max(budget(), kGrown)) {
     options_.done = 1;
     options_.share = 0;
@@ -285,9 +285,24 @@ class Control {
     std::vector<Vec3> points = Repair(run_.surface(), *polygons_, vertices_, far).points(outcome_.ball);
     if (points.empty() || run_.seeds.size() + points.size() > most_) return false;
     run_.seeds.add(points);
+    if (run_.has_features()) put_on_curves(run_.seeds.size() - points.size());
     outcome_.inserted += points.size();
     ++outcome_.rounds;
     return true;
+  }
+
+  // Those of the seeds from `first` on whose cells cut curves.
+  void put_on_curves(std::size_t first) {
+    const FeatureCurves& curves = run_.curves();
+    const std::vector<std::vector<CurveInterval>> traces = trace_.trace(run_.diagram(Want::polygons).polygons);
+    std::vector<double> lengths(run_.seeds.size(), 0);
+    for (Index c = 0; c < traces.size(); ++c)
+      for (const CurveInterval& i : traces[c]) {
+        if (i.cell < first || i.to - i.from <= lengths[i.cell]) continue;
+        lengths[i.cell] = i.to - i.from;
+        const double middle = curves.wrap(c, 0.5 * (i.from + i.to));
+        run_.seeds.put(i.cell, curves.point(c, middle), {SeedPlace::Kind::curve, c, kNone, middle});
+      }
   }
 
   void optimise_again(int steps) {
@@ -446,6 +461,7 @@ class Control {
   }
 
   CvtRun& run_;
+  const FeatureTrace& trace_;
   OptimiseOptions options_;
   std::size_t wanted_;      // vertices
   std::size_t given_;       // seeds before those inserted by refining
@@ -504,8 +520,9 @@ std::vector<TopologyFault> topology_faults(const BallReport& report, const std::
   return faults;
 }
 
-TopologyOutcome enforce_topology(CvtRun& run, const MeshTopology& input, OptimiseOptions options) {
-  if (input.manifold && input.oriented) return Control(run, std::move(options)).run();
+TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
+                                 OptimiseOptions options) {
+  if (input.manifold && input.oriented) return Control(run, trace, std::move(options)).run();
   return {check_ball_property(run.surface(), run.diagram(Want::polygons).polygons), 0, 0, 0, {}, 0};
 }
 

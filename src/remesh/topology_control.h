@@ -9,6 +9,7 @@
 #include "bisector/remesh.h"
 #include "cvt/optimise.h"
 #include "mesh/topology.h"
+#include "remesh/feature_trace.h"
 #include "voronoi/ball_property.h"
 
 namespace bisector {
@@ -37,12 +38,16 @@ struct TopologyOutcome {
 //   away; it ends if a dozen rounds in a row have not led to fewer failures.
 // - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are
 //   optimised as far as the property goes on holding.
+// A seed whose cell would cut a feature curve goes on the curve instead, there, as segments are split in Delaunay
+// refinement when a point encroaches upon them (Ruppert 1995): otherwise curves and topology would be mended in turns
+// for ever. `trace` is that of the run's curves.
 // Cells of sheets that cross or nearly touch are divided (sheets.h): the report then names the sheets in
 // TopologyOutcome::sheets by indices after those of the seeds.
 //
 // Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to
 // the seeds with the fewest failures, which topology_faults lists. Surfaces that are not manifold and oriented are only
 // checked.
-TopologyOutcome enforce_topology(CvtRun& run, const MeshTopology& input, OptimiseOptions options);
+TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
+                                 OptimiseOptions options);
 
 }  // namespace bisector

@@ -21,9 +21,10 @@
 namespace bisector {
 namespace {
 
-// Pieces across a wall come to light one behind the other, for so many rounds at most. Where sheets cross there is no
-// end to it, and it is given up when each triangle has been divided so often on average, or more than one cell in so
-// many has strays after all rounds.
+// Pieces across a wall come to light one behind the other, for as many rounds as there are seeds side by side within the
+// wall's width, but each round has fewer. Where sheets cross there is no end to it: the rounds end when the last kRounds
+// have not halved the triangles to divide, and all is given up if more than one cell in kManyLeft has strays then, or
+// when each triangle has been divided so often on average.
 constexpr int kRounds = 16;
 constexpr std::size_t kDivisions = 4, kManyLeft = 10;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
@@ -545,16 +546,18 @@ std::optional<std::size_t> Localiser::Work::localise(const std::vector<Vec3>& gi
   const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
   neighbours.build(seeds, NeighbourSource::nearest);
-  std::size_t divided = 0;
-  int round = 0;
-  for (; round < kRounds; ++round) {
+  std::size_t divided = 0, before = std::numeric_limits<std::size_t>::max();
+  for (int round = 0;; ++round) {
     const Triangles triangles = leave_out();
     if (triangles.empty()) break;
+    if (round % kRounds == 0 && 2 * triangles.size() > std::exchange(before, triangles.size())) {
+      if (strays.size() * kManyLeft > given.size()) return {};
+      break;
+    }
     divided += triangles.size();
     if (divided > kDivisions * surface.facets.size()) return {};
     find_strays(clip_anew(triangles));
   }
-  if (round == kRounds && strays.size() * kManyLeft > given.size()) return {};
   Triangles changed;
   for (const auto& at : left_out) changed.push_back(at.first);
   // What else is torn then lies beside what is clipped anew.
