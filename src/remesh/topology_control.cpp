@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -216,15 +217,17 @@ class Control {
  public:
   Control(CvtRun& run, const FeatureTrace& trace, OptimiseOptions options)
       : run_(run), trace_(trace), options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_),
-        most_(std::max(budget(), kGrown)) {
+        most_(std::max(budget(), kGrown)), lost_(run.curves().size(), 0) {
     options_.done = 1;
     options_.share = 0;
   }
 
   TopologyOutcome run() {
     check();
+    for (const Cut& cut : cuts_) lost_[cut.curve] = 1;
+    cuts_.clear();
     keep_best();
-    if (!outcome_.ball.holds) {
+    if (!holds()) {
       grow();
       const SavedSeeds start = best_;
       most_ = budget();
@@ -236,7 +239,7 @@ class Control {
         keep_best();
         if (refine()) break;
       }
-      if (outcome_.ball.holds) {
+      if (holds()) {
         trim();
         polish();
         smooth();
@@ -256,6 +259,16 @@ class Control {
     double gap = kCrossing;
   };
 
+  // Where the cell of a seed on the surface cuts a curve.
+  struct Cut {
+    Index cell, curve;
+    double position;
+  };
+
+  // The ball property, and no curve is cut that was not at the beginning.
+  bool holds() const { return outcome_.ball.holds && cuts_.empty(); }
+  std::size_t failures() const { return outcome_.ball.failures() + cuts_.size(); }
+
   // Seeds that may be added before sheets are taken for what keeps the property from holding.
   std::size_t budget() const { return wanted_ + std::max(wanted_ / 4 + kMostAdded, std::min(wanted_, kAnyway)); }
 
@@ -263,6 +276,7 @@ class Control {
   void check() {
     run_.context().check();
     polygons_ = &run_.diagram(Want::polygons).polygons;
+    cuts_ = find_cuts();
     outcome_.ball = check_ball_property(run_.surface(), *polygons_);
     vertices_ = run_.seeds.positions();
     if (!outcome_.ball.holds && (!too_few_seeds() || gap_ == kInfinity)) divide();
@@ -283,26 +297,44 @@ class Control {
 
   bool insert(bool far) {
     std::vector<Vec3> points = Repair(run_.surface(), *polygons_, vertices_, far).points(outcome_.ball);
-    if (points.empty() || run_.seeds.size() + points.size() > most_) return false;
+    if (points.empty() && cuts_.empty()) return false;
+    if (run_.seeds.size() + points.size() + cuts_.size() > most_) return false;
+    const std::size_t before = run_.seeds.size();
     run_.seeds.add(points);
-    if (run_.has_features()) put_on_curves(run_.seeds.size() - points.size());
-    outcome_.inserted += points.size();
+    for (const Cut& cut : cuts_) {
+      run_.seeds.add(Vec3{});
+      put_on_curve(run_.seeds.size() - 1, cut);
+    }
+    if (run_.has_features())
+      for (const Cut& cut : find_cuts())
+        if (cut.cell >= before) put_on_curve(cut.cell, cut);
+    outcome_.inserted += run_.seeds.size() - before;
     ++outcome_.rounds;
     return true;
   }
 
-  // Those of the seeds from `first` on whose cells cut curves.
-  void put_on_curves(std::size_t first) {
+  void put_on_curve(std::size_t seed, const Cut& cut) {
+    run_.seeds.put(seed, run_.curves().point(cut.curve, cut.position),
+                   {SeedPlace::Kind::curve, cut.curve, kNone, cut.position});
+  }
+
+  // By curve; a cell once for each.
+  std::vector<Cut> find_cuts() {
+    std::vector<Cut> cuts;
+    if (!run_.has_features()) return cuts;
     const FeatureCurves& curves = run_.curves();
     const std::vector<std::vector<CurveInterval>> traces = trace_.trace(run_.diagram(Want::polygons).polygons);
-    std::vector<double> lengths(run_.seeds.size(), 0);
-    for (Index c = 0; c < traces.size(); ++c)
+    for (Index c = 0; c < traces.size(); ++c) {
+      if (lost_[c]) continue;
+      std::map<Index, CurveInterval> longest;
       for (const CurveInterval& i : traces[c]) {
-        if (i.cell < first || i.to - i.from <= lengths[i.cell]) continue;
-        lengths[i.cell] = i.to - i.from;
-        const double middle = curves.wrap(c, 0.5 * (i.from + i.to));
-        run_.seeds.put(i.cell, curves.point(c, middle), {SeedPlace::Kind::curve, c, kNone, middle});
+        if (!run_.seeds.on_surface(i.cell)) continue;
+        const auto [at, fresh] = longest.insert({i.cell, i});
+        if (!fresh && i.to - i.from > at->second.to - at->second.from) at->second = i;
       }
+      for (const auto& [cell, i] : longest) cuts.push_back({cell, c, curves.wrap(c, 0.5 * (i.from + i.to))});
+    }
+    return cuts;
   }
 
   void optimise_again(int steps) {
@@ -322,18 +354,18 @@ class Control {
 
   // Where sheets cross there is no end to refining: more and more cells fail.
   bool refine() {
-    std::size_t least = outcome_.ball.failures();
+    std::size_t least = failures();
     const std::size_t hopeless = kDivergence * least + kMostAdded;
-    for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !outcome_.ball.holds;
+    for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !holds();
          ++round, ++idle) {
-      if (outcome_.ball.failures() > hopeless || !insert(round % kFarRounds == kFarRounds - 1)) break;
+      if (failures() > hopeless || !insert(round % kFarRounds == kFarRounds - 1)) break;
       check();
       keep_best();
-      if (outcome_.ball.failures() >= least) continue;
-      least = outcome_.ball.failures();
+      if (failures() >= least) continue;
+      least = failures();
       idle = 0;
     }
-    return outcome_.ball.holds;
+    return holds();
   }
 
   // Back to the number of seeds asked for, at the cost of places where the energy can spare them.
@@ -380,12 +412,12 @@ class Control {
 
   // Of two states that hold, the one with fewer vertices is better; as long as too many cells fail, the later.
   void keep_best() {
-    const std::size_t failures = outcome_.ball.failures();
+    const std::size_t count = failures();
     const std::size_t surplus = vertices_.size() - std::min(vertices_.size(), wanted_);
-    const bool better = failures != fewest_ ? failures < fewest_ : failures == 0 && surplus < least_surplus_;
+    const bool better = count != fewest_ ? count < fewest_ : count == 0 && surplus < least_surplus_;
     if (!best_has_too_few_ && (too_few_seeds() || !better)) return;
     best_has_too_few_ = too_few_seeds();
-    fewest_ = failures;
+    fewest_ = count;
     least_surplus_ = surplus;
     best_ = {run_.seeds, given_, gap_};
   }
@@ -400,6 +432,7 @@ class Control {
   // Seeds of what fails, and their neighbours.
   std::vector<char> failing_neighbourhood() const {
     std::vector<char> failing = failing_seeds(outcome_.ball, vertices_.size());
+    for (const Cut& cut : cuts_) failing[cut.cell] = 1;
     mark_neighbours(extract_dual_edges(*polygons_, vertices_), failing);
     failing.resize(run_.seeds.size());
     return failing;
@@ -413,7 +446,7 @@ class Control {
       const std::span<Vec3> positions = run_.seeds.edit_positions();
       for (std::size_t i = 0; i < next.size(); ++i) positions[i] = held[i] ? before.position(i) : next[i];
       check();
-      if (outcome_.ball.holds) return true;
+      if (holds()) return true;
       const std::vector<char> failing = failing_neighbourhood();
       for (std::size_t i = 0; i < held.size(); ++i) held[i] |= failing[i];
     }
@@ -468,6 +501,8 @@ class Control {
   std::size_t most_;        // seeds
   double gap_ = kCrossing;  // see divide_cells
   TopologyOutcome outcome_;
+  std::vector<Cut> cuts_;
+  std::vector<char> lost_;  // by curve: cut at the beginning, and so left as it is
   const RestrictedPolygons* polygons_ = nullptr;  // of the run's diagram, or divided_
   RestrictedPolygons divided_;
   std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells

@@ -38,9 +38,9 @@ struct TopologyOutcome {
 //   away; it ends if a dozen rounds in a row have not led to fewer failures.
 // - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are
 //   optimised as far as the property goes on holding.
-// A seed whose cell would cut a feature curve goes on the curve instead, there, as segments are split in Delaunay
-// refinement when a point encroaches upon them (Ruppert 1995): otherwise curves and topology would be mended in turns
-// for ever. `trace` is that of the run's curves.
+// A curve that no cell of a seed on the surface cuts at the beginning stays so: such a cut counts as a failure, and the
+// seed goes on the curve there, or another one does, as segments are split in Delaunay refinement when a point
+// encroaches upon them (Ruppert 1995). `trace` is that of the run's curves.
 // Cells of sheets that cross or nearly touch are divided (sheets.h): the report then names the sheets in
 // TopologyOutcome::sheets by indices after those of the seeds.
 //

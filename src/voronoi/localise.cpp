@@ -21,12 +21,14 @@
 namespace bisector {
 namespace {
 
-// Pieces across a wall come to light one behind the other, for as many rounds as there are seeds side by side within the
-// wall's width, but each round has fewer. Where sheets cross there is no end to it: the rounds end when the last kRounds
-// have not halved the triangles to divide, and all is given up if more than one cell in kManyLeft has strays then, or
-// when each triangle has been divided so often on average.
+// Pieces across a wall come to light one behind the other: where a wall is much thinner than the edges, as many as there
+// are seeds nearer than the first on the right side. Every kRounds rounds it is looked at by how much fewer triangles
+// were divided in the last than kRounds before. Where few cells have strays, no more than one in kManyLeft, the rounds
+// end if that was not by half; where sheets cross there is no end to it, and all is given up if many have and it was not
+// by a tenth, or when each triangle has been divided kDivisions times on average.
 constexpr int kRounds = 16;
-constexpr std::size_t kDivisions = 4, kManyLeft = 10;
+constexpr double kFewLess = 0.5, kManyLess = 0.9;
+constexpr std::size_t kDivisions = 16, kManyLeft = 10;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
@@ -550,9 +552,13 @@ std::optional<std::size_t> Localiser::Work::localise(const std::vector<Vec3>& gi
   for (int round = 0;; ++round) {
     const Triangles triangles = leave_out();
     if (triangles.empty()) break;
-    if (round % kRounds == 0 && 2 * triangles.size() > std::exchange(before, triangles.size())) {
-      if (strays.size() * kManyLeft > given.size()) return {};
-      break;
+    if (round % kRounds == 0) {
+      const bool many = strays.size() * kManyLeft > given.size();
+      const double less = (many ? kManyLess : kFewLess) * static_cast<double>(std::exchange(before, triangles.size()));
+      if (static_cast<double>(triangles.size()) > less) {
+        if (many) return {};
+        break;
+      }
     }
     divided += triangles.size();
     if (divided > kDivisions * surface.facets.size()) return {};

@@ -22,6 +22,9 @@
 #include "remesh/remesh.h"
 #include "remesh/sheets.h"
 #include "remesh/topology_control.h"
+#include "support/featured.h"
+#include "remesh/feature_seeds.h"
+#include "remesh/feature_recovery.h"
 #include "support/diagram.h"
 #include "support/models.h"
 #include "support/run.h"
@@ -567,7 +570,7 @@ TEST(TopologyControlTest, SeedsThatAreNotFreeStay) {
     run.seeds.edit_places()[i] = {i % 3 ? SeedPlace::Kind::surface : SeedPlace::Kind::fixed, kNone, i, 0};
     if (i % 3 == 0) fixed[i] = run.seeds.position(i);
   }
-  const TopologyOutcome outcome = enforce_topology(run, topology_of(lens), options);
+  const TopologyOutcome outcome = enforce_topology(run, FeatureTrace(surface, run.curves()), topology_of(lens), options);
   EXPECT_TRUE(outcome.ball.holds);
   EXPECT_GT(outcome.inserted, 0u);
   // The energy is that of the seeds.
@@ -579,6 +582,52 @@ TEST(TopologyControlTest, SeedsThatAreNotFreeStay) {
       EXPECT_LT(norm(run.seeds.position(i) - fixed.at(run.seeds.place(i).corner)), 1e-12);
     }
   EXPECT_EQ(found, fixed.size());
+}
+
+// A double cone with a sharp rim.
+TriangleMesh double_cone(double height) {
+  constexpr Index kRim = 48;
+  TriangleMesh mesh;
+  for (Index k = 0; k < kRim; ++k) {
+    const double angle = 2 * std::numbers::pi * k / kRim;
+    mesh.vertices.push_back({std::cos(angle), std::sin(angle), 0});
+  }
+  mesh.vertices.push_back({0, 0, height});
+  mesh.vertices.push_back({0, 0, -height});
+  for (Index k = 0; k < kRim; ++k) {
+    mesh.triangles.push_back({k, (k + 1) % kRim, kRim});
+    mesh.triangles.push_back({(k + 1) % kRim, k, kRim + 1});
+  }
+  return mesh;
+}
+
+// Near a rim the seeds of one side own pieces of the other. Those put there for that must not cut the rim.
+TEST(TopologyControlTest, CurvesStay) {
+  for (const double height : {0.05, 0.1, 0.2})
+    for (const std::size_t count : {60, 120, 240}) {
+      const TriangleMesh mesh = double_cone(height);
+      const Surface surface(mesh);
+      CpuBackend backend(surface, NeighbourSource::nearest);
+      const FeatureCurves curves(sharp_graph(mesh), mesh.vertices);
+      ASSERT_EQ(curves.size(), 1u);
+      const CurveMeasure measure(surface, curves);
+      const FeatureTrace trace(surface, curves);
+      const double scale = measure.scale(count);
+      const Context context;
+      CvtRun run(backend, curves, context);
+      run.seeds = seeds_on_features(curves, measure, scale);
+      run.seeds.add(random_seeds(mesh, count - run.seeds.size(), 3));
+      OptimiseOptions options;
+      options.constrained = true;
+      options.iterations = 30;
+      optimise(run, options);
+      ASSERT_TRUE(recover_features(run, trace, measure, scale, options).broken.empty());
+      const TopologyOutcome outcome = enforce_topology(run, trace, topology_of(mesh), options);
+      EXPECT_TRUE(outcome.ball.holds) << height << ' ' << count;
+      EXPECT_GT(outcome.inserted, 0u) << height << ' ' << count;
+      const Diagram& diagram = run.diagram(Want::polygons | Want::dual);
+      EXPECT_TRUE(check_features(trace, curves, run.seeds.places(), diagram).broken.empty()) << height << ' ' << count;
+    }
 }
 
 // Thin ears and trunk, genus 3; legs that touch and cross.

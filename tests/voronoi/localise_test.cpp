@@ -173,11 +173,31 @@ TEST(LocalisedCells, OfAWedgeHaveItsSurfaceAsDual) {
   }
 }
 
+// The sides of a lens that is much thinner than its cells are wide: where the seeds of one are sparse, pieces of dozens
+// of cells of the other lie behind each other.
+TEST(LocalisedCells, OfAThinLensComeToAnEnd) {
+  for (const double thickness : {0.02, 0.005}) {
+    TriangleMesh lens = icosphere(4);
+    for (Vec3& v : lens.vertices) v.z *= thickness;
+    const Surface surface(lens);
+    for (std::uint64_t random_seed = 1; random_seed < 4; ++random_seed) {
+      const std::vector<Vec3> seeds = optimised_plate_seeds(surface, random_seed);
+      Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+      const std::size_t before = check_ball_property(surface, diagram.polygons).failures();
+      ASSERT_TRUE(Localiser(surface).localise(seeds, diagram).has_value());
+      expect_diagram(surface, diagram);
+      const BallReport after = check_ball_property(surface, diagram.polygons);
+      EXPECT_LT(4 * after.failures(), before);
+      EXPECT_EQ(after.euler, 2);
+    }
+  }
+}
+
 // Of sheets that cross, every cell has pieces of several, and behind each piece is another cell's.
 TEST(LocalisedCells, OfManyCrossingSheetsAreGivenUp) {
   const TriangleMesh sheet = grid_patch(12, 12);
   TriangleMesh sheets;
-  for (int k = 0; k < 16; ++k) {
+  for (int k = 0; k < 40; ++k) {
     const auto first = static_cast<Index>(sheets.vertices.size());
     for (const Vec3& v : sheet.vertices)
       sheets.vertices.push_back(v + Vec3{0, 0, 0.02 * std::sin(3.0 * k) * (v.x - 6) + 0.02 * std::cos(5.0 * k) * v.y});
