@@ -12,7 +12,7 @@ struct Slivers {
   bool worth_another_run = false;
 };
 
-// Of a result with its feature edges. Triangles between two feature edges do not count: what is acute stays so.
+// Of a result with its feature edges. An angle that two feature edges enclose does not count: what is acute stays so.
 Slivers find_slivers(const TriangleMesh& mesh);
 
 // Whether a run is to be preferred to another on the same input: for its topology, then for the curves it keeps, then

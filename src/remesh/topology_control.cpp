@@ -356,8 +356,7 @@ class Control {
   bool refine() {
     std::size_t least = failures();
     const std::size_t hopeless = kDivergence * least + kMostAdded;
-    for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !holds();
-         ++round, ++idle) {
+    for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !holds(); ++round, ++idle) {
       if (failures() > hopeless || !insert(round % kFarRounds == kFarRounds - 1)) break;
       check();
       keep_best();
@@ -502,7 +501,7 @@ class Control {
   double gap_ = kCrossing;  // see divide_cells
   TopologyOutcome outcome_;
   std::vector<Cut> cuts_;
-  std::vector<char> lost_;  // by curve: cut at the beginning, and so left as it is
+  std::vector<char> lost_;                        // by curve: cut at the beginning, and so left as it is
   const RestrictedPolygons* polygons_ = nullptr;  // of the run's diagram, or divided_
   RestrictedPolygons divided_;
   std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells

@@ -21,11 +21,11 @@
 namespace bisector {
 namespace {
 
-// Pieces across a wall come to light one behind the other: where a wall is much thinner than the edges, as many as there
-// are seeds nearer than the first on the right side. Every kRounds rounds it is looked at by how much fewer triangles
-// were divided in the last than kRounds before. Where few cells have strays, no more than one in kManyLeft, the rounds
-// end if that was not by half; where sheets cross there is no end to it, and all is given up if many have and it was not
-// by a tenth, or when each triangle has been divided kDivisions times on average.
+// Pieces across a wall come to light one behind the other: where a wall is much thinner than the edges, as many as
+// there are seeds nearer than the first on the right side. Every kRounds rounds it is looked at by how much fewer
+// triangles were divided in the last than kRounds before. Where few cells have strays, no more than one in kManyLeft,
+// the rounds end if that was not by half; where sheets cross there is no end to it, and all is given up if many have
+// and it was not by a tenth, or when each triangle has been divided kDivisions times on average.
 constexpr int kRounds = 16;
 constexpr double kFewLess = 0.5, kManyLess = 0.9;
 constexpr std::size_t kDivisions = 16, kManyLeft = 10;

@@ -19,13 +19,13 @@
 #include "core/geometry.h"
 #include "cvt/multilevel.h"
 #include "mesh/topology.h"
+#include "remesh/feature_recovery.h"
+#include "remesh/feature_seeds.h"
 #include "remesh/remesh.h"
 #include "remesh/sheets.h"
 #include "remesh/topology_control.h"
-#include "support/featured.h"
-#include "remesh/feature_seeds.h"
-#include "remesh/feature_recovery.h"
 #include "support/diagram.h"
+#include "support/featured.h"
 #include "support/models.h"
 #include "support/run.h"
 #include "voronoi/ball_property.h"
@@ -570,7 +570,8 @@ TEST(TopologyControlTest, SeedsThatAreNotFreeStay) {
     run.seeds.edit_places()[i] = {i % 3 ? SeedPlace::Kind::surface : SeedPlace::Kind::fixed, kNone, i, 0};
     if (i % 3 == 0) fixed[i] = run.seeds.position(i);
   }
-  const TopologyOutcome outcome = enforce_topology(run, FeatureTrace(surface, run.curves()), topology_of(lens), options);
+  const TopologyOutcome outcome =
+      enforce_topology(run, FeatureTrace(surface, run.curves()), topology_of(lens), options);
   EXPECT_TRUE(outcome.ball.holds);
   EXPECT_GT(outcome.inserted, 0u);
   // The energy is that of the seeds.
