@@ -34,7 +34,7 @@ struct QualityReport {
   double theta_max = 0;         // largest angle, degrees
   double theta_below_30 = 0;    // percent of triangles with an angle under 30 degrees
   // The same without what two of mesh.feature_edges impose on a triangle: its Q, and the angle between them.
-  double q_min_free = 0, theta_min_free = 0, theta_max_free = 0;
+  double q_min_free = 0, theta_min_free = 0, theta_max_free = 0, theta_below_30_free = 0;
   double valence6 = 0;                              // fraction of interior vertices with six neighbours
   double edge_min = 0, edge_ave = 0, edge_max = 0;  // lengths, in the mesh's unit
   double area = 0;

@@ -120,6 +120,7 @@ void print_quality(Console& console, const QualityCommand& command, const Qualit
   row("q_min_free", number(q.q_min_free), "q_min of triangles with fewer than two feature edges");
   row("theta_min_free", number(q.theta_min_free), "smallest angle not between two feature edges");
   row("theta_max_free", number(q.theta_max_free), "largest angle not between two feature edges");
+  row("theta_below_30_free", number(q.theta_below_30_free), "% of triangles with such an angle below 30 degrees");
   row("valence6", number(q.valence6), "share of interior vertices with six neighbours");
   row("edge_min", number(q.edge_min), "shortest edge");
   row("edge_ave", number(q.edge_ave));

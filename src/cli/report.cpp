@@ -116,6 +116,7 @@ Json quality_json(const QualityReport& quality) {
           {"q_min_free", quality.q_min_free},
           {"theta_min_free", quality.theta_min_free},
           {"theta_max_free", quality.theta_max_free},
+          {"theta_below_30_free", quality.theta_below_30_free},
           {"valence6", quality.valence6},
           {"edge_min", quality.edge_min},
           {"edge_ave", quality.edge_ave},

@@ -33,33 +33,19 @@ TriangleShape measure_shape(const std::array<Vec3, 3>& p, double area) {
   return shape;
 }
 
-// Which edges of a triangle, k from corner k to the next, are marked as features.
-class Marks {
- public:
-  explicit Marks(const TriangleMesh& mesh) : edges_(mesh.feature_edges) {
-    for (auto& [a, b] : edges_)
-      if (a > b) std::swap(a, b);
-    std::sort(edges_.begin(), edges_.end());
-  }
-  std::array<bool, 3> of(const Triangle& t) const {
-    std::array<bool, 3> marked{};
-    for (int k = 0; k < 3 && !edges_.empty(); ++k) {
-      const Index a = t[k], b = t[(k + 1) % 3];
-      marked[k] =
-          std::binary_search(edges_.begin(), edges_.end(), std::array<Index, 2>{std::min(a, b), std::max(a, b)});
-    }
-    return marked;
-  }
-
- private:
-  std::vector<std::array<Index, 2>> edges_;
-};
+std::vector<std::array<Index, 2>> sorted_features(const TriangleMesh& mesh) {
+  std::vector<std::array<Index, 2>> edges = mesh.feature_edges;
+  for (auto& [a, b] : edges)
+    if (a > b) std::swap(a, b);
+  std::sort(edges.begin(), edges.end());
+  return edges;
+}
 
 void measure_triangles(const TriangleMesh& mesh, QualityReport& report) {
   report.q_min = report.q_min_free = std::numeric_limits<double>::infinity();
   report.theta_min = report.theta_min_free = 180;
-  const Marks marks(mesh);
-  std::size_t below_30 = 0;
+  const std::vector<std::array<Index, 2>> features = sorted_features(mesh);
+  std::size_t below_30 = 0, free_below_30 = 0;
   for (const Triangle& t : mesh.triangles) {
     const std::array<Vec3, 3> p{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
     const double area = triangle_area(p[0], p[1], p[2]);
@@ -69,13 +55,16 @@ void measure_triangles(const TriangleMesh& mesh, QualityReport& report) {
     report.theta_min = std::min(report.theta_min, *smallest);
     report.theta_max = std::max(report.theta_max, *largest);
     if (*smallest < 30) ++below_30;
-    const std::array<bool, 3> marked = marks.of(t);
+    const std::array<bool, 3> marked = edges_among(t, features);
     if (marked[0] + marked[1] + marked[2] < 2) report.q_min_free = std::min(report.q_min_free, shape.q);
+    bool free_angle_below_30 = false;
     for (int k = 0; k < 3; ++k) {
       if (marked[k] && marked[(k + 2) % 3]) continue;
+      free_angle_below_30 |= shape.theta[k] < 30;
       report.theta_min_free = std::min(report.theta_min_free, shape.theta[k]);
       report.theta_max_free = std::max(report.theta_max_free, shape.theta[k]);
     }
+    free_below_30 += free_angle_below_30;
     if (!(area > 0)) {
       ++report.zero_area;
       continue;
@@ -88,6 +77,7 @@ void measure_triangles(const TriangleMesh& mesh, QualityReport& report) {
   const double measured = count - static_cast<double>(report.zero_area);
   if (std::isinf(report.q_min_free)) report.q_min_free = report.q_min;
   report.theta_below_30 = 100 * static_cast<double>(below_30) / count;
+  report.theta_below_30_free = 100 * static_cast<double>(free_below_30) / count;
   if (measured > 0) {
     report.q_ave /= measured;
     report.theta_min_ave /= measured;

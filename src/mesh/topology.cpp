@@ -40,6 +40,15 @@ std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::si
 
 }  // namespace
 
+std::array<bool, 3> edges_among(const Triangle& t, const std::vector<std::array<Index, 2>>& edges) {
+  std::array<bool, 3> among{};
+  for (int k = 0; k < 3 && !edges.empty(); ++k) {
+    const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
+    among[k] = std::binary_search(edges.begin(), edges.end(), std::array<Index, 2>{a, b});
+  }
+  return among;
+}
+
 EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
   using Record = std::pair<Index, std::size_t>;  // the edge's higher vertex, half-edge
   const std::size_t n = 3 * triangles.size();

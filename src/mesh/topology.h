@@ -16,6 +16,10 @@ struct EdgeTable {
 };
 EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
+// Which edges of a triangle, k from corner k to the next, are among these, which are sorted, each with its lower vertex
+// first.
+std::array<bool, 3> edges_among(const Triangle& t, const std::vector<std::array<Index, 2>>& edges);
+
 // The component of each vertex, connected through triangles, numbered from 0 by lowest vertex; kNone for vertices that
 // no triangle uses.
 std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "mesh/topology.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/improve_patch.h"
 #include "spatial/kd_tree.h"
@@ -306,7 +307,7 @@ double Improver::angle_missing(Index seed) const {
     if (now_.excess[*t].under <= missing) continue;
     const Triangle& v = now_.dual().triangles[*t];
     const std::array<Vec3, 3> x{now_.seeds.position(v[0]), now_.seeds.position(v[1]), now_.seeds.position(v[2])};
-    if (!angle_is_imposed(x, locked_edges(v, now_.features.edges))) missing = now_.excess[*t].under;
+    if (!angle_is_imposed(x, edges_among(v, now_.features.edges))) missing = now_.excess[*t].under;
   }
   return missing;
 }
@@ -379,7 +380,7 @@ ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& 
       patch.add_vertex(vertex);
     }
     patch.add_triangle(local);
-    const std::array<bool, 3> on_curve = locked_edges(corners, now_.features.edges);
+    const std::array<bool, 3> on_curve = edges_among(corners, now_.features.edges);
     for (int m = 0; m < 3; ++m) {
       const int next = (m + 1) % 3;
       if (on_curve[m])

@@ -101,15 +101,6 @@ bool angle_is_imposed(const std::array<Vec3, 3>& corners, const std::array<bool,
   return locked[(least + 1) % 3] && locked[(least + 2) % 3];
 }
 
-std::array<bool, 3> locked_edges(const Triangle& t, const std::vector<std::array<Index, 2>>& edges) {
-  std::array<bool, 3> locked;
-  for (int m = 0; m < 3; ++m) {
-    const auto [a, b] = std::minmax(t[m], t[(m + 1) % 3]);
-    locked[m] = std::binary_search(edges.begin(), edges.end(), std::array<Index, 2>{a, b});
-  }
-  return locked;
-}
-
 Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
   double nearest = norm2(seeds_[owner] - p);
   for (Index last = kNone; last != owner;) {

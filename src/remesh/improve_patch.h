@@ -39,8 +39,6 @@ ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const Shap
 // Whether the smallest angle is between two locked edges, which curves give it. `locked` tells of the edges from each
 // corner to the next.
 bool angle_is_imposed(const std::array<Vec3, 3>& corners, const std::array<bool, 3>& locked);
-// Which edges of a triangle, from each corner to the next, are among these, which are sorted with the lower end first.
-std::array<bool, 3> locked_edges(const Triangle& t, const std::vector<std::array<Index, 2>>& edges);
 
 // The surface by the cells of a diagram: the nearest seed of a point owns the piece of the surface that the point goes
 // to, which keeps points on their sheet.

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "core/geometry.h"
+#include "mesh/topology.h"
 #include "remesh/improve_patch.h"
 
 namespace bisector {
@@ -31,7 +32,7 @@ Slivers find_slivers(const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) p[k] = mesh.vertices[t[k]];
     const double under = shape_excess(p[0], p[1], p[2], goal).under;
     if (under <= 0) continue;
-    if (angle_is_imposed(p, locked_edges(t, mesh.feature_edges))) continue;
+    if (angle_is_imposed(p, edges_among(t, mesh.feature_edges))) continue;
     double longest = 0, perimeter = 0;
     for (int k = 0; k < 3; ++k) {
       const double length = norm(p[(k + 1) % 3] - p[k]);

@@ -280,9 +280,9 @@ TEST_F(Cli, RemeshWritesWhatItSays) {
     EXPECT_GE(report["seconds"].value(key, -1.0), 0) << key;
   for (const char* key : {"pairs", "uncertain", "wider", "double", "cpu"})
     EXPECT_TRUE(report["certification"].contains(key)) << key;
-  for (const char* key :
-       {"q_min", "q_ave", "theta_min", "theta_min_ave", "theta_below_30", "theta_max", "q_min_free", "theta_min_free",
-        "theta_max_free", "valence6", "distance_mean", "distance_rms", "distance_max", "self_intersections"})
+  for (const char* key : {"q_min", "q_ave", "theta_min", "theta_min_ave", "theta_below_30", "theta_max", "q_min_free",
+                          "theta_min_free", "theta_max_free", "theta_below_30_free", "valence6", "distance_mean",
+                          "distance_rms", "distance_max", "self_intersections"})
     EXPECT_TRUE(report["quality"].contains(key)) << key;
   EXPECT_EQ(report["topology"]["manifold"], true);
   EXPECT_EQ(report["topology"]["closed"], true);

@@ -345,9 +345,12 @@ TEST(Quality, FreeFiguresLeaveOutWhatFeaturesImpose) {
   EXPECT_EQ(marked.theta_max, plain.theta_max);
   EXPECT_NEAR(marked.theta_max_free, std::atan2(4, 1) * 180 / std::numbers::pi, 1e-9);  // the right angles are imposed
   EXPECT_EQ(marked.theta_min_free, plain.theta_min);
+  EXPECT_EQ(marked.theta_below_30_free, 100);
   mesh.feature_edges = {{0, 1}, {0, 2}};  // the angle of atan(1/4) at vertex 0 of the first triangle
   const QualityReport acute = measure_quality(mesh);
   EXPECT_NEAR(acute.theta_min_free, plain.theta_min, 1e-12);  // the second has the same angle, free, at vertex 2
+  EXPECT_EQ(acute.theta_below_30, 100);
+  EXPECT_EQ(acute.theta_below_30_free, 50);
   mesh.triangles.pop_back();
   EXPECT_NEAR(measure_quality(mesh).theta_min_free, std::atan2(4, 1) * 180 / std::numbers::pi, 1e-9);
 }
