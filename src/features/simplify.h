@@ -24,14 +24,18 @@ std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<T
 // Leaves corners, and creases beside each other, at least `width` apart where that goes:
 //   - Of corners that are nearer to each other along the curves one remains, those of many curves before turns; the
 //     curves of the others are led there, along what lies between.
-//   - Creases go by ascending weight if they run within `width` of others for more than half of their length, though
-//     they are not led there by a corner (curve_gaps). So the two curves of a chamfer become one.
+//   - Creases, the lighter first, go where they run within `width` of others or of themselves, though they are not led
+//     there by a corner (curve_gaps): as a whole, or in stretches of at least three widths. So the two curves of a
+//     chamfer become one. What is left of a curve is led to what stays along edges of the mesh.
 //   - Closed creases shorter than 4 `width` go.
 // Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing. `links` are edges of the
-// mesh between two corners that are no features: corners may be led along them, too (corner_links).
+// mesh between two corners that are no features: corners may be led along them, too (corner_links). `neighbours` are
+// the vertices at the other ends of each vertex's edges; without them stretches stay that others would have to be led
+// across.
 SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
                                      const std::vector<double>& weights, double width,
-                                     const std::vector<std::array<Index, 2>>& links = {});
+                                     const std::vector<std::array<Index, 2>>& links = {},
+                                     const Csr<Index>& neighbours = {});
 
 std::vector<std::array<Index, 2>> corner_links(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
                                                std::size_t vertex_count);

@@ -16,6 +16,9 @@ struct EdgeTable {
 };
 EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
+// The vertices at the other ends of each vertex's edges, ascending.
+Csr<Index> vertex_neighbours(const std::vector<Triangle>& triangles, std::size_t vertex_count);
+
 // Which edges of a triangle, k from corner k to the next, are among these, which are sorted, each with its lower vertex
 // first.
 std::array<bool, 3> edges_among(const Triangle& t, const std::vector<std::array<Index, 2>>& edges);

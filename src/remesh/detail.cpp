@@ -18,6 +18,7 @@
 #include "features/disk_radius.h"
 #include "features/simplify.h"
 #include "mesh/sampling.h"
+#include "mesh/topology.h"
 
 namespace bisector {
 namespace {
@@ -51,7 +52,8 @@ class Planner {
           std::size_t vertices)
       : mesh_(mesh), features_(features), edge_length_(edge_length), vertices_(static_cast<double>(vertices)),
         weights_(curve_weights(features, mesh.triangles, mesh.vertices)),
-        links_(corner_links(features, mesh.triangles, mesh.vertices.size())) {
+        links_(corner_links(features, mesh.triangles, mesh.vertices.size())),
+        neighbours_(vertex_neighbours(mesh.triangles, mesh.vertices.size())) {
     double sum = 0;
     for (const double h : edge_length) sum += h;
     mean_ = sum / static_cast<double>(edge_length.size());
@@ -69,7 +71,7 @@ class Planner {
   Trial trial(double width, double coarsening) const {
     Trial t;
     t.width = width;
-    t.simplified = simplify_features(features_, mesh_.vertices, weights_, width, links_);
+    t.simplified = simplify_features(features_, mesh_.vertices, weights_, width, links_, neighbours_);
     find_sizes(t, coarsening);
     t.vertices = count(t, coarsening);
     return t;
@@ -199,6 +201,7 @@ class Planner {
   double mean_ = 0;
   std::vector<double> weights_;
   std::vector<std::array<Index, 2>> links_;
+  Csr<Index> neighbours_;
   std::vector<Limb> limbs_;
 };
 

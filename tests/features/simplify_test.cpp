@@ -247,5 +247,131 @@ TEST(SimplifiedFeatures, DoNotDependOnWhichWayCurvesRun) {
   EXPECT_EQ(simplified(slab, graph, 0.1).graph.edges, simplified(slab, turned, 0.1).graph.edges);
 }
 
+// Two halves of a circle that run on into each other are one closed curve.
+TEST(SimplifiedFeatures, OfTwoHalvesAreAClosedCurve) {
+  constexpr Index kCount = 40;
+  std::vector<Vec3> points;
+  FeatureGraph halves;
+  halves.corners = {0, kCount / 2};
+  halves.curves.assign(2, {});
+  for (Index k = 0; k < kCount; ++k) {
+    const double angle = 2 * std::numbers::pi * k / kCount;
+    points.push_back({std::cos(angle), std::sin(angle), 0});
+  }
+  for (Index k = 0; k <= kCount / 2; ++k) {
+    halves.curves[0].vertices.push_back(k);
+    halves.curves[1].vertices.push_back((k + kCount / 2) % kCount);
+  }
+  for (FeatureCurve& curve : halves.curves) curve.kind = FeatureKind::crease;
+  halves.edges = edges_of(halves.curves);
+  const SimplifiedFeatures left = simplify_features(halves, points, {1, 1}, 0.1);
+  ASSERT_EQ(left.graph.curves.size(), 1u);
+  EXPECT_TRUE(left.graph.curves[0].closed);
+  EXPECT_EQ(left.graph.curves[0].vertices.size(), kCount);
+  EXPECT_EQ(left.graph.edges, halves.edges);
+  EXPECT_TRUE(left.graph.corners.empty());
+}
+
+// A flat grid of squares 0.1 wide, x from 0 to 8 and y from -2 to 4, with creases along its lines.
+class CreasesOnAGrid {
+ public:
+  CreasesOnAGrid() {
+    for (int y = 0; y <= kRows; ++y)
+      for (int x = 0; x <= kColumns; ++x) points_.push_back({0.1 * x, 0.1 * y - 2, 0});
+    std::vector<Triangle> triangles;
+    for (int y = 0; y < kRows; ++y)
+      for (int x = 0; x < kColumns; ++x) {
+        const Index v = at(x, y), up = at(x, y + 1);
+        triangles.push_back({v, v + 1, up + 1});
+        triangles.push_back({v, up + 1, up});
+      }
+    neighbours_ = vertex_neighbours(triangles, points_.size());
+  }
+
+  // Through points that are joined by lines of the grid, in units of 0.1.
+  void crease(const std::vector<std::array<int, 2>>& stations, double weight) {
+    FeatureCurve curve;
+    curve.kind = FeatureKind::crease;
+    auto [x, y] = stations[0];
+    curve.vertices.push_back(at(x, y + 20));
+    for (const auto& [to_x, to_y] : stations)
+      while (x != to_x || y != to_y) {
+        x += (to_x > x) - (to_x < x);
+        y += (to_y > y) - (to_y < y);
+        curve.vertices.push_back(at(x, y + 20));
+      }
+    for (const Index end : {curve.vertices.front(), curve.vertices.back()}) graph_.corners.push_back(end);
+    graph_.curves.push_back(curve);
+    graph_.edges = edges_of(graph_.curves);
+    weights_.push_back(weight);
+  }
+
+  SimplifiedFeatures at_width(double width) const {
+    return simplify_features(graph_, points_, weights_, width, {}, neighbours_);
+  }
+  const Vec3& point(Index v) const { return points_[v]; }
+  double length(const FeatureGraph& graph) const {
+    double sum = 0;
+    for (const auto& [a, b] : graph.edges) sum += norm(points_[a] - points_[b]);
+    return sum;
+  }
+
+ private:
+  static constexpr int kColumns = 80, kRows = 60;
+  static Index at(int x, int y) { return static_cast<Index>(y * (kColumns + 1) + x); }
+
+  std::vector<Vec3> points_;
+  Csr<Index> neighbours_;
+  FeatureGraph graph_;
+  std::vector<double> weights_;
+};
+
+// Ends of curves that are no corner of the input and where no other curve ends.
+int count_loose_ends(const SimplifiedFeatures& left, const std::set<Index>& input_corners) {
+  std::map<Index, int> ends;
+  for (const FeatureCurve& curve : left.graph.curves)
+    if (!curve.closed)
+      for (const Index v : {curve.vertices.front(), curve.vertices.back()}) ++ends[v];
+  int loose = 0;
+  for (const auto& [v, count] : ends) loose += count == 1 && !input_corners.contains(v);
+  return loose;
+}
+
+// Half of the lighter crease runs beside the heavier: the other half stays, and ends on the heavier.
+TEST(SimplifiedFeatures, GoWhereTheyRunBesideOthers) {
+  for (const bool turned : {false, true}) {
+    CreasesOnAGrid grid;
+    grid.crease({{0, 0}, {80, 0}}, 10);
+    if (turned) grid.crease({{40, 40}, {40, 1}, {0, 1}}, 1);
+    else grid.crease({{0, 1}, {40, 1}, {40, 40}}, 1);
+    const SimplifiedFeatures left = grid.at_width(0.5);
+    EXPECT_EQ(left.graph.curves.size(), 3u);
+    EXPECT_NEAR(grid.length(left.graph), 8 + 4, 0.6);
+    EXPECT_EQ(count_loose_ends(left, {}), 3);
+    EXPECT_EQ(left.merged, 0u);
+  }
+}
+
+// A crease along both sides of a strip and around a field at its end becomes one line to a loop.
+TEST(SimplifiedFeatures, GoWhereTheyRunBesideThemselves) {
+  CreasesOnAGrid grid;
+  grid.crease({{0, 0}, {40, 0}, {40, -15}, {75, -15}, {75, 15}, {40, 15}, {40, 1}, {0, 1}}, 10);
+  const SimplifiedFeatures left = grid.at_width(0.5);
+  EXPECT_NEAR(grid.length(left.graph), 4 + 13, 0.6);
+  EXPECT_EQ(count_loose_ends(left, {}), 1);
+}
+
+// Of a crease that goes back and forth, lines that are apart remain.
+TEST(SimplifiedFeatures, OfAWindingCreaseAreLinesApart) {
+  CreasesOnAGrid grid;
+  std::vector<std::array<int, 2>> stations;
+  for (int row = 0; row <= 20; ++row)
+    for (const int x : {10, 70}) stations.push_back({row % 2 == 0 ? x : 80 - x, row});
+  grid.crease(stations, 10);
+  const double before = 21 * 6 + 2, after = grid.length(grid.at_width(0.5).graph);
+  EXPECT_LT(after, 0.35 * before);
+  EXPECT_GT(after, 0.1 * before);
+}
+
 }  // namespace
 }  // namespace bisector::test
