@@ -25,7 +25,7 @@ RunTotals& operator+=(RunTotals& a, const RunTotals& b) {
 }
 
 void CvtRun::localise(bool on) {
-  if (localised_ == on || sheets_cross_) return;
+  if (localised_ == on) return;
   localised_ = on;
   if (!on) {
     if (diagram_.strays > 0) diagram_ = {};
@@ -43,12 +43,7 @@ Localiser& CvtRun::localiser() {
 
 void CvtRun::leave_out_strays(DiagramOfSeeds& known) {
   const Stopwatch watch;
-  const std::optional<std::size_t> strays = localiser().localise(known.positions, known.diagram);
-  known.strays = strays.value_or(0);
-  if (!strays) {
-    localise(false);
-    sheets_cross_ = true;
-  }
+  known.strays = localiser().localise(known.positions, known.diagram);
   if (known.strays > 0 && includes(known.diagram.has, Want::dual)) add_dual(known.diagram);
   known.report.seconds.clip += watch.seconds();
   totals.seconds.clip += watch.seconds();

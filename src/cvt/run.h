@@ -53,8 +53,7 @@ class CvtRun {
   // The diagram of the seeds as they are, with what is wanted of it. It is computed if the last one was of other
   // positions, or lacks something. The reference is good until the next call that computes one.
   const Diagram& diagram(Want want = Want::moments);
-  // Whether diagrams are those of cells without stray parts (voronoi/localise.h). Once sheets turn out to cross, they
-  // are those of whole cells from then on.
+  // Whether diagrams are those of cells without stray parts (voronoi/localise.h).
   void localise(bool on);
   bool localises() const { return localised_; }
   // How many cells have such parts, or had them where they are left out, with the seeds as they are.

@@ -1,6 +1,9 @@
 #include "mesh/topology.h"
 
 #include <algorithm>
+#include <numeric>
+#include <set>
+#include <unordered_map>
 #include <utility>
 
 #include "bisector/quality.h"
@@ -21,6 +24,14 @@ std::size_t next_half_edge(std::size_t half_edge) { return half_edge % 3 == 2 ? 
 // The corner of the half-edge's triangle that lies at an end of its edge; half-edge h starts at corner h.
 std::size_t corner_at(const std::vector<Triangle>& triangles, std::size_t half_edge, Index vertex) {
   return origin(triangles, half_edge) == vertex ? half_edge : next_half_edge(half_edge);
+}
+
+// Links the corners (3 t + k) at both ends of an edge over all its triangles.
+void join_fans(const std::vector<Triangle>& triangles, const EdgeTable& table, std::size_t edge, DisjointSets<>& fans) {
+  const std::size_t* sides = table.half_edges.begin(edge);
+  for (std::size_t s = 1; s < table.half_edges.size(edge); ++s)
+    for (const Index v : table.edges[edge])
+      fans.join(corner_at(triangles, sides[0], v), corner_at(triangles, sides[s], v));
 }
 
 // Number of vertices whose corners make more than one fan; `fans` links the corners (3 t + k) of each.
@@ -111,8 +122,7 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
     if (count == 1) ++topology.boundary_edges;
     if (count > 2 || a == b) ++topology.non_manifold_edges;
     if (count == 2 && origin(triangles, sides[0]) == origin(triangles, sides[1])) topology.oriented = false;
-    for (std::size_t s = 1; s < count; ++s)
-      for (const Index v : {a, b}) fans.join(corner_at(triangles, sides[0], v), corner_at(triangles, sides[s], v));
+    join_fans(triangles, table, e, fans);
   }
   topology.non_manifold_vertices = count_split_vertices(triangles, vertex_count, fans);
   topology.closed = topology.boundary_edges == 0;
@@ -129,6 +139,51 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
   }
   topology.euler = vertices - static_cast<long long>(table.edges.size()) + static_cast<long long>(triangles.size());
   return topology;
+}
+
+std::vector<Index> split_fans(TriangleMesh& mesh) {
+  const std::size_t count = mesh.vertices.size();
+  std::vector<Index> original(count);
+  std::iota(original.begin(), original.end(), Index{0});
+  const EdgeTable table = edge_table(mesh.triangles, count);
+  DisjointSets<> fans(3 * mesh.triangles.size());
+  for (std::size_t e = 0; e < table.edges.size(); ++e) join_fans(mesh.triangles, table, e, fans);
+  constexpr std::size_t kUnseen = static_cast<std::size_t>(-1);
+  std::vector<std::size_t> first(count, kUnseen);  // fan of each vertex
+  std::unordered_map<std::size_t, Index> copies;   // of the other fans
+  const std::vector<Triangle> before = mesh.triangles;
+  for (std::size_t corner = 0; corner < 3 * before.size(); ++corner) {
+    const Index v = origin(before, corner);
+    const std::size_t fan = fans.root(corner);
+    if (first[v] == kUnseen) first[v] = fan;
+    if (first[v] == fan) continue;
+    const auto [copy, is_new] = copies.try_emplace(fan, static_cast<Index>(mesh.vertices.size()));
+    if (is_new) {
+      mesh.vertices.push_back(Vec3(mesh.vertices[v]));
+      original.push_back(v);
+    }
+    mesh.triangles[corner / 3][corner % 3] = copy->second;
+  }
+  mesh.feature_edges = edges_after_split(mesh, original, mesh.feature_edges);
+  return original;
+}
+
+std::vector<std::array<Index, 2>> edges_after_split(const TriangleMesh& mesh, const std::vector<Index>& original,
+                                                    const std::vector<std::array<Index, 2>>& edges) {
+  const auto ascending = [](Index a, Index b) { return std::array<Index, 2>{std::min(a, b), std::max(a, b)}; };
+  std::set<std::array<Index, 2>> named, met, found;
+  for (const auto& [a, b] : edges) named.insert(ascending(a, b));
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3 && !named.empty(); ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      const std::array<Index, 2> before = ascending(original[a], original[b]);
+      if (!named.contains(before)) continue;
+      met.insert(before);
+      found.insert(ascending(a, b));
+    }
+  for (const auto& edge : named)
+    if (!met.contains(edge)) found.insert(edge);
+  return {found.begin(), found.end()};
 }
 
 std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count) {

@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "bisector/repair.h"
+#include "core/geometry.h"
 #include "features/normals.h"
 #include "mesh/topology.h"
 #include "remesh/detail.h"
@@ -21,6 +23,8 @@ namespace {
 // then is one that a mesh of so many vertices could follow.
 constexpr std::size_t kLeastForDensity = 3000;
 constexpr std::size_t kMostVertices = 100'000'000;
+// Of the diagonal: how far vertices are moved that would be at the same point.
+constexpr double kApart = 1e-7;
 
 std::size_t non_manifold_edges(const TriangleMesh& mesh) {
   return analyse_topology(mesh.triangles, mesh.vertices.size()).non_manifold_edges;
@@ -66,6 +70,41 @@ void orient_with_warning(TriangleMesh& mesh, const Context& context) {
   context.warn(fmt::format("turned {} over, to run the same way round as most", plural(count, "triangle")));
 }
 
+// Moves vertices that were one towards their own triangles, so that seeds there are not at the same point.
+void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
+  std::vector<char> is_split(mesh.vertices.size(), 0);
+  for (Index v = 0; v < original.size(); ++v)
+    if (original[v] != v) is_split[v] = is_split[original[v]] = 1;
+  std::vector<Vec3> inwards(mesh.vertices.size());
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!is_split[t[k]]) continue;
+      const Vec3 across = 0.5 * (mesh.vertices[t[(k + 1) % 3]] + mesh.vertices[t[(k + 2) % 3]]) - mesh.vertices[t[k]];
+      if (const double length = norm(across); length > 0) inwards[t[k]] += (1 / length) * across;
+    }
+  const double step = kApart * bounding_box(mesh.vertices).diagonal();
+  for (Index v = 0; v < original.size(); ++v)
+    if (const double length = norm(inwards[v]); is_split[v] && length > 0)
+      mesh.vertices[v] += (step / length) * inwards[v];
+}
+
+// Where the surface touches itself in points alone, it is meshed as if it did not: it is a manifold then. Returns the
+// vertex of each that it was before.
+std::vector<Index> split_fans_with_warning(TriangleMesh& mesh, const Context& context) {
+  const MeshTopology topology = analyse_topology(mesh.triangles, mesh.vertices.size());
+  const std::size_t points = topology.non_manifold_vertices;
+  if (points > 0 && topology.non_manifold_edges == 0) {
+    context.warn(fmt::format("parts of the surface touch in {}; they are meshed as if they did not",
+                             plural(points, "point")));
+    std::vector<Index> original = split_fans(mesh);
+    part_fans(mesh, original);
+    return original;
+  }
+  std::vector<Index> same(mesh.vertices.size());
+  std::iota(same.begin(), same.end(), Index{0});
+  return same;
+}
+
 SizingTarget target_of(const RemeshOptions& options) {
   if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
   return {options.vertices, options.edge_length};
@@ -91,6 +130,7 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
   warn_of_weld(welded_, options, context);
   orient_with_warning(mesh_, context);
 
+  const std::size_t vertices = mesh_.vertices.size();
   FeatureOptions features = options.features;
   for (auto& [a, b] : features.given) {
     if (a >= vertex_of.size() || b >= vertex_of.size())
@@ -99,6 +139,8 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
     b = vertex_of[b];
   }
   std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+  const std::vector<Index> before = split_fans_with_warning(mesh_, context);
+  if (before.size() > vertices) features.given = edges_after_split(mesh_, before, features.given);
   if (options.energy == Energy::automatic) find_noise(features);
   features_ = detect_features(mesh_, features);
 
@@ -106,8 +148,9 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
     if (sizing_.attribute.size() != input.vertices.size())
       throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex",
                               sizing_.attribute.size(), input.vertices.size()));
-    std::vector<double> values(mesh_.vertices.size());
+    std::vector<double> values(vertices);
     for (std::size_t v = input.vertices.size(); v-- > 0;) values[vertex_of[v]] = sizing_.attribute[v];
+    for (std::size_t v = vertices; v < before.size(); ++v) values.push_back(double{values[before[v]]});
     sizing_.attribute = std::move(values);
   }
   sizing_.sharp = features_.edges;

@@ -196,7 +196,6 @@ void Pipeline::optimise_levels() {
     optimise(run_, step_);
     if (may_localise) run_.localise(true);
     if (may_localise && run_.strays() == 0) run_.localise(false);
-    // The other half of the steps is due though sheets cross and cells stay whole.
     if (many || run_.localises()) {
       step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
       optimise(run_, step_);

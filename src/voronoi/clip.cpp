@@ -31,9 +31,9 @@ void Clipper::reset(const SortedSeeds& seeds) {
   for (Screen& screen : screens_) screen.list = nullptr;
 }
 
-void Clipper::begin(const Facet& facet, std::span<const Index> left_out) {
+void Clipper::begin(const Facet& facet, const SlotFilter* among) {
   facet_ = &facet;
-  left_out_ = left_out;
+  among_ = among;
   for (unsigned k = 0; k < 3; ++k) {
     Line& line = lines_[k];
     const unsigned from = facet.origin[k], to = from == k ? (k + 1) % 3 : k;
@@ -225,7 +225,7 @@ unsigned Clipper::lines_that_may_cut(const ScreenBlock& block) const {
 }
 
 bool Clipper::visit(Index other) {
-  if (!left_out_.empty() && std::find(left_out_.begin(), left_out_.end(), other) != left_out_.end()) return true;
+  if (among_ && !among_->admits(other)) return true;
   const Vec3 d = seeds_->x[other] - seeds_->x[slot_];
   if (wider_ && bounded_by(other)) return true;
   cut(other, d, norm2(d));

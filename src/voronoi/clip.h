@@ -1,7 +1,6 @@
 // Clipping one triangle to one restricted Voronoi cell: labels first, coordinates from labels (thesis 4.3.2, 4.3.4).
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "core/geometry.h"
@@ -13,6 +12,13 @@
 
 namespace bisector {
 
+// Some of the seeds.
+class SlotFilter {
+ public:
+  virtual ~SlotFilter() = default;
+  virtual bool admits(Index slot) const = 0;
+};
+
 // Clips facets to cells and integrates over the result. One object per thread; memory is kept between calls.
 class Clipper {
  public:
@@ -20,9 +26,9 @@ class Clipper {
 
   // Forgets what is kept about the seeds; to be called whenever they or their neighbours change.
   void reset(const SortedSeeds& seeds);
-  // The facet that the following calls are about, and slots whose seeds clip() takes not to be there; both must outlive
-  // them.
-  void begin(const Facet& facet, std::span<const Index> left_out = {});
+  // The facet that the following calls are about, and the seeds that clip() takes to be there, all if there is no
+  // filter; both must outlive them.
+  void begin(const Facet& facet, const SlotFilter* among = nullptr);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
   // The same, if the result is bounded by the lines with these labels in this cyclic order (that of an earlier diagram
@@ -121,7 +127,7 @@ class Clipper {
 
   const SortedSeeds* seeds_ = nullptr;
   const Facet* facet_ = nullptr;
-  std::span<const Index> left_out_;
+  const SlotFilter* among_ = nullptr;
   Index slot_ = 0;
   Vec3 local_[3];             // the facet's corners relative to the seed
   double largest_ = 0;        // absolute coordinate of local_

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <span>
 #include <unordered_map>
@@ -21,14 +22,9 @@
 namespace bisector {
 namespace {
 
-// Pieces across a wall come to light one behind the other: where a wall is much thinner than the edges, as many as
-// there are seeds nearer than the first on the right side. Every kRounds rounds it is looked at by how much fewer
-// triangles were divided in the last than kRounds before. Where few cells have strays, no more than one in kManyLeft,
-// the rounds end if that was not by half; where sheets cross there is no end to it, and all is given up if many have
-// and it was not by a tenth, or when each triangle has been divided kDivisions times on average.
-constexpr int kRounds = 16;
-constexpr double kFewLess = 0.5, kManyLess = 0.9;
-constexpr std::size_t kDivisions = 16, kManyLeft = 10;
+// Where the parts that win a region are apart from their seeds, there is another round: few triangles are left then. What
+// is left when each triangle has been divided so many times on average stays.
+constexpr std::size_t kDivisions = 16;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
@@ -77,6 +73,22 @@ class Overlay {
   std::vector<T> values_;
 };
 
+// The seeds that divide a triangle among them.
+class Among : public SlotFilter {
+ public:
+  bool admits(Index slot) const override {
+    if (contains(left_out, slot)) return false;
+    return std::binary_search(own.begin(), own.end(), slot) ||
+           std::any_of(around.begin(), around.end(), [&](const auto& slots) {
+             return std::binary_search(slots->begin(), slots->end(), slot);
+           });
+  }
+
+  std::vector<Index> left_out;                                       // that had stray pieces here
+  std::vector<Index> own;                                            // with cells here that are no stray pieces, ascending
+  std::vector<std::shared_ptr<const std::vector<Index>>> around;     // the regions of such pieces, ascending
+};
+
 }  // namespace
 
 struct Localiser::Work {
@@ -96,13 +108,14 @@ struct Localiser::Work {
   Overlay<RestrictedPolygons> clipped;             // triangles as they are divided now
   Overlay<Triangles> cell_triangles;               // of cells that changed
   std::map<Index, std::vector<Triangles>> strays;  // components of cells apart from their seeds
-  Slots left_out, back;                            // without a cell on a triangle, and not again
+  std::unordered_map<Index, Among> among;          // of triangles where seeds are left out
+  Slots back;                                      // that are not left out of a triangle again
 
   explicit Work(const Surface& s);
 
   // Both return how many cells have strays.
   std::size_t find_all_strays(const std::vector<Vec3>& given, const Diagram& diagram);
-  std::optional<std::size_t> localise(const std::vector<Vec3>& given, Diagram& diagram);
+  std::size_t localise(const std::vector<Vec3>& given, Diagram& diagram);
 
  private:
   // The polygons on a triangle as they are now.
@@ -134,16 +147,14 @@ struct Localiser::Work {
   std::vector<std::size_t> nearest_to_seed(Index cell, std::span<const Index> triangles);
   std::vector<Triangles> find_strays(Index cell);
   void find_strays(const std::vector<Index>& cells);
-  bool is_own(Index triangle, Index cell) const;
-  bool borders_on_own(Index cell, const Triangles& piece) const;
   bool is_left_out(Index triangle, Index cell) const;
-  bool has_own_at(std::size_t half_edge) const;
+  template <class Body>
+  void each_cell_beside(Index cell, const Triangles& piece, const Body& body) const;
   Triangles leave_out();
-  Triangles put_back_torn(const Triangles& among);
+  Triangles put_back_torn(const Triangles& those);
   Triangles beside(const Triangles& triangles) const;
   std::vector<Index> clip_anew(const Triangles& triangles);
   RestrictedPolygons clip(Index triangle, Clipper& clipper) const;
-  Index nearest_but(const Vec3& q, std::span<const Index> without, Clipper& clipper) const;
   RestrictedPolygons splice() const;
   void sum(Diagram& diagram);
 };
@@ -293,86 +304,144 @@ void Localiser::Work::find_strays(const std::vector<Index>& cells) {
   }
 }
 
-bool Localiser::Work::is_own(Index triangle, Index cell) const {
-  const auto at = strays.find(cell);
-  return at == strays.end() || std::none_of(at->second.begin(), at->second.end(), [&](const Triangles& piece) {
-           return std::binary_search(piece.begin(), piece.end(), triangle);
-         });
+bool Localiser::Work::is_left_out(Index triangle, Index cell) const {
+  const auto at = among.find(triangle);
+  return at != among.end() && !at->second.admits(seeds.slot[cell]);
 }
 
-// A sheet without a seed has pieces that border on none, and they stay. Beyond a mesh edge there may be another cell
-// where this one is left out already.
-bool Localiser::Work::borders_on_own(Index cell, const Triangles& piece) const {
+// Calls body(triangle, other) for the cells that a piece of a cell borders on, on its own triangles, and beyond mesh
+// edges where the cell is left out already.
+template <class Body>
+void Localiser::Work::each_cell_beside(Index cell, const Triangles& piece, const Body& body) const {
   for (const Index t : piece) {
     const Row on = row(t);
     const std::size_t p = on.find(cell);
     for (std::size_t e = on.polygons->offsets[p]; e < on.polygons->offsets[p + 1]; ++e) {
       const Index label = on.polygons->labels[e];
       if (!is_edge(label)) {
-        if (is_own(t, label)) return true;
+        body(t, label);
         continue;
       }
       const std::size_t h = std::size_t{3} * t + (label & ~kEdgeLabel);
-      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other)
-        if (is_left_out(static_cast<Index>(*other / 3), cell) && has_own_at(*other)) return true;
-    }
-  }
-  return false;
-}
-
-bool Localiser::Work::is_left_out(Index triangle, Index cell) const {
-  return has_slot(left_out, triangle, seeds.slot[cell]);
-}
-
-// Whether a cell's own part lies at a half-edge, in its triangle.
-bool Localiser::Work::has_own_at(std::size_t half_edge) const {
-  const auto triangle = static_cast<Index>(half_edge / 3);
-  const Row on = row(triangle);
-  for (std::size_t p = on.begin; p < on.end; ++p)
-    if (on.has_label(p, kEdgeLabel | static_cast<Index>(half_edge % 3)) && is_own(triangle, on.polygons->pairs[p].cell))
-      return true;
-  return false;
-}
-
-// Leaves out seeds where they have stray pieces. Returns the triangles, ascending.
-Triangles Localiser::Work::leave_out() {
-  Triangles triangles;
-  for (const auto& [cell, pieces] : strays)
-    for (const Triangles& piece : pieces) {
-      if (!borders_on_own(cell, piece)) continue;
-      for (const Index t : piece) {
-        const Index slot = seeds.slot[cell];
-        if (has_slot(back, t, slot)) continue;
-        left_out[t].push_back(slot);
-        triangles.push_back(t);
+      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
+        const auto beyond = static_cast<Index>(*other / 3);
+        if (!is_left_out(beyond, cell)) continue;
+        const Row there = row(beyond);
+        for (std::size_t q = there.begin; q < there.end; ++q)
+          if (there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)))
+            body(beyond, there.polygons->pairs[q].cell);
       }
     }
-  sort_unique(triangles);
+  }
+}
+
+// Divides each region of stray pieces that border on each other anew, among the cells that border on it with their own
+// parts: all seeds of a sheet across leave it at once. A sheet without a seed is a region that borders on none, and its
+// pieces stay. Returns the triangles, ascending.
+Triangles Localiser::Work::leave_out() {
+  struct Piece {
+    Index cell;
+    const Triangles* triangles;
+  };
+  std::vector<Piece> pieces;
+  std::unordered_map<Index, std::size_t> first_of;  // piece of each cell
+  for (const auto& [cell, of] : strays) {
+    first_of[cell] = pieces.size();
+    for (const Triangles& piece : of) pieces.push_back({cell, &piece});
+  }
+  // Where a triangle holds no piece of the cell, it is the cell's own.
+  const auto piece_at = [&](Index triangle, Index cell) {
+    const auto at = first_of.find(cell);
+    if (at == first_of.end()) return pieces.size();
+    for (std::size_t k = at->second; k < pieces.size() && pieces[k].cell == cell; ++k)
+      if (std::binary_search(pieces[k].triangles->begin(), pieces[k].triangles->end(), triangle)) return k;
+    return pieces.size();
+  };
+  DisjointSets<> regions(pieces.size());
+  std::vector<std::vector<Index>> own(pieces.size());
+  for (std::size_t k = 0; k < pieces.size(); ++k)
+    each_cell_beside(pieces[k].cell, *pieces[k].triangles, [&](Index triangle, Index other) {
+      const std::size_t piece = piece_at(triangle, other);
+      if (piece == pieces.size()) own[k].push_back(seeds.slot[other]);
+      else regions.join(k, piece);
+    });
+  std::vector<std::shared_ptr<std::vector<Index>>> around(pieces.size());  // of each region, at its root
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    auto& slots = around[regions.root(k)];
+    if (!slots) slots = std::make_shared<std::vector<Index>>();
+    slots->insert(slots->end(), own[k].begin(), own[k].end());
+  }
+  for (const auto& slots : around)
+    if (slots) sort_unique(*slots);
+
+  Triangles triangles;
+  std::map<Index, std::vector<std::size_t>> regions_at;  // of triangles
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    const std::size_t region = regions.root(k);
+    if (around[region]->empty()) continue;
+    const Index slot = seeds.slot[pieces[k].cell];
+    for (const Index t : *pieces[k].triangles) {
+      if (has_slot(back, t, slot)) continue;
+      among[t].left_out.push_back(slot);
+      std::vector<std::size_t>& there = regions_at[t];
+      if (std::find(there.begin(), there.end(), region) == there.end()) there.push_back(region);
+    }
+  }
+  for (const auto& [t, there] : regions_at) {
+    Among& these = among[t];
+    these.own.clear();
+    these.around.clear();
+    const Row on = row(t);
+    for (std::size_t p = on.begin; p < on.end; ++p)
+      if (const Index slot = seeds.slot[on.polygons->pairs[p].cell]; !contains(these.left_out, slot))
+        these.own.push_back(slot);
+    sort_unique(these.own);
+    for (const std::size_t region : there) these.around.push_back(around[region]);
+    const auto left = [&](Index slot) { return !contains(these.left_out, slot); };
+    if (these.own.empty() && std::none_of(these.around.begin(), these.around.end(), [&](const auto& slots) {
+          return std::any_of(slots->begin(), slots->end(), left);
+        })) {
+      // All that could have the triangle have left it before.
+      for (std::size_t p = on.begin; p < on.end; ++p) {
+        const Index slot = seeds.slot[on.polygons->pairs[p].cell];
+        std::erase(these.left_out, slot);
+        these.own.push_back(slot);
+        back[t].push_back(slot);
+      }
+      sort_unique(these.own);
+      continue;
+    }
+    triangles.push_back(t);
+  }
   return triangles;
 }
 
 // Where a cell ends at a mesh edge because it is left out on one of these triangles beyond, it is put back there.
 // Returns the triangles where one was.
-Triangles Localiser::Work::put_back_torn(const Triangles& among) {
+Triangles Localiser::Work::put_back_torn(const Triangles& those) {
   Triangles triangles;
   std::vector<std::pair<Index, Index>> torn;
-  for (const Index triangle : among) {
-    const auto slots = left_out.find(triangle);
-    if (slots == left_out.end()) continue;
+  for (const Index triangle : those) {
+    const auto these = among.find(triangle);
+    if (these == among.end()) continue;
     for (Index k = 0; k < 3; ++k) {
       const std::size_t h = std::size_t{3} * triangle + k;
       if (!direct[h]) continue;
       for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
         const Row there = row(static_cast<Index>(*other / 3));
-        for (const Index slot : slots->second)
-          if (const std::size_t q = there.find(seeds.id[slot]);
-              q < there.end && there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)))
+        for (std::size_t q = there.begin; q < there.end; ++q) {
+          const Index slot = seeds.slot[there.polygons->pairs[q].cell];
+          if (there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)) && !these->second.admits(slot))
             torn.push_back({triangle, slot});
+        }
       }
     }
   }
   for (const auto& [triangle, slot] : torn) {
-    std::erase(left_out[triangle], slot);
+    Among& these = among[triangle];
+    std::erase(these.left_out, slot);
+    these.own.push_back(slot);
+    sort_unique(these.own);
     if (!contains(back[triangle], slot)) back[triangle].push_back(slot);
     triangles.push_back(triangle);
   }
@@ -391,35 +460,29 @@ Triangles Localiser::Work::beside(const Triangles& triangles) const {
   return found;
 }
 
-// A slot with a cell on the facet that the clipper is at, some being left out.
-Index Localiser::Work::nearest_but(const Vec3& q, std::span<const Index> without, Clipper& clipper) const {
-  double radius = norm(seeds.x[neighbours.nearest(q)] - q);
-  for (std::size_t tried = 0; tried + without.size() < seeds.x.size(); radius = 1.5 * radius + 1e-6 * seeds.extent) {
-    std::vector<Index> near = neighbours.around(q, radius);
-    std::erase_if(near, [&](Index s) { return norm(seeds.x[s] - q) > radius || contains(without, s); });
-    std::sort(near.begin(), near.end(), [&](Index a, Index b) {
-      return std::pair(norm2(seeds.x[a] - q), seeds.id[a]) < std::pair(norm2(seeds.x[b] - q), seeds.id[b]);
-    });
-    for (; tried < near.size(); ++tried)
-      if (clipper.clip(neighbours, near[tried])) return near[tried];
-  }
-  return kNone;
-}
-
 // The division of a triangle among the seeds that are not left out.
 RestrictedPolygons Localiser::Work::clip(Index triangle, Clipper& clipper) const {
-  const auto these = left_out.find(triangle);
-  const std::span<const Index> without = these == left_out.end() ? std::span<const Index>{} : these->second;
-  clipper.begin(surface.facets[surface.facet_of[triangle]], without);
+  const Among& these = among.at(triangle);
+  clipper.begin(surface.facets[surface.facet_of[triangle]], &these);
   std::vector<Index> met;
   const auto meet = [&](Index slot) {
-    if (slot != kNone && !contains(met, slot) && !contains(without, slot)) met.push_back(slot);
+    if (!contains(met, slot) && these.admits(slot)) met.push_back(slot);
   };
-  const Row before = row(triangle);
-  for (std::size_t p = before.begin; p < before.end; ++p) meet(seeds.slot[before.polygons->pairs[p].cell]);
-  if (const auto at = back.find(triangle); at != back.end())
-    for (const Index slot : at->second) meet(slot);
-  if (met.empty()) meet(nearest_but(surface.mesh.vertices[surface.mesh.triangles[triangle][0]], without, clipper));
+  for (const Index slot : these.own) meet(slot);
+  if (met.empty()) {
+    // The seed nearest to a point of the triangle has a cell on it.
+    const Vec3& q = surface.mesh.vertices[surface.mesh.triangles[triangle][0]];
+    std::vector<Index> candidates;
+    for (const auto& slots : these.around)
+      for (const Index slot : *slots)
+        if (these.admits(slot)) candidates.push_back(slot);
+    std::sort(candidates.begin(), candidates.end(), [&](Index a, Index b) {
+      return std::pair(norm2(seeds.x[a] - q), seeds.id[a]) < std::pair(norm2(seeds.x[b] - q), seeds.id[b]);
+    });
+    const auto nearest = std::find_if(candidates.begin(), candidates.end(),
+                                      [&](Index slot) { return clipper.clip(neighbours, slot); });
+    if (nearest != candidates.end()) meet(*nearest);
+  }
   RestrictedPolygons found;
   found.offsets = {0};
   for (std::size_t k = 0; k < met.size(); ++k) {
@@ -536,7 +599,7 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
   clipped.reset(surface.mesh.triangles.size());
   cell_triangles.reset(given.size());
   strays.clear();
-  left_out.clear();
+  among.clear();
   back.clear();
   std::vector<Index> cells(given.size());
   std::iota(cells.begin(), cells.end(), Index{0});
@@ -544,28 +607,19 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
   return strays.size();
 }
 
-std::optional<std::size_t> Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
+std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
   const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
   neighbours.build(seeds, NeighbourSource::nearest);
-  std::size_t divided = 0, before = std::numeric_limits<std::size_t>::max();
-  for (int round = 0;; ++round) {
+  std::size_t divided = 0;
+  for (;;) {
     const Triangles triangles = leave_out();
-    if (triangles.empty()) break;
-    if (round % kRounds == 0) {
-      const bool many = strays.size() * kManyLeft > given.size();
-      const double less = (many ? kManyLess : kFewLess) * static_cast<double>(std::exchange(before, triangles.size()));
-      if (static_cast<double>(triangles.size()) > less) {
-        if (many) return {};
-        break;
-      }
-    }
     divided += triangles.size();
-    if (divided > kDivisions * surface.facets.size()) return {};
+    if (triangles.empty() || divided > kDivisions * surface.facets.size()) break;
     find_strays(clip_anew(triangles));
   }
   Triangles changed;
-  for (const auto& at : left_out) changed.push_back(at.first);
+  for (const auto& at : among) changed.push_back(at.first);
   // What else is torn then lies beside what is clipped anew.
   for (Triangles torn = put_back_torn(changed); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);
   if (clipped.items.empty()) return 0;
@@ -577,7 +631,7 @@ std::optional<std::size_t> Localiser::Work::localise(const std::vector<Vec3>& gi
 Localiser::Localiser(const Surface& surface) : work_(std::make_unique<Work>(surface)) {}
 Localiser::~Localiser() = default;
 
-std::optional<std::size_t> Localiser::localise(const std::vector<Vec3>& seeds, Diagram& diagram) {
+std::size_t Localiser::localise(const std::vector<Vec3>& seeds, Diagram& diagram) {
   return work_->localise(seeds, diagram);
 }
 

@@ -3,13 +3,12 @@
 // Near a fold of the surface, a thin wall or a thin limb a seed also owns pieces of the sheet across, apart from its
 // own part of the surface. In the localised restricted Voronoi diagram (Yan, Bao, Zhang and Wonka 2014, "Low-resolution
 // remeshing using the localized restricted Voronoi diagram") a cell is what its seed owns of the surface around itself:
-// a stray piece is divided among the other seeds as if its own were not there, until every cell is one piece. Its dual
+// what stray pieces cover together is divided among the cells around it, until every cell is one piece. Its dual
 // follows the surface with far fewer seeds, and its energy spreads the seeds over each sheet for itself.
 #pragma once
 
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "core/geometry.h"
@@ -24,12 +23,11 @@ class Localiser {
   explicit Localiser(const Surface& surface);
   ~Localiser();
 
-  // Gives each component of a cell that is not the one nearest to the seed, and that borders on other cells' own
-  // components, to those. `diagram` is that of the seeds, with its polygons; these and the moments become those of the
-  // localised cells. The result depends on seeds and labels alone, and polygons tile the surface as before. Returns how
-  // many cells had such components; nothing, with the diagram as it was, where sheets cross so that there is no end to
-  // it.
-  std::optional<std::size_t> localise(const std::vector<Vec3>& seeds, Diagram& diagram);
+  // Gives each component of a cell that is not the one nearest to the seed to the cells whose own components border on
+  // it and on what it borders on of the kind; where there are none it stays. `diagram` is that of the seeds, with its
+  // polygons; these and the moments become those of the localised cells. The result depends on seeds and labels alone,
+  // and polygons tile the surface as before. Returns how many cells had such components.
+  std::size_t localise(const std::vector<Vec3>& seeds, Diagram& diagram);
   // That number alone.
   std::size_t count_strays(const std::vector<Vec3>& seeds, const Diagram& diagram);
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -174,6 +175,36 @@ TEST(RemeshHard, NonManifoldInputRunsAndReports) {
                                              topology.closed == input.closed && topology.euler == input.euler &&
                                              topology.components == input.components);
     }
+}
+
+// Boxes that touch in a corner are remeshed as two, both with that corner.
+TEST(RemeshHard, WhatTouchesInAPointIsSeveralSurfaces) {
+  const TriangleMesh one = box(4);
+  const auto index_of = [](const std::vector<Vec3>& points, const Vec3& p) {
+    return static_cast<Index>(std::find(points.begin(), points.end(), p) - points.begin());
+  };
+  TriangleMesh boxes = one;
+  for (Triangle t : one.triangles) {
+    for (Index& v : t) {
+      const Vec3 p = one.vertices[v] + Vec3{1, 1, 1};
+      v = index_of(boxes.vertices, p);
+      if (v == boxes.vertices.size()) boxes.vertices.push_back(p);
+    }
+    boxes.triangles.push_back(t);
+  }
+  ASSERT_EQ(analyse_topology(boxes.triangles, boxes.vertices.size()).non_manifold_vertices, 1u);
+  std::vector<std::string> warnings;
+  Context context;
+  context.warning = [&](const std::string& line) { warnings.push_back(line); };
+  const RemeshResult result = remesh(boxes, options_for(800), context);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(result.topology.manifold && result.topology.closed && result.topology_matches);
+  EXPECT_EQ(result.topology.components, 2u);
+  EXPECT_EQ(result.mesh.vertices.size(), 800u);
+  EXPECT_EQ(result.features.broken, 0u);
+  EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
+  const auto is_there = [](const Vec3& v) { return norm(v - Vec3{1, 1, 1}) < 1e-6; };
+  EXPECT_EQ(std::count_if(result.mesh.vertices.begin(), result.mesh.vertices.end(), is_there), 2);
 }
 
 TEST(RemeshHard, FewVerticesGiveWhatTheyCan) {

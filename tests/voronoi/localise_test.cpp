@@ -184,7 +184,7 @@ TEST(LocalisedCells, OfAThinLensComeToAnEnd) {
       const std::vector<Vec3> seeds = optimised_plate_seeds(surface, random_seed);
       Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
       const std::size_t before = check_ball_property(surface, diagram.polygons).failures();
-      ASSERT_TRUE(Localiser(surface).localise(seeds, diagram).has_value());
+      EXPECT_GT(Localiser(surface).localise(seeds, diagram), 0u);
       expect_diagram(surface, diagram);
       const BallReport after = check_ball_property(surface, diagram.polygons);
       EXPECT_LT(4 * after.failures(), before);
@@ -194,7 +194,7 @@ TEST(LocalisedCells, OfAThinLensComeToAnEnd) {
 }
 
 // Of sheets that cross, every cell has pieces of several, and behind each piece is another cell's.
-TEST(LocalisedCells, OfManyCrossingSheetsAreGivenUp) {
+TEST(LocalisedCells, OfManyCrossingSheetsAreOfOneEach) {
   const TriangleMesh sheet = grid_patch(12, 12);
   TriangleMesh sheets;
   for (int k = 0; k < 40; ++k) {
@@ -206,10 +206,16 @@ TEST(LocalisedCells, OfManyCrossingSheetsAreGivenUp) {
   const Surface surface(sheets);
   const std::vector<Vec3> seeds = random_seeds(sheets, 400, 5);
   const Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+  const auto divided_cells = [&](const Diagram& d) {
+    std::size_t count = 0;
+    for (const BallReport::Cell& cell : check_ball_property(surface, d.polygons).cells) count += cell.components > 1;
+    return count;
+  };
   Diagram localised = diagram;
-  EXPECT_FALSE(Localiser(surface).localise(seeds, localised).has_value());
-  EXPECT_EQ(localised.polygons.labels, diagram.polygons.labels);
-  EXPECT_TRUE(same_bits(localised.moments.cells, diagram.moments.cells));
+  EXPECT_GT(Localiser(surface).localise(seeds, localised), 390u);
+  expect_diagram(surface, localised);
+  EXPECT_GT(divided_cells(diagram), 390u);
+  EXPECT_LT(divided_cells(localised), 4u);
 }
 
 TEST(LocalisedCells, AreTheSameWithAnyNumberOfThreads) {
