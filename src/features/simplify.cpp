@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -27,9 +28,11 @@ namespace {
 constexpr double kBeside = 0.5;
 // Edges that a closed curve has at least, so that it looks round.
 constexpr double kLoopEdges = 4;
-// A curve that comes back to its corner is one if it is longer than so many widths. So long a stretch beside others
-// goes by itself.
+// A curve that comes back to its corner is one if it is longer than so many widths.
 constexpr double kLoopWidths = 3;
+// So long, in widths, are parts of curves that go by themselves: two curves that leave a corner at less than 30 degrees
+// are nearer to each other than the width as far as that.
+constexpr double kStretch = 2;
 // Between points where curves are looked at, in widths.
 constexpr double kStep = 0.5;
 // A curve runs beside itself where it is nearer than this part of the way along it: where it turns back at less than
@@ -332,7 +335,7 @@ struct Stretch {
   bool beside;
 };
 
-// Those shorter than kLoopWidths become like what is around them, the shortest first.
+// Those shorter than kStretch become like what is around them, the shortest first.
 std::vector<Stretch> stretches_of(const std::vector<char>& beside) {
   std::vector<Stretch> stretches;
   for (std::size_t k = 0; k < beside.size(); ++k) {
@@ -343,7 +346,7 @@ std::vector<Stretch> stretches_of(const std::vector<char>& beside) {
   while (stretches.size() > 1) {
     const auto shortest = std::min_element(stretches.begin(), stretches.end(),
                                            [&](const Stretch& a, const Stretch& b) { return size(a) < size(b); });
-    if (kStep * static_cast<double>(size(*shortest)) >= kLoopWidths) break;
+    if (kStep * static_cast<double>(size(*shortest)) >= kStretch) break;
     shortest->beside = !shortest->beside;
     std::vector<Stretch> merged;
     for (const Stretch& s : stretches) {
@@ -355,22 +358,32 @@ std::vector<Stretch> stretches_of(const std::vector<char>& beside) {
   return stretches;
 }
 
-// Divides a candidate at its vertices that are nearest to these arc lengths, but not where none is within
-// `reach`. A closed one then begins at the first of them.
-std::vector<Candidate> parts_of(const Candidate& whole, const std::vector<double>& positions,
-                                const std::vector<Vec3>& vertices, double reach) {
+// An arc length, and how far from it a vertex may be.
+struct Cut {
+  double position, reach;
+};
+
+// Divides a candidate at its vertices that are nearest to these places, but not into parts shorter than `least`. A
+// closed one then begins at the first of them.
+std::vector<Candidate> parts_of(const Candidate& whole, const std::vector<Cut>& places,
+                                const std::vector<Vec3>& vertices, double least) {
   std::vector<Index> chain = whole.curve.vertices;
   if (whole.curve.closed) chain.push_back(chain.front());
   const std::vector<double> at = arc_lengths(chain, vertices);
   const std::size_t last = chain.size() - 1;
   std::set<std::size_t> nearest;
-  for (const double position : positions) {
+  for (const auto& [position, reach] : places) {
     auto k = static_cast<std::size_t>(std::lower_bound(at.begin(), at.end(), position) - at.begin());
     k = std::min(k, last);
     if (k > 0 && position - at[k - 1] < at[k] - position) --k;
     if (std::abs(at[k] - position) > reach) continue;
     if (whole.curve.closed) nearest.insert(k % last);
-    else if (k > 0 && k < last) nearest.insert(k);
+    else if (at[k] >= least && at[last] - at[k] >= least) nearest.insert(k);
+  }
+  for (auto k = nearest.begin(); k != nearest.end();) {
+    const auto next = std::next(k);
+    if (next != nearest.end() && at[*next] - at[*k] < least) nearest.erase(next);
+    else k = next;
   }
   if (nearest.empty()) return {whole};
   std::vector<std::size_t> cuts(nearest.begin(), nearest.end());
@@ -459,8 +472,8 @@ class Selection {
     return static_cast<double>(std::count(beside.begin(), beside.end(), 1)) / static_cast<double>(beside.size());
   }
 
-  std::vector<Candidate> divided_at(const Candidate& whole, const std::vector<double>& positions, double reach) {
-    std::vector<Candidate> parts = parts_of(whole, positions, vertices_, reach);
+  std::vector<Candidate> divided_at(const Candidate& whole, const std::vector<Cut>& places) {
+    std::vector<Candidate> parts = parts_of(whole, places, vertices_, kStretch * width_);
     for (std::size_t k = 0; k < parts.size() && !parts[k].curve.closed; ++k) {
       if (k > 0 || whole.curve.closed) cuts_.insert(parts[k].curve.vertices.front());
       if (k + 1 < parts.size() || whole.curve.closed) cuts_.insert(parts[k].curve.vertices.back());
@@ -469,19 +482,24 @@ class Selection {
   }
 
   std::vector<Candidate> divided_between(const Candidate& whole, const std::vector<Stretch>& stretches) {
-    std::vector<double> positions;
-    if (whole.curve.closed && stretches.size() > 1 && stretches.front().beside != stretches.back().beside)
-      positions.push_back(0);
-    for (std::size_t k = 1; k < stretches.size(); ++k)
-      positions.push_back(kStep * width_ * static_cast<double>(stretches[k].begin));
-    return divided_at(whole, positions, width_);
+    // A vertex may be as far beyond the end of a stretch that goes as that is long.
+    const double step = kStep * width_;
+    std::vector<Cut> places;
+    for (std::size_t k = 0; k < stretches.size(); ++k) {
+      const std::size_t before = k == 0 ? stretches.size() - 1 : k - 1;
+      if (k == 0 && (!whole.curve.closed || stretches[k].beside == stretches[before].beside)) continue;
+      const Stretch& goes = stretches[stretches[k].beside ? k : before];
+      places.push_back(
+          {step * static_cast<double>(stretches[k].begin), step * static_cast<double>(goes.end - goes.begin)});
+    }
+    return divided_at(whole, places);
   }
 
   // Divides a curve where it comes beside itself and leaves itself. One that is beside itself all along winds, like a
   // thread, and is halved.
   std::vector<Candidate> apart_from_itself(const Candidate& whole, bool& winds) {
     const std::vector<Sample> samples = samples_of(whole, vertices_, width_);
-    if (whole.length < 2 * kLoopWidths * width_) return {whole};
+    if (whole.length < 2 * kStretch * width_) return {whole};
     const bool loop = whole.curve.closed || whole.curve.vertices.front() == whole.curve.vertices.back();
     std::vector<Vec3> points;
     for (const Sample& sample : samples) points.push_back(sample.point);
@@ -500,7 +518,7 @@ class Selection {
     }
     const std::vector<Stretch> stretches = stretches_of(beside);
     winds = stretches.size() == 1 && stretches[0].beside;
-    if (winds) return divided_at(whole, {0, 0.5 * whole.length}, whole.length);
+    if (winds) return divided_at(whole, {{0, whole.length}, {0.5 * whole.length, whole.length}});
     return divided_between(whole, stretches);
   }
 

@@ -94,8 +94,8 @@ std::vector<Index> split_fans_with_warning(TriangleMesh& mesh, const Context& co
   const MeshTopology topology = analyse_topology(mesh.triangles, mesh.vertices.size());
   const std::size_t points = topology.non_manifold_vertices;
   if (points > 0 && topology.non_manifold_edges == 0) {
-    context.warn(fmt::format("parts of the surface touch in {}; they are meshed as if they did not",
-                             plural(points, "point")));
+    context.warn(
+        fmt::format("parts of the surface touch in {}; they are meshed as if they did not", plural(points, "point")));
     std::vector<Index> original = split_fans(mesh);
     part_fans(mesh, original);
     return original;

@@ -22,8 +22,8 @@
 namespace bisector {
 namespace {
 
-// Where the parts that win a region are apart from their seeds, there is another round: few triangles are left then. What
-// is left when each triangle has been divided so many times on average stays.
+// Where the parts that win a region are apart from their seeds, there is another round: few triangles are left then.
+// What is left when each triangle has been divided so many times on average stays.
 constexpr std::size_t kDivisions = 16;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
@@ -79,14 +79,13 @@ class Among : public SlotFilter {
   bool admits(Index slot) const override {
     if (contains(left_out, slot)) return false;
     return std::binary_search(own.begin(), own.end(), slot) ||
-           std::any_of(around.begin(), around.end(), [&](const auto& slots) {
-             return std::binary_search(slots->begin(), slots->end(), slot);
-           });
+           std::any_of(around.begin(), around.end(),
+                       [&](const auto& slots) { return std::binary_search(slots->begin(), slots->end(), slot); });
   }
 
-  std::vector<Index> left_out;                                       // that had stray pieces here
-  std::vector<Index> own;                                            // with cells here that are no stray pieces, ascending
-  std::vector<std::shared_ptr<const std::vector<Index>>> around;     // the regions of such pieces, ascending
+  std::vector<Index> left_out;                                    // that had stray pieces here
+  std::vector<Index> own;                                         // with cells here that are no stray pieces, ascending
+  std::vector<std::shared_ptr<const std::vector<Index>>> around;  // the regions of such pieces, ascending
 };
 
 }  // namespace
@@ -479,8 +478,8 @@ RestrictedPolygons Localiser::Work::clip(Index triangle, Clipper& clipper) const
     std::sort(candidates.begin(), candidates.end(), [&](Index a, Index b) {
       return std::pair(norm2(seeds.x[a] - q), seeds.id[a]) < std::pair(norm2(seeds.x[b] - q), seeds.id[b]);
     });
-    const auto nearest = std::find_if(candidates.begin(), candidates.end(),
-                                      [&](Index slot) { return clipper.clip(neighbours, slot); });
+    const auto nearest =
+        std::find_if(candidates.begin(), candidates.end(), [&](Index slot) { return clipper.clip(neighbours, slot); });
     if (nearest != candidates.end()) meet(*nearest);
   }
   RestrictedPolygons found;

@@ -373,5 +373,45 @@ TEST(SimplifiedFeatures, OfAWindingCreaseAreLinesApart) {
   EXPECT_GT(after, 0.1 * before);
 }
 
+// Of two creases that leave a corner at an acute angle the lighter begins where there is room between them.
+TEST(SimplifiedFeatures, OfAnAcuteWedgeBeginWhereItIsWide) {
+  constexpr Index kCount = 40;
+  const double step = 0.05, width = 0.1;
+  for (const double angle : {0.25, 0.4, 0.8}) {
+    std::vector<Vec3> points{{0, 0, 0}};
+    FeatureGraph graph;
+    graph.curves.assign(2, {{0}, false, FeatureKind::crease});
+    std::vector<Triangle> triangles;
+    for (Index k = 1; k <= kCount; ++k) {
+      const Index low = 2 * k - 1, high = 2 * k;
+      points.push_back({step * k, 0, 0});
+      points.push_back({step * k * std::cos(angle), step * k * std::sin(angle), 0});
+      graph.curves[0].vertices.push_back(low);
+      graph.curves[1].vertices.push_back(high);
+      if (k == 1) {
+        triangles.push_back({0, low, high});
+      } else {
+        triangles.push_back({low - 2, low, high});
+        triangles.push_back({low - 2, high, high - 2});
+      }
+    }
+    graph.corners = {0, 2 * kCount - 1, 2 * kCount};
+    graph.edges = edges_of(graph.curves);
+    const SimplifiedFeatures left =
+        simplify_features(graph, points, {2, 1}, width, {}, vertex_neighbours(triangles, points.size()));
+    const auto stays = [&](Index a, Index b) {
+      return std::binary_search(left.graph.edges.begin(), left.graph.edges.end(), std::array<Index, 2>{a, b});
+    };
+    for (Index k = 2; k <= kCount; ++k) {
+      EXPECT_TRUE(stays(2 * k - 3, 2 * k - 1)) << k;
+      const double gap = step * k * std::sin(angle);
+      if (angle > 0.5 || gap > 1.5 * width || gap < 0.7 * width) {
+        EXPECT_EQ(stays(2 * k - 2, 2 * k), angle > 0.5 || gap > width) << angle << " " << k;
+      }
+    }
+    EXPECT_EQ(count_loose_ends(left, {2 * kCount - 1, 2 * kCount}), 0);
+  }
+}
+
 }  // namespace
 }  // namespace bisector::test
