@@ -409,7 +409,7 @@ TEST(SimplifiedFeatures, OfAnAcuteWedgeBeginWhereItIsWide) {
         EXPECT_EQ(stays(2 * k - 2, 2 * k), angle > 0.5 || gap > width) << angle << " " << k;
       }
     }
-    EXPECT_EQ(count_loose_ends(left, {2 * kCount - 1, 2 * kCount}), 0);
+    EXPECT_EQ(count_loose_ends(left, {0, 2 * kCount - 1, 2 * kCount}), 0);
   }
 }
 
