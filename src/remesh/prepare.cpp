@@ -181,10 +181,14 @@ void Preparation::plan(const RemeshOptions& options) {
   bound({std::move(plan.points), std::move(plan.lengths)});
 }
 
+void SizeBounds::add(const SizeBounds& others) {
+  points.insert(points.end(), others.points.begin(), others.points.end());
+  lengths.insert(lengths.end(), others.lengths.begin(), others.lengths.end());
+}
+
 void Preparation::bound(const SizeBounds& bounds) {
   if (!bounds.points.empty()) unbounded_.reset();
-  bounds_.points.insert(bounds_.points.end(), bounds.points.begin(), bounds.points.end());
-  bounds_.lengths.insert(bounds_.lengths.end(), bounds.lengths.begin(), bounds.lengths.end());
+  bounds_.add(bounds);
 }
 
 PreparedInput Preparation::lay_down() {

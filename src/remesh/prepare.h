@@ -23,6 +23,8 @@ struct PreparedInput {
 struct SizeBounds {
   std::vector<Vec3> points;
   std::vector<double> lengths;
+
+  void add(const SizeBounds& others);
 };
 
 // The input with its borders joined: within `tolerance`, or, without one, at the same point, if that leaves fewer
@@ -40,6 +42,8 @@ class Preparation {
   // The domain with its density as it stands.
   PreparedInput lay_down();
   const WeldResult& welded() const { return welded_; }
+  // The input, welded and oriented.
+  const TriangleMesh& mesh() const { return mesh_; }
 
  private:
   void find_noise(FeatureOptions& features);

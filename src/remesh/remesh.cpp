@@ -458,11 +458,13 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   Preparation preparation(input, options, context);
   Compute compute(options.compute, context);
   double preparing = watch.seconds();
-  // Once for cells that are no disks, and once for slivers, the run starts again with shorter edges there.
+  // Once for cells that are no disks, and once for slivers and triangles that cross, the run starts again with shorter
+  // edges there.
   bool may_shorten = options.seeds.empty() && options.detail != DetailMode::off, may_refine = may_shorten;
   Spent before;
   RunProgress progress(context);
-  std::optional<RemeshResult> best;
+  std::optional<JudgedResult> best;
+  std::optional<bool> input_crosses;
   for (;;) {
     const Stopwatch laying_down;
     PreparedInput prepared = preparation.lay_down();
@@ -489,20 +491,33 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
     before = {pipeline.spent().totals, result.seconds};
-    const Slivers slivers = find_slivers(result.mesh);
-    if (!best || is_better(result, *best)) best = std::move(result);
-    if (std::exchange(may_refine, false) && plan.constrained && plan.min_angle > 0 && slivers.worth_another_run) {
+    Slivers slivers = find_slivers(result.mesh);
+    JudgedResult judged{std::move(result)};
+    const bool last = !std::exchange(may_refine, false) || !plan.constrained || plan.min_angle == 0;
+    if (!last || best) {
+      // Where the input crosses itself, smaller triangles do so in more pairs.
+      const Crossings crossings = find_crossings(judged.result.mesh);
+      if (crossings.pairs > 0 && !input_crosses) input_crosses = count_self_intersections(preparation.mesh()) > 0;
+      if (crossings.pairs > 0 && !*input_crosses) {
+        judged.crossings = crossings.pairs;
+        slivers.bounds.add(crossings.bounds);
+      }
+    }
+    const bool crosses = judged.crossings > 0;
+    if (!best || is_better(judged, *best)) best = std::move(judged);
+    if (!last && (slivers.worth_another_run || crosses)) {
       preparation.bound(slivers.bounds);
-      progress.start_again("shorter edges for angles");
+      progress.start_again(slivers.worth_another_run ? "shorter edges for angles" : "shorter edges where it crosses");
       continue;
     }
-    best->iterations = before.totals.iterations;
-    best->evaluations = before.totals.evaluations;
-    best->seconds = before.seconds;
-    best->seconds.prepare = preparing;
-    best->seconds.total = watch.seconds();
-    best->welded = preparation.welded();
-    return *std::move(best);
+    RemeshResult& chosen = best->result;
+    chosen.iterations = before.totals.iterations;
+    chosen.evaluations = before.totals.evaluations;
+    chosen.seconds = before.seconds;
+    chosen.seconds.prepare = preparing;
+    chosen.seconds.total = watch.seconds();
+    chosen.welded = preparation.welded();
+    return std::move(chosen);
   }
 }
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
+#include <vector>
 
+#include "bisector/quality.h"
 #include "core/geometry.h"
 #include "mesh/topology.h"
 #include "remesh/improve_patch.h"
@@ -53,11 +55,33 @@ Slivers find_slivers(const TriangleMesh& mesh) {
   return found;
 }
 
-bool is_better(const RemeshResult& result, const RemeshResult& than) {
-  const auto rank = [](const RemeshResult& r) {
-    return std::tuple(!r.topology_matches, r.features.broken, find_slivers(r.mesh).bounds.points.size());
+Crossings find_crossings(const TriangleMesh& mesh) {
+  Crossings found;
+  std::vector<Index> crossing;
+  for (const auto& pair : find_self_intersections(mesh)) {
+    crossing.insert(crossing.end(), pair.begin(), pair.end());
+    ++found.pairs;
+  }
+  std::sort(crossing.begin(), crossing.end());
+  crossing.erase(std::unique(crossing.begin(), crossing.end()), crossing.end());
+  for (const Index t : crossing) {
+    const Triangle& v = mesh.triangles[t];
+    double perimeter = 0;
+    for (std::size_t k = 0; k < 3; ++k) perimeter += norm(mesh.vertices[v[(k + 1) % 3]] - mesh.vertices[v[k]]);
+    for (const Index corner : v) {
+      found.bounds.points.push_back(mesh.vertices[corner]);
+      found.bounds.lengths.push_back(kLeast * perimeter / 3);
+    }
+  }
+  return found;
+}
+
+bool is_better(const JudgedResult& judged, const JudgedResult& than) {
+  const auto rank = [](const JudgedResult& j) {
+    const RemeshResult& r = j.result;
+    return std::tuple(!r.topology_matches, r.features.broken, j.crossings, find_slivers(r.mesh).bounds.points.size());
   };
-  return rank(result) < rank(than);
+  return rank(judged) < rank(than);
 }
 
 }  // namespace bisector

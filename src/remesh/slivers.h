@@ -1,4 +1,4 @@
-// Triangles that the edge lengths around them left no room to be good.
+// Triangles that the edge lengths around them left no room to be good, or to keep apart.
 #pragma once
 
 #include "bisector/remesh.h"
@@ -15,8 +15,19 @@ struct Slivers {
 // Of a result with its feature edges. An angle that two feature edges enclose does not count: what is acute stays so.
 Slivers find_slivers(const TriangleMesh& mesh);
 
+// Where a result crosses itself: edges of half the length at the triangles that do.
+struct Crossings {
+  SizeBounds bounds;
+  std::size_t pairs = 0;
+};
+Crossings find_crossings(const TriangleMesh& mesh);
+
 // Whether a run is to be preferred to another on the same input: for its topology, then for the curves it keeps, then
-// for fewer slivers.
-bool is_better(const RemeshResult& result, const RemeshResult& than);
+// for fewer pairs of triangles that cross though the input's do not, then for fewer slivers.
+struct JudgedResult {
+  RemeshResult result;
+  std::size_t crossings = 0;  // 0 as well if the input crosses itself
+};
+bool is_better(const JudgedResult& judged, const JudgedResult& than);
 
 }  // namespace bisector

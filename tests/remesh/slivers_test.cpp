@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "support/models.h"
@@ -55,18 +56,42 @@ TEST(Slivers, AskForEdgesAsShortAsTheirHeight) {
   }
 }
 
-TEST(Slivers, DecideAfterTopologyAndCurves) {
-  RemeshResult good;
-  good.mesh = acute(60);
-  good.topology_matches = true;
-  RemeshResult poor = good, broken = good, torn = good;
-  poor.mesh = acute(20);
-  broken.features.broken = 1;
-  torn.topology_matches = false;
+TEST(Slivers, DecideAfterTopologyCurvesAndCrossings) {
+  JudgedResult good;
+  good.result.mesh = acute(60);
+  good.result.topology_matches = true;
+  JudgedResult poor = good, crossing = good, broken = good, torn = good;
+  poor.result.mesh = acute(20);
+  crossing.crossings = 1;
+  broken.result.features.broken = 1;
+  torn.result.topology_matches = false;
   EXPECT_TRUE(is_better(good, poor));
-  EXPECT_TRUE(is_better(poor, broken));
+  EXPECT_TRUE(is_better(poor, crossing));
+  EXPECT_TRUE(is_better(crossing, broken));
   EXPECT_TRUE(is_better(broken, torn));
   EXPECT_FALSE(is_better(good, good));
+}
+
+// Each triangle that crosses another asks for edges of half its own at its corners, once.
+TEST(Crossings, AskForShorterEdgesAtTheirTriangles) {
+  TriangleMesh mesh = icosphere(3);
+  EXPECT_EQ(find_crossings(mesh).pairs, 0u);
+  const auto first = static_cast<Index>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), {{0.9, 0.1, 0.05}, {1.2, 0.1, 0.05}, {1.05, 0.1, 0.35}});
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  const Crossings crossings = find_crossings(mesh);
+  EXPECT_GT(crossings.pairs, 1u);
+  EXPECT_EQ(crossings.bounds.points.size(), 3 * (crossings.pairs + 1));
+  for (std::size_t k = 0; k < crossings.bounds.points.size(); ++k) {
+    const double length = crossings.bounds.lengths[k];
+    const bool added = std::find(mesh.vertices.begin() + first, mesh.vertices.end(), crossings.bounds.points[k]) !=
+                       mesh.vertices.end();
+    if (added) {
+      EXPECT_NEAR(length, 0.5 * (0.3 + 2 * std::hypot(0.15, 0.3)) / 3, 1e-12);
+    } else {
+      EXPECT_LT(length, 0.15);
+    }
+  }
 }
 
 }  // namespace
