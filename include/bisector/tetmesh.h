@@ -40,6 +40,9 @@ struct TetOptions {
 
   TetSizingOptions sizing;
   FeatureOptions features;
+  // Details of the boundary that are finer than the edges (remesh.h) get edges as short as the number of vertices can
+  // pay for, the plain ones becoming at most half as long again; finer ones are merged or let go. Not with seeds.
+  bool detail = true;
   std::uint64_t random_seed = 1;
   int iterations = 100;      // of which each phase may make a share (design.md)
   double tolerance = 1e-6;   // a phase ends when the energy falls by less than this share per step
@@ -77,6 +80,7 @@ struct TetResult {
   TetMesh mesh;
   std::size_t boundary_vertices = 0;
   RemeshResult boundary;           // without its mesh
+  DetailResult detail;             // vertices: of the boundary
   bool delaunay = false;           // the tetrahedra were Delaunay before slivers were removed
   std::size_t steiner_points = 0;  // vertices that TetGen had to add, where they were not
   std::size_t refused_sites = 0;   // sites inside that could not become vertices then

@@ -229,11 +229,7 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["topology"]["divided"] = result.divided;
   report["topology"]["faults"] = faults_json(result);
   report["features"] = features_json(result.features, result.mesh.feature_edges.size());
-  report["detail"] = {{"width", result.detail.width},
-                      {"resolved", result.features.curves},
-                      {"merged", result.detail.merged},
-                      {"let_go", result.detail.let_go},
-                      {"vertices", result.detail.vertices}};
+  report["detail"] = detail_json(result.detail, result.features.curves);
   report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length}};
   report["noisy"] = result.noisy;
   report["weld"] = weld_json(result.welded);
@@ -278,11 +274,7 @@ void print_summary(Console& console, const RemeshCommand& command, const RemeshR
     console.print(fmt::format("features   {} of {} kept, {}", result.features.curves - result.features.broken,
                               counted(result.features.curves, "curve", "curves"),
                               counted(result.features.corners, "corner", "corners")));
-  if (const DetailResult& detail = result.detail; detail.merged + detail.let_go > 0)
-    console.print(fmt::format(
-        "detail     finer than {:.4g}: {} merged, {} let go{}", detail.width, counted(detail.merged, "curve", "curves"),
-        detail.let_go,
-        detail.vertices > 0 ? fmt::format("; {} vertices would show all", detail.vertices) : std::string()));
+  print_detail(console, result.detail);
   if (result.noisy)
     console.print("noise      seeds were left off the surface, whose normals are noise at this edge length");
   console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));

@@ -158,6 +158,14 @@ void add_distance(Json& quality, const DistanceReport& distance) {
   quality["distance_rms_from_reference"] = distance.rms_from_reference;
 }
 
+Json detail_json(const DetailResult& detail, std::size_t curves) {
+  return {{"width", detail.width},
+          {"resolved", curves},
+          {"merged", detail.merged},
+          {"let_go", detail.let_go},
+          {"vertices", detail.vertices}};
+}
+
 Json features_json(const FeatureResult& features, std::size_t edges) {
   const FeatureDistance& d = features.distance;
   return {{"curves", features.curves},

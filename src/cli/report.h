@@ -33,6 +33,7 @@ void add_tets(Json& quality, const TetQualityReport& tets);
 void add_tets(Json& topology, const TetTopology& tets);
 void add_distance(Json& quality, const DistanceReport& distance);
 Json features_json(const FeatureResult& features, std::size_t edges);
+Json detail_json(const DetailResult& detail, std::size_t curves);
 // A point, or null if a coordinate is not finite.
 Json point_json(const Vec3& p);
 

@@ -37,4 +37,12 @@ void print_device(Console& console, const BackendDescription& device) {
   else if (!device.fallback.empty()) console.print(fmt::format("device     {}; {}", device.name, device.fallback));
 }
 
+void print_detail(Console& console, const DetailResult& detail) {
+  if (detail.merged + detail.let_go == 0) return;
+  console.print(
+      fmt::format("detail     finer than {:.4g}: {} merged, {} let go{}", detail.width,
+                  counted(detail.merged, "curve", "curves"), detail.let_go,
+                  detail.vertices > 0 ? fmt::format("; {} vertices would show all", detail.vertices) : std::string()));
+}
+
 }  // namespace bisector::cli

@@ -18,4 +18,7 @@ void print_seconds(Console& console, const Json& seconds, const Json& device_sec
 // What computed, where that was not the CPU all along.
 void print_device(Console& console, const BackendDescription& device);
 
+// A line if any detail was merged or let go.
+void print_detail(Console& console, const DetailResult& detail);
+
 }  // namespace bisector::cli

@@ -26,6 +26,7 @@
 #include "remesh/topology_control.h"
 #include "report.h"
 #include "summary.h"
+#include "words.h"
 
 namespace bisector::cli {
 namespace {
@@ -83,6 +84,11 @@ void add_options(CLI::App* app, TetCommand& command) {
                "sharp edges to keep: auto (default), none, or all with a\n"
                "dihedral deviation of so many degrees. Edges between face\n"
                "labels are kept unless none");
+  add_words(app, "--detail", command.options.detail, kTetDetailWords,
+            "what is finer than the boundary's edges: auto (smaller\n"
+            "edges where the vertices suffice, else merged; default) or\n"
+            "off")
+      ->group("Features");
   add_feature_file(app, command.feature_file);
   add_weld(app, command.weld);
   add_wrap(app, command.wrap);
@@ -239,6 +245,7 @@ Json tet_report(Console& console, const TetCommand& command, const TetResult& re
   report["topology"]["matches_input"] = same_topology(measures.topology.boundary, result.input_topology);
   report["topology"]["ball_property"] = result.boundary.ball_property;
   report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
+  report["detail"] = detail_json(result.detail, result.boundary.features.curves);
   report["sizing"] = {
       {"wanted", result.wanted}, {"edge_length", result.edge_length}, {"boundary_vertices", result.boundary_vertices}};
   report["conform"] = {{"delaunay", result.delaunay},
@@ -284,6 +291,7 @@ void print_summary(Console& console, const TetCommand& command, const TetResult&
     console.print(fmt::format("features   {} of {} kept, {}", features.curves - features.broken,
                               counted(features.curves, "curve", "curves"),
                               counted(features.corners, "corner", "corners")));
+  print_detail(console, result.detail);
   print_device(console, result.device);
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose)

@@ -31,9 +31,9 @@ struct StandIns::Domain {
 };
 
 StandIns::StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& boundary, const FeatureGraph& features,
-                   const TetOptions& options, Compute& compute, const Context& context)
-    : mesh_(mesh), surface_(surface), boundary_(boundary), features_(features), options_(options), compute_(compute),
-      context_(context) {}
+                   const TetOptions& options, const SizeField* bound, Compute& compute, const Context& context)
+    : mesh_(mesh), surface_(surface), boundary_(boundary), features_(features), options_(options), bound_(bound),
+      compute_(compute), context_(context) {}
 
 StandIns::~StandIns() = default;
 
@@ -56,7 +56,7 @@ SolidBackend* StandIns::choose(std::size_t count, std::size_t final_count, const
 std::unique_ptr<StandIns::Domain> StandIns::make_sized(std::size_t count) const {
   SizingTarget target;
   target.vertices = count;
-  SizedSolid sized = refine_for_sizes(mesh_, surface_, options_.sizing, target);
+  SizedSolid sized = refine_for_sizes(mesh_, surface_, options_.sizing, target, bound_);
   std::vector<double> density = sized.volume_density();
   return std::make_unique<Domain>(std::move(sized.mesh), std::move(density), compute_);
 }

@@ -9,6 +9,7 @@
 #include "backend/backend.h"
 #include "bisector/tetmesh.h"
 #include "compute/compute.h"
+#include "features/size_field.h"
 
 namespace bisector {
 
@@ -17,7 +18,7 @@ class StandIns {
   // `mesh` and `surface` are the solid's as given, `boundary` and `features` those of the solid as refined for its
   // sizes. Everything must outlive the object.
   StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& boundary, const FeatureGraph& features,
-           const TetOptions& options, Compute& compute, const Context& context);
+           const TetOptions& options, const SizeField* bound, Compute& compute, const Context& context);
   ~StandIns();
 
   // The stand-in for `whole` with `count` of `final_count` sites; null if the solid itself will do. It lasts until the
@@ -35,6 +36,7 @@ class StandIns {
   Backend& boundary_;
   const FeatureGraph& features_;
   const TetOptions& options_;
+  const SizeField* bound_;
   Compute& compute_;
   const Context& context_;
   std::unique_ptr<Domain> domain_;

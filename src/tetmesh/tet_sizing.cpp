@@ -34,6 +34,7 @@ constexpr std::size_t kMostTets = 2'000'000;  // unless the input has more
 constexpr int kRounds = 6;                    // of refinement and calibration
 constexpr int kTrials = 40;                   // factors tried by a calibration
 constexpr double kCalibrated = 1e-3;          // relative error of the edge length, at which a calibration ends
+constexpr double kMostFactor = 2;             // of lengths beside a bound, in lengths without
 constexpr double kNarrowest = 1e-9;           // relative width of the interval of factors, at which it gives up
 constexpr double kOutside = -1e-6;  // least barycentric coordinate of a point that counts as within the background mesh
 constexpr double kLeastDensity = 1e-100, kMostDensity = 1e100;  // of an attribute
@@ -170,9 +171,11 @@ SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const 
 }
 
 // The field of edge lengths that grows from the samples, their lengths multiplied by a factor and kept within bounds.
+// If there are no samples it is `uniform` times the factor everywhere.
 class ScaledField {
  public:
-  ScaledField(const SizeSamples& samples, const SizingOptions& bounds) : samples_(samples), bounds_(bounds) {
+  ScaledField(const SizeSamples& samples, const SizingOptions& bounds, double uniform, const SizeField* bound)
+      : samples_(samples), bounds_(bounds), uniform_(uniform), bound_(bound) {
     if (samples.tets.empty()) return;
     background_.vertices = samples.points;
     background_.tets = samples.tets;
@@ -183,16 +186,21 @@ class ScaledField {
   void scale(double factor) {
     lengths_ = samples_.lengths;
     for (double& h : lengths_) h = bounded(h * factor);
-    field_.emplace(samples_.points, lengths_, bounds_.gradation);
+    plain_ = uniform_ * factor;
+    if (!lengths_.empty()) field_.emplace(samples_.points, lengths_, bounds_.gradation);
   }
-  double at(const Vec3& x) const { return bounded(std::min((*field_)(x), linear(x, locate(x)))); }
+  double at(const Vec3& x) const {
+    const double grown = field_ ? (*field_)(x) : plain_, bound = bound_ ? (*bound_)(x) : grown;
+    return bounded(std::min({grown, bound, linear(x, locate(x))}));
+  }
   std::vector<double> at(const std::vector<Vec3>& points) {
-    std::vector<double> h = field_->at(points, near_);
+    std::vector<double> h = field_ ? field_->at(points, near_) : std::vector<double>(points.size(), plain_);
+    const std::vector<double> bounds = bound_ ? bound_->at(points, near_bound_) : h;
     const std::size_t known = tet_of_.size();
     tet_of_.resize(points.size(), kNone);
     parallel_each(points.size(), [&](std::size_t k) {
       if (k >= known) tet_of_[k] = locate(points[k]);
-      h[k] = bounded(std::min(h[k], linear(points[k], tet_of_[k])));
+      h[k] = bounded(std::min({h[k], bounds[k], linear(points[k], tet_of_[k])}));
     });
     return h;
   }
@@ -217,18 +225,21 @@ class ScaledField {
 
   const SizeSamples& samples_;
   const SizingOptions& bounds_;
+  double uniform_, plain_ = 0;
+  const SizeField* bound_;
   std::optional<SizeField> field_;
   std::vector<double> lengths_;
   TetMesh background_;
   std::optional<TetLocator> locator_;
   // Of the points that at() was given last: the sample found near each and its tetrahedron of the background mesh. The
   // next call's points begin with the same ones.
-  std::vector<Index> near_, tet_of_;
+  std::vector<Index> near_, near_bound_, tet_of_;
 };
 
-// Finds the factor with which the estimate meets the target, beginning with the one given. Returns h at the vertices.
+// Finds the factor with which the estimate meets the target, beginning with the one given and up to `most`. Returns h
+// at the vertices.
 std::vector<double> calibrate(const Extent& extent, const TetMesh& mesh, const TriangleMesh& boundary,
-                              const SizingTarget& target, ScaledField& field, double& factor) {
+                              const SizingTarget& target, ScaledField& field, double most, double& factor) {
   double low = 0, high = 0;
   std::vector<double> h;
   for (int k = 0; k < kTrials; ++k) {
@@ -238,8 +249,9 @@ std::vector<double> calibrate(const Extent& extent, const TetMesh& mesh, const T
     const double off = target.vertices ? std::log(static_cast<double>(target.vertices) / e.vertices) / 3
                                        : std::log(e.mean_edge / target.edge_length);
     if (std::abs(off) < kCalibrated || (low > 0 && high > 0 && std::log(high / low) < kNarrowest)) break;
+    if (off < 0 && factor >= most) break;
     (off < 0 ? low : high) = factor;
-    const double next = factor * std::exp(-off);
+    const double next = std::min(factor * std::exp(-off), most);
     factor = low > 0 && high > 0 && !(next > low && next < high) ? std::sqrt(low * high) : next;
   }
   return h;
@@ -444,22 +456,29 @@ double estimate_tet_vertices(double volume, double area, double h) {
 }
 
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
-                            const SizingTarget& target) {
+                            const SizingTarget& target, const SizeField* bound) {
   check(mesh, options, target);
   SizedSolid sized;
   sized.mesh = mesh;
   set_uniform(Extent(mesh, boundary), target, sized);
-  if (options.field.kind == DensityKind::uniform && options.sizes.points.empty()) return sized;
+  const bool uniform = options.field.kind == DensityKind::uniform && options.sizes.points.empty();
+  if (uniform && !bound) return sized;
 
-  const SizeSamples samples = samples_of(mesh, boundary, options, sized.edge_length);
-  ScaledField field(samples, options.field);
+  const SizeSamples samples = uniform ? SizeSamples{} : samples_of(mesh, boundary, options, sized.edge_length);
+  double factor = 1, most = std::numeric_limits<double>::infinity();
   TriangleMesh surface = boundary;
-  double factor = 1;
+  if (bound && !uniform) {
+    // The factor that would do without the bound.
+    ScaledField unbounded(samples, options.field, sized.edge_length, nullptr);
+    calibrate(Extent(mesh, boundary), mesh, boundary, target, unbounded, most, factor);
+  }
+  if (bound) most = kMostFactor * factor;
+  ScaledField field(samples, options.field, sized.edge_length, bound);
   const std::size_t limit = std::max(kMostTets, mesh.tets.size());
   for (int round = 0;; ++round) {
     surface.vertices = sized.mesh.vertices;
     const Extent extent(sized.mesh, surface);
-    sized.lengths = calibrate(extent, sized.mesh, surface, target, field, factor);
+    sized.lengths = calibrate(extent, sized.mesh, surface, target, field, most, factor);
     const TetEstimate e = estimate(extent, sized.mesh, surface, sized.lengths);
     sized.edge_length = e.mean_edge;
     if (target.vertices == 0) sized.vertices = static_cast<std::size_t>(std::llround(e.vertices));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -10,10 +11,13 @@
 
 #include "bisector/error.h"
 #include "compute/compute.h"
+#include "core/degenerate.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "features/size_field.h"
 #include "mesh/tet_topology.h"
 #include "mesh/topology.h"
+#include "remesh/detail.h"
 #include "remesh/prepare.h"
 #include "tetmesh/boundary_phase.h"
 #include "tetmesh/check_surface.h"
@@ -200,18 +204,47 @@ void check_attribute(const TetOptions& options, std::size_t vertices) {
                             vertices));
 }
 
+// What becomes of the boundary's features and edge lengths where they are finer than the edges.
+struct BoundaryDetail {
+  FeatureGraph features;
+  std::optional<SizeField> bound;
+  DetailResult result;
+};
+
+BoundaryDetail plan_boundary(const TetMesh& mesh, const TriangleMesh& surface, const TetOptions& options,
+                             const SizingTarget& target) {
+  BoundaryDetail detail;
+  detail.features = detect_features(surface, options.features);
+  if (!options.detail || !options.seeds.empty()) return detail;
+  const SizedSolid plain = refine_for_sizes(mesh, surface, options.sizing, target);
+  std::vector<double> lengths(surface.vertices.size(), plain.edge_length);
+  std::copy_n(plain.lengths.begin(), std::min(plain.lengths.size(), lengths.size()), lengths.begin());
+  double vertices = 0;
+  for (const Triangle& t : surface.triangles) {
+    const double h = (lengths[t[0]] + lengths[t[1]] + lengths[t[2]]) / 3;
+    vertices += 2 / std::sqrt(3.0) *
+                triangle_area(surface.vertices[t[0]], surface.vertices[t[1]], surface.vertices[t[2]]) / (h * h);
+  }
+  DetailPlan plan = plan_details(surface, detail.features, lengths, static_cast<std::size_t>(vertices), false);
+  detail.features = std::move(plan.features);
+  detail.result = plan.result;
+  if (!plan.points.empty()) detail.bound.emplace(plan.points, plan.lengths, options.sizing.field.gradation);
+  return detail;
+}
+
 TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& context) {
   const Stopwatch watch;
   TriangleMesh surface = boundary_of(mesh);
   keep_boundary_edges(surface);
-  const FeatureGraph graph = detect_features(surface, options.features);
   const SizingTarget target = options.seeds.empty() ? SizingTarget{options.vertices, options.edge_length}
                                                     : SizingTarget{options.seeds.size(), 0};
-  SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
+  const BoundaryDetail detail = plan_boundary(mesh, surface, options, target);
+  const SizeField* bound = detail.bound ? &*detail.bound : nullptr;
+  SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target, bound);
   if (sized.vertices < kFewest)
     throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones",
                             options.edge_length, sized.vertices, kFewest));
-  const FeatureGraph features = split_features(graph, sized.splits);
+  const FeatureGraph features = split_features(detail.features, sized.splits);
   const Solid solid(sized.mesh, sized.volume_density());
   TriangleMesh outside = boundary_of(sized.mesh);
   const Surface boundary(std::move(outside), sized.surface_density());
@@ -219,13 +252,14 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   Compute compute(options.compute, context);
   const std::unique_ptr<SolidBackend> backend = compute.backend(solid);
   const std::unique_ptr<Backend> boundary_backend = compute.backend(boundary);
-  StandIns stand_ins(mesh, surface, *boundary_backend, features, options, compute, context);
+  StandIns stand_ins(mesh, surface, *boundary_backend, features, options, bound, compute, context);
   const FeatureCurves curves(features, solid.mesh.vertices);
   const std::size_t wanted = options.seeds.empty() ? sized.vertices : options.seeds.size();
   TetRun run{CvtRun(*backend, curves, context), *backend, *boundary_backend, features, sized, options, wanted};
   TetResult result = mesh_sized(run, stand_ins);
   set_regions(sized.mesh, result.mesh);
   result.background_tets = sized.mesh.tets.size();
+  result.detail = detail.result;
   result.seconds.prepare = preparing;
   result.seconds.total = watch.seconds();
   return result;

@@ -51,6 +51,45 @@ TEST(TetSizing, UniformSizeMeetsTheCountAndBisectsNothing) {
   EXPECT_NEAR(estimate_tet_vertices(1, 6, sized.edge_length), 5000, 1);
 }
 
+// Edges near the bound's point are short, the others one length, and the count is met.
+TEST(TetSizing, ABoundShortensEdgesNearIt) {
+  const TetMesh box = tet_box(2);
+  SizingTarget target;
+  target.vertices = 5000;
+  const SizedSolid plain = refine_for_sizes(box, surface_of(box), {}, target);
+  for (const double shorter : {0.2, 0.5}) {
+    const SizeField bound({{0, 0, 0}}, {shorter * plain.edge_length}, 0.2);
+    const SizedSolid sized = refine_for_sizes(box, surface_of(box), {}, target, &bound);
+    ASSERT_EQ(sized.lengths.size(), sized.mesh.vertices.size());
+    const double longest = *std::max_element(sized.lengths.begin(), sized.lengths.end());
+    EXPECT_GT(longest, plain.edge_length);
+    EXPECT_LT(longest, 2 * plain.edge_length);
+    for (std::size_t v = 0; v < sized.lengths.size(); ++v)
+      EXPECT_DOUBLE_EQ(sized.lengths[v], std::min(bound(sized.mesh.vertices[v]), longest));
+    double count = 0;
+    for (const Tetrahedron& t : sized.mesh.tets) {
+      double per_volume = 0;
+      for (const Index v : t) per_volume += 0.25 * std::pow(sized.lengths[v], -3);
+      const Vec3& p = sized.mesh.vertices[t[0]];
+      count += estimate_tet_vertices(dot(sized.mesh.vertices[t[1]] - p,
+                                         cross(sized.mesh.vertices[t[2]] - p, sized.mesh.vertices[t[3]] - p)) /
+                                         6,
+                                     0, 1) *
+               per_volume;
+    }
+    const TriangleMesh surface = surface_of(sized.mesh);
+    for (const Triangle& t : surface.triangles) {
+      double per_area = 0;
+      for (const Index v : t) per_area += std::pow(sized.lengths[v], -2) / 3;
+      const Vec3& p = sized.mesh.vertices[t[0]];
+      count +=
+          estimate_tet_vertices(0, 0.5 * norm(cross(sized.mesh.vertices[t[1]] - p, sized.mesh.vertices[t[2]] - p)), 1) *
+          per_area;
+    }
+    EXPECT_NEAR(count, 5000, 25);
+  }
+}
+
 TEST(TetSizing, RefinedSolidIsTheSameSolid) {
   TetMesh box = tet_box(2);
   for (std::size_t t = 0; t < box.tets.size(); ++t) box.regions.push_back(static_cast<int>(t % 3));

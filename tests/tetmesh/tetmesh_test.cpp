@@ -20,6 +20,7 @@
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 #include "support/diagram.h"
+#include "support/featured.h"
 #include "support/models.h"
 #include "support/solids.h"
 
@@ -154,6 +155,27 @@ TEST(TetrahedraliseThinSolids, HaveTheCountAndWhatRoomThereIsInside) {
 
 bool same_bits_and_tets(const TetMesh& a, const TetMesh& b) {
   return a.tets == b.tets && a.boundary == b.boundary && same_bits(a.vertices, b.vertices);
+}
+
+// Blocks whose edges have chamfers much narrower than the mesh's edges, of which one curve each is left, or about as
+// wide, which get shorter edges.
+TEST(TetrahedraliseDetails, AreMergedOrGetShorterEdges) {
+  for (const double chamfer : {0.004, 0.06}) {
+    const TriangleMesh block = prism({{0, 0}, {1, 0}, {1, 1 - chamfer}, {1 - chamfer, 1}, {0, 1}});
+    TetOptions options;
+    options.vertices = 600;
+    const TetResult with = tetrahedralise(block, options);
+    EXPECT_EQ(with.detail.merged > 0, chamfer < 0.01);
+    EXPECT_EQ(with.boundary.features.broken, 0u);
+    const QualityReport quality = measure_quality(boundary_mesh(with.mesh));
+    EXPECT_GT(quality.theta_min, 30) << chamfer;
+    EXPECT_GT(measure_tet_quality(with.mesh).dihedral_min, 15) << chamfer;
+    EXPECT_NEAR(static_cast<double>(with.mesh.vertices.size()), 600, 18);
+    options.detail = false;
+    const TetResult without = tetrahedralise(block, options);
+    EXPECT_EQ(without.detail.merged, 0u);
+    EXPECT_LT(measure_quality(boundary_mesh(without.mesh)).theta_min, quality.theta_min) << chamfer;
+  }
 }
 
 TEST(TetrahedraliseAgain, GivesTheSameWithAnyThreadsAndNeighbours) {
