@@ -17,6 +17,7 @@ class SizeField {
   // One length per point, at least one, finite; gradation > 0.
   SizeField(const std::vector<Vec3>& points, const std::vector<double>& lengths, double gradation);
 
+  double gradation() const { return gradation_; }
   double operator()(const Vec3& x) const;
   // h at each point. `near`, if as long as the points, says for each a sample that limited it before, and is written
   // likewise: the search is quicker from there.

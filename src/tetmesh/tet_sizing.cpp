@@ -30,6 +30,7 @@ constexpr double kPerVolume = 2 * 0.9235 * 0.9235 * 0.9235;
 constexpr double kPerArea = 1 / std::numbers::sqrt3;
 constexpr double kMostVertices = 1e8;         // that may be asked for
 constexpr double kLongest = 2;                // lengths h at an edge's end, beyond which the edge is bisected
+constexpr double kReach = 0.87;               // of a tetrahedron from the middle of its longest edge, by that
 constexpr std::size_t kMostTets = 2'000'000;  // unless the input has more
 constexpr int kRounds = 6;                    // of refinement and calibration
 constexpr int kTrials = 40;                   // factors tried by a calibration
@@ -189,6 +190,10 @@ class ScaledField {
     plain_ = uniform_ * factor;
     if (!lengths_.empty()) field_.emplace(samples_.points, lengths_, bounds_.gradation);
   }
+  // Whether the length is known to be the same everywhere in a ball.
+  bool is_constant(const Vec3& centre, double radius) const {
+    return !field_ && bound_ && (*bound_)(centre)-bound_->gradation() * radius >= plain_;
+  }
   double at(const Vec3& x) const {
     const double grown = field_ ? (*field_)(x) : plain_, bound = bound_ ? (*bound_)(x) : grown;
     return bounded(std::min({grown, bound, linear(x, locate(x))}));
@@ -335,7 +340,10 @@ class Refiner {
   void push(Index a, Index b) {
     const Edge e = edge(a, b);
     const double most = kLongest * std::min(lengths_[a], lengths_[b]);
-    if (std::get<0>(e) > most * most) queue_.push(e);
+    if (!(std::get<0>(e) > most * most)) return;
+    // A tetrahedron with this edge as its longest lies within the ball.
+    const Vec3 middle = 0.5 * mesh_.vertices[a] + 0.5 * mesh_.vertices[b];
+    if (!field_.is_constant(middle, kReach * std::sqrt(std::get<0>(e)))) queue_.push(e);
   }
 
   // False if the edge is not there any more, or too short for a vertex between its ends.

@@ -33,10 +33,10 @@ double estimate_tet_vertices(double volume, double area, double h);
 
 // Bisects edges that are longer than 2 h at one of their ends, longest first (Rivara 1984). With a gradation of 0.2 the
 // linear density then stands for lengths within 8 % of h, and its integrals are exact; edges of length h would take
-// eight times as many tetrahedra. A uniform size bisects nothing. `target.vertices` is of the whole mesh. Stops at 2
-// million tetrahedra or the input's number, if that is larger. `boundary` is the mesh's, on the same vertices. `bound`,
-// in the mesh's unit, is what edges should not be longer than; the others become at most twice as long for it. Throws
-// Error as refine_for_density does.
+// eight times as many tetrahedra. A uniform size bisects nothing, nor does a bound where it does not reach.
+// `target.vertices` is of the whole mesh. Stops at 2 million tetrahedra or the input's number, if that is larger.
+// `boundary` is the mesh's, on the same vertices. `bound`, in the mesh's unit, is what edges should not be longer than;
+// the others become at most twice as long for it. Throws Error as refine_for_density does.
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
                             const SizingTarget& target, const SizeField* bound = nullptr);
 

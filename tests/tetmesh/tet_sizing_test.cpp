@@ -53,7 +53,7 @@ TEST(TetSizing, UniformSizeMeetsTheCountAndBisectsNothing) {
 
 // Edges near the bound's point are short, the others one length, and the count is met.
 TEST(TetSizing, ABoundShortensEdgesNearIt) {
-  const TetMesh box = tet_box(2);
+  const TetMesh box = tet_box(6);
   SizingTarget target;
   target.vertices = 5000;
   const SizedSolid plain = refine_for_sizes(box, surface_of(box), {}, target);
@@ -62,6 +62,11 @@ TEST(TetSizing, ABoundShortensEdgesNearIt) {
     const SizedSolid sized = refine_for_sizes(box, surface_of(box), {}, target, &bound);
     ASSERT_EQ(sized.lengths.size(), sized.mesh.vertices.size());
     const double longest = *std::max_element(sized.lengths.begin(), sized.lengths.end());
+    // Far from the point tetrahedra are as they were.
+    const auto is_one_of_the_box = [&](const Tetrahedron& t) {
+      return std::find(box.tets.begin(), box.tets.end(), t) != box.tets.end();
+    };
+    EXPECT_GT(std::count_if(sized.mesh.tets.begin(), sized.mesh.tets.end(), is_one_of_the_box), 0);
     EXPECT_GT(longest, plain.edge_length);
     EXPECT_LT(longest, 2 * plain.edge_length);
     for (std::size_t v = 0; v < sized.lengths.size(); ++v)
