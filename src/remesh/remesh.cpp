@@ -361,7 +361,7 @@ void Pipeline::fit() {
 void Pipeline::place() {
   result_.wanted = wanted_;
   result_.input_topology = analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size());
-  localises_ = plan_.topology != TopologyControl::off && plan_.seeds.empty();
+  localises_ = plan_.topology != TopologyControl::off && (plan_.seeds.empty() || !plan_.places.empty());
   optimise_levels();
 }
 
