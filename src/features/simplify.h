@@ -25,7 +25,7 @@ std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<T
 //   - Of corners that are nearer to each other along the curves one remains, those of many curves before turns; the
 //     curves of the others are led there, along what lies between.
 //   - Creases, the lighter first, go where they run within `width` of others or of themselves, though they are not led
-//     there by a corner (curve_gaps): as a whole, or in stretches of at least three widths. So the two curves of a
+//     there by a corner (curve_gaps): as a whole, or in stretches of at least two widths. So the two curves of a
 //     chamfer become one. What is left of a curve is led to what stays along edges of the mesh.
 //   - Closed creases shorter than 4 `width` go.
 // Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing. `links` are edges of the

@@ -53,16 +53,13 @@ std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::si
 
 Csr<Index> vertex_neighbours(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
   const EdgeTable table = edge_table(triangles, vertex_count);
-  Csr<Index> neighbours = group_into_rows<Index>(vertex_count, [&](const auto& put) {
+  // The edges are in ascending order, and so are the neighbours of each vertex then.
+  return group_into_rows<Index>(vertex_count, [&](const auto& put) {
     for (const auto& [a, b] : table.edges) {
       put(a, b);
       put(b, a);
     }
   });
-  for (std::size_t v = 0; v < vertex_count; ++v)
-    std::sort(neighbours.values.begin() + static_cast<std::ptrdiff_t>(neighbours.offsets[v]),
-              neighbours.values.begin() + static_cast<std::ptrdiff_t>(neighbours.offsets[v + 1]));
-  return neighbours;
 }
 
 std::array<bool, 3> edges_among(const Triangle& t, const std::vector<std::array<Index, 2>>& edges) {

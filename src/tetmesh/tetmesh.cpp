@@ -19,6 +19,7 @@
 #include "mesh/topology.h"
 #include "remesh/detail.h"
 #include "remesh/prepare.h"
+#include "remesh/sizing.h"
 #include "tetmesh/boundary_phase.h"
 #include "tetmesh/check_surface.h"
 #include "tetmesh/conform.h"
@@ -211,21 +212,15 @@ struct BoundaryDetail {
   DetailResult result;
 };
 
-BoundaryDetail plan_boundary(const TetMesh& mesh, const TriangleMesh& surface, const TetOptions& options,
-                             const SizingTarget& target) {
+// `plain` is the solid refined for sizes without details.
+BoundaryDetail plan_boundary(const TriangleMesh& surface, const SizedSolid& plain, const TetOptions& options) {
   BoundaryDetail detail;
   detail.features = detect_features(surface, options.features);
   if (!options.detail || !options.seeds.empty()) return detail;
-  const SizedSolid plain = refine_for_sizes(mesh, surface, options.sizing, target);
   std::vector<double> lengths(surface.vertices.size(), plain.edge_length);
   std::copy_n(plain.lengths.begin(), std::min(plain.lengths.size(), lengths.size()), lengths.begin());
-  double vertices = 0;
-  for (const Triangle& t : surface.triangles) {
-    const double h = (lengths[t[0]] + lengths[t[1]] + lengths[t[2]]) / 3;
-    vertices += 2 / std::sqrt(3.0) *
-                triangle_area(surface.vertices[t[0]], surface.vertices[t[1]], surface.vertices[t[2]]) / (h * h);
-  }
-  DetailPlan plan = plan_details(surface, detail.features, lengths, static_cast<std::size_t>(vertices), false);
+  const MeshEstimate without = estimate_mesh(boundary_of(plain.mesh), {plain.surface_density(), plain.edge_length});
+  DetailPlan plan = plan_details(surface, detail.features, lengths, static_cast<std::size_t>(without.vertices), false);
   detail.features = std::move(plan.features);
   detail.result = plan.result;
   if (!plan.points.empty()) detail.bound.emplace(plan.points, plan.lengths, options.sizing.field.gradation);
@@ -238,9 +233,10 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   keep_boundary_edges(surface);
   const SizingTarget target = options.seeds.empty() ? SizingTarget{options.vertices, options.edge_length}
                                                     : SizingTarget{options.seeds.size(), 0};
-  const BoundaryDetail detail = plan_boundary(mesh, surface, options, target);
+  SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
+  const BoundaryDetail detail = plan_boundary(surface, sized, options);
   const SizeField* bound = detail.bound ? &*detail.bound : nullptr;
-  SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target, bound);
+  if (bound) sized = refine_for_sizes(mesh, surface, options.sizing, target, bound);
   if (sized.vertices < kFewest)
     throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones",
                             options.edge_length, sized.vertices, kFewest));

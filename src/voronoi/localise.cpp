@@ -374,7 +374,7 @@ Triangles Localiser::Work::leave_out() {
     if (slots) sort_unique(*slots);
 
   Triangles triangles;
-  std::map<Index, std::vector<std::size_t>> regions_at;  // of triangles
+  std::vector<std::pair<Index, std::size_t>> regions_at;  // of triangles
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     const std::size_t region = regions.root(k);
     if (around[region]->empty()) continue;
@@ -382,21 +382,22 @@ Triangles Localiser::Work::leave_out() {
     for (const Index t : *pieces[k].triangles) {
       if (has_slot(back, t, slot)) continue;
       among[t].left_out.push_back(slot);
-      std::vector<std::size_t>& there = regions_at[t];
-      if (std::find(there.begin(), there.end(), region) == there.end()) there.push_back(region);
+      regions_at.push_back({t, region});
     }
   }
-  for (const auto& [t, there] : regions_at) {
+  std::sort(regions_at.begin(), regions_at.end());
+  regions_at.erase(std::unique(regions_at.begin(), regions_at.end()), regions_at.end());
+  for (auto at = regions_at.begin(); at != regions_at.end();) {
+    const Index t = at->first;
     Among& these = among[t];
     these.own.clear();
     these.around.clear();
+    for (; at != regions_at.end() && at->first == t; ++at) these.around.push_back(around[at->second]);
+    const auto left = [&](Index slot) { return !contains(these.left_out, slot); };
     const Row on = row(t);
     for (std::size_t p = on.begin; p < on.end; ++p)
-      if (const Index slot = seeds.slot[on.polygons->pairs[p].cell]; !contains(these.left_out, slot))
-        these.own.push_back(slot);
+      if (const Index slot = seeds.slot[on.polygons->pairs[p].cell]; left(slot)) these.own.push_back(slot);
     sort_unique(these.own);
-    for (const std::size_t region : there) these.around.push_back(around[region]);
-    const auto left = [&](Index slot) { return !contains(these.left_out, slot); };
     if (these.own.empty() && std::none_of(these.around.begin(), these.around.end(), [&](const auto& slots) {
           return std::any_of(slots->begin(), slots->end(), left);
         })) {
