@@ -40,9 +40,7 @@ struct TetOptions {
 
   TetSizingOptions sizing;
   FeatureOptions features;
-  // Details of the boundary that are finer than the edges (remesh.h) get edges as short as the number of vertices can
-  // pay for, the plain ones becoming at most half as long again; finer ones are merged or let go. Not with seeds.
-  bool detail = true;
+  DetailMode detail = DetailMode::budget;  // of the boundary; not with seeds
   std::uint64_t random_seed = 1;
   int iterations = 100;      // of which each phase may make a share (design.md)
   double tolerance = 1e-6;   // a phase ends when the energy falls by less than this share per step

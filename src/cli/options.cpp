@@ -271,7 +271,7 @@ void Usage::check_edge_bounds(const SizingOptions& sizing) const {
 
 void Usage::check_uniform_density() const {
   for (const char* option : {"--gradation", "--edge-min", "--edge-max"})
-    refuse(option, "a uniform density has edges of one length; choose another --density");
+    refuse(option, "it is for edge lengths that follow a density; choose another than uniform");
 }
 
 void Usage::check_wrap(const std::string& attribute) const {

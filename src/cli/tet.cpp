@@ -84,10 +84,10 @@ void add_options(CLI::App* app, TetCommand& command) {
                "sharp edges to keep: auto (default), none, or all with a\n"
                "dihedral deviation of so many degrees. Edges between face\n"
                "labels are kept unless none");
-  add_words(app, "--detail", command.options.detail, kTetDetailWords,
+  add_words(app, "--detail", command.options.detail, kDetailWords,
             "what is finer than the boundary's edges: auto (smaller\n"
-            "edges where the vertices suffice, else merged; default) or\n"
-            "off")
+            "edges where the vertices suffice, else merged; default),\n"
+            "all (as many vertices as it takes) or off")
       ->group("Features");
   add_feature_file(app, command.feature_file);
   add_weld(app, command.weld);

@@ -23,9 +23,6 @@ inline constexpr auto kTopologyWords = word_table<TopologyControl>(
 inline constexpr auto kDetailWords =
     word_table<DetailMode>({{DetailMode::budget, "auto"}, {DetailMode::all, "all"}, {DetailMode::off, "off"}});
 
-// Whether, for tetrahedra.
-inline constexpr auto kTetDetailWords = word_table<bool>({{true, "auto"}, {false, "off"}});
-
 inline constexpr auto kEnergyWords =
     word_table<Energy>({{Energy::automatic, "auto"}, {Energy::restricted, "rcvt"}, {Energy::constrained, "ccvt"}});
 

@@ -35,7 +35,6 @@ constexpr std::size_t kMostTets = 2'000'000;  // unless the input has more
 constexpr int kRounds = 6;                    // of refinement and calibration
 constexpr int kTrials = 40;                   // factors tried by a calibration
 constexpr double kCalibrated = 1e-3;          // relative error of the edge length, at which a calibration ends
-constexpr double kMostFactor = 2;             // of lengths beside a bound, in lengths without
 constexpr double kNarrowest = 1e-9;           // relative width of the interval of factors, at which it gives up
 constexpr double kOutside = -1e-6;  // least barycentric coordinate of a point that counts as within the background mesh
 constexpr double kLeastDensity = 1e-100, kMostDensity = 1e100;  // of an attribute
@@ -464,7 +463,7 @@ double estimate_tet_vertices(double volume, double area, double h) {
 }
 
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
-                            const SizingTarget& target, const SizeField* bound) {
+                            const SizingTarget& target, const SizeField* bound, double longer) {
   check(mesh, options, target);
   SizedSolid sized;
   sized.mesh = mesh;
@@ -480,7 +479,7 @@ SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, c
     ScaledField unbounded(samples, options.field, sized.edge_length, nullptr);
     calibrate(Extent(mesh, boundary), mesh, boundary, target, unbounded, most, factor);
   }
-  if (bound) most = kMostFactor * factor;
+  if (bound) most = longer * factor;
   ScaledField field(samples, options.field, sized.edge_length, bound);
   const std::size_t limit = std::max(kMostTets, mesh.tets.size());
   for (int round = 0;; ++round) {
@@ -489,7 +488,8 @@ SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, c
     sized.lengths = calibrate(extent, sized.mesh, surface, target, field, most, factor);
     const TetEstimate e = estimate(extent, sized.mesh, surface, sized.lengths);
     sized.edge_length = e.mean_edge;
-    if (target.vertices == 0) sized.vertices = static_cast<std::size_t>(std::llround(e.vertices));
+    if (target.vertices == 0 || (bound && longer == 1))
+      sized.vertices = std::max(target.vertices, static_cast<std::size_t>(std::llround(e.vertices)));
     if (round == kRounds || !Refiner(sized, surface, field, sized.lengths).run(limit)) break;
   }
   if (static_cast<double>(sized.vertices) > kMostVertices)

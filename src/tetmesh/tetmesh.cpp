@@ -36,6 +36,7 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kFewest = 8;  // vertices or seeds that a result can be made of
+constexpr double kLongerForDetails = 2;  // become the other edges at most, by this factor
 constexpr double kEnough = 0.97;    // of the sites wanted; with fewer the boundary takes more
 constexpr double kGoalBeyond = 5;   // degrees: aiming a little higher than asked for raises the mean as well
 // Fractions of the whole run, about, for progress.
@@ -216,11 +217,12 @@ struct BoundaryDetail {
 BoundaryDetail plan_boundary(const TriangleMesh& surface, const SizedSolid& plain, const TetOptions& options) {
   BoundaryDetail detail;
   detail.features = detect_features(surface, options.features);
-  if (!options.detail || !options.seeds.empty()) return detail;
+  if (options.detail == DetailMode::off || !options.seeds.empty()) return detail;
   std::vector<double> lengths(surface.vertices.size(), plain.edge_length);
   std::copy_n(plain.lengths.begin(), std::min(plain.lengths.size(), lengths.size()), lengths.begin());
   const MeshEstimate without = estimate_mesh(boundary_of(plain.mesh), {plain.surface_density(), plain.edge_length});
-  DetailPlan plan = plan_details(surface, detail.features, lengths, static_cast<std::size_t>(without.vertices), false);
+  DetailPlan plan = plan_details(surface, detail.features, lengths, static_cast<std::size_t>(without.vertices),
+                                 options.detail == DetailMode::all);
   detail.features = std::move(plan.features);
   detail.result = plan.result;
   if (!plan.points.empty()) detail.bound.emplace(plan.points, plan.lengths, options.sizing.field.gradation);
@@ -236,7 +238,8 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
   const BoundaryDetail detail = plan_boundary(surface, sized, options);
   const SizeField* bound = detail.bound ? &*detail.bound : nullptr;
-  if (bound) sized = refine_for_sizes(mesh, surface, options.sizing, target, bound);
+  const double longer = options.detail == DetailMode::all ? 1 : kLongerForDetails;
+  if (bound) sized = refine_for_sizes(mesh, surface, options.sizing, target, bound, longer);
   if (sized.vertices < kFewest)
     throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones",
                             options.edge_length, sized.vertices, kFewest));

@@ -95,6 +95,17 @@ TEST(TetSizing, ABoundShortensEdgesNearIt) {
   }
 }
 
+TEST(TetSizing, VerticesGrowWhereOtherEdgesMayNotBecomeLonger) {
+  const TetMesh box = tet_box(6);
+  SizingTarget target;
+  target.vertices = 5000;
+  const SizedSolid plain = refine_for_sizes(box, surface_of(box), {}, target);
+  const SizeField bound({{0, 0, 0}}, {0.2 * plain.edge_length}, 0.2);
+  const SizedSolid sized = refine_for_sizes(box, surface_of(box), {}, target, &bound, 1);
+  EXPECT_GT(sized.vertices, 5000u);
+  EXPECT_NEAR(*std::max_element(sized.lengths.begin(), sized.lengths.end()), plain.edge_length, 1e-9);
+}
+
 TEST(TetSizing, RefinedSolidIsTheSameSolid) {
   TetMesh box = tet_box(2);
   for (std::size_t t = 0; t < box.tets.size(); ++t) box.regions.push_back(static_cast<int>(t % 3));

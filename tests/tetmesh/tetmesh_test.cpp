@@ -171,10 +171,14 @@ TEST(TetrahedraliseDetails, AreMergedOrGetShorterEdges) {
     EXPECT_GT(quality.theta_min, 30) << chamfer;
     EXPECT_GT(measure_tet_quality(with.mesh).dihedral_min, 15) << chamfer;
     EXPECT_NEAR(static_cast<double>(with.mesh.vertices.size()), 600, 18);
-    options.detail = false;
+    options.detail = DetailMode::off;
     const TetResult without = tetrahedralise(block, options);
     EXPECT_EQ(without.detail.merged, 0u);
     EXPECT_LT(measure_quality(boundary_mesh(without.mesh)).theta_min, quality.theta_min) << chamfer;
+    options.detail = DetailMode::all;
+    const TetResult all = tetrahedralise(block, options);
+    EXPECT_EQ(all.detail.merged > 0, chamfer < 0.005) << "below a sixteenth of an edge";
+    EXPECT_GT(measure_tet_quality(all.mesh).dihedral_min, 15) << chamfer;
   }
 }
 
