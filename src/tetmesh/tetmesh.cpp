@@ -35,10 +35,10 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kFewest = 8;  // vertices or seeds that a result can be made of
+constexpr std::size_t kFewest = 8;       // vertices or seeds that a result can be made of
 constexpr double kLongerForDetails = 2;  // become the other edges at most, by this factor
-constexpr double kEnough = 0.97;    // of the sites wanted; with fewer the boundary takes more
-constexpr double kGoalBeyond = 5;   // degrees: aiming a little higher than asked for raises the mean as well
+constexpr double kEnough = 0.97;         // of the sites wanted; with fewer the boundary takes more
+constexpr double kGoalBeyond = 5;        // degrees: aiming a little higher than asked for raises the mean as well
 // Fractions of the whole run, about, for progress.
 constexpr double kPlaced = 0.82, kExtracted = 0.85;
 
