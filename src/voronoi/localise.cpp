@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -12,6 +13,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/grouping.h"
+#include "core/marks.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
 #include "voronoi/clip.h"
@@ -27,7 +29,7 @@ namespace {
 constexpr std::size_t kDivisions = 16;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
-constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 8;  // of a parallel loop
+constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 16;  // of a parallel loop
 
 using Triangles = std::vector<Index>;  // ascending
 
@@ -73,24 +75,75 @@ class Overlay {
   std::vector<T> values_;
 };
 
-// The seeds that divide a triangle among them.
-class Among : public SlotFilter {
+// The seeds that divide a triangle among them: those around its regions, and its own.
+struct Among {
+  std::vector<Index> left_out;  // that had stray pieces here
+  std::vector<Index> own;       // with cells here that are no stray pieces
+  std::vector<Index> regions;   // of stray pieces here, the last time that it was divided
+};
+
+// The regions of stray pieces of all rounds, and the seeds around each.
+class Regions {
  public:
-  bool admits(Index slot) const override {
-    if (contains(left_out, slot)) return false;
-    return std::binary_search(own.begin(), own.end(), slot) ||
-           std::any_of(around.begin(), around.end(),
-                       [&](const auto& slots) { return std::binary_search(slots->begin(), slots->end(), slot); });
+  void reset(std::size_t slots) {
+    around_.clear();
+    of_.assign(slots, kNone);
+    links_.clear();
+  }
+  // Adds a region with these seeds around it, ascending.
+  Index add(std::vector<Index> slots) {
+    const auto region = static_cast<Index>(around_.size());
+    for (const Index slot : slots) {
+      links_.push_back({region, of_[slot]});
+      of_[slot] = static_cast<Index>(links_.size() - 1);
+    }
+    around_.push_back(std::move(slots));
+    return region;
+  }
+  const std::vector<Index>& around(Index region) const { return around_[region]; }
+  bool admits(const Among& among, Index slot) const {
+    if (contains(among.left_out, slot)) return false;
+    if (contains(among.own, slot)) return true;
+    for (Index k = of_[slot]; k != kNone; k = links_[k].next)
+      if (contains(among.regions, links_[k].region)) return true;
+    return false;
   }
 
-  std::vector<Index> left_out;                                    // that had stray pieces here
-  std::vector<Index> own;                                         // with cells here that are no stray pieces, ascending
-  std::vector<std::shared_ptr<const std::vector<Index>>> around;  // the regions of such pieces, ascending
+ private:
+  struct Link {
+    Index region, next;
+  };
+  std::vector<std::vector<Index>> around_;
+  std::vector<Index> of_;  // first link of each slot
+  std::vector<Link> links_;
+};
+
+class Admitted : public SlotFilter {
+ public:
+  Admitted(const Regions& regions, const Among& among) : regions_(regions), among_(among) {}
+  bool admits(Index slot) const override { return regions_.admits(among_, slot); }
+
+ private:
+  const Regions& regions_;
+  const Among& among_;
+};
+
+// Memory that loops over triangles or cells use.
+struct Scratch {
+  std::vector<Index> place;  // of triangles in the list of one cell; anything for others
+  std::vector<Index> labels, met;
+  std::vector<std::size_t> order;
+  RestrictedPolygons found;
 };
 
 }  // namespace
 
 struct Localiser::Work {
+  // Polygons of a triangle.
+  struct Range {
+    std::size_t begin, end;
+  };
+
   const Surface& surface;
   // The half-edges by which a triangle's neighbours across its own half-edge are entered, if need be behind triangles
   // that are exactly collinear and have no polygons.
@@ -99,16 +152,19 @@ struct Localiser::Work {
 
   SortedSeeds seeds;
   Neighbours neighbours{ListLength{}, LongLists::all_seeds};
-  ThreadLocal<Clipper> clippers;           // of these seeds
-  ThreadLocal<std::vector<Index>> places;  // of triangles in the list of one cell; anything for others
+  ThreadLocal<Clipper> clippers;  // of these seeds
+  ThreadLocal<Scratch> scratches;
   const RestrictedPolygons* raw = nullptr;
   const Csr<Index>* raw_triangles = nullptr;       // of each cell in `raw`
   std::vector<std::size_t> first;                  // polygon in `raw` of each triangle
-  Overlay<RestrictedPolygons> clipped;             // triangles as they are divided now
+  RestrictedPolygons anew;                         // all that was clipped anew, some of it more than once
+  Overlay<Range> clipped;                          // triangles as they are divided now, in `anew`
   Overlay<Triangles> cell_triangles;               // of cells that changed
   std::map<Index, std::vector<Triangles>> strays;  // components of cells apart from their seeds
-  std::unordered_map<Index, Among> among;          // of triangles where seeds are left out
-  Slots back;                                      // that are not left out of a triangle again
+  Overlay<Among> among;                            // of triangles where seeds are left out
+  Regions regions;
+  Slots back;   // that are not left out of a triangle again
+  Marks taken;  // cells
 
   explicit Work(const Surface& s);
 
@@ -135,14 +191,14 @@ struct Localiser::Work {
     }
   };
   Row row(Index triangle) const {
-    if (const RestrictedPolygons* anew = clipped.find(triangle)) return {anew, 0, anew->pairs.size()};
+    if (const Range* now = clipped.find(triangle)) return {&anew, now->begin, now->end};
     return {raw, first[triangle], first[triangle + 1]};
   }
   std::span<const Index> triangles_of(Index cell) const;
 
   Clipper& clipper();
-  void take(const Row& on, std::size_t polygon, Clipper& clipper) const;
-  double squared_distance(Index triangle, Index cell, Clipper& clipper) const;
+  void take(const Row& on, std::size_t polygon, Clipper& clipper);
+  double squared_distance(Index triangle, Index cell, Clipper& clipper);
   std::vector<std::size_t> nearest_to_seed(Index cell, std::span<const Index> triangles);
   std::vector<Triangles> find_strays(Index cell);
   void find_strays(const std::vector<Index>& cells);
@@ -153,7 +209,8 @@ struct Localiser::Work {
   Triangles put_back_torn(const Triangles& those);
   Triangles beside(const Triangles& triangles) const;
   std::vector<Index> clip_anew(const Triangles& triangles);
-  RestrictedPolygons clip(Index triangle, Clipper& clipper) const;
+  void clip(Index triangle, Clipper& clipper, RestrictedPolygons& out);
+  void change(Index triangle, const Row& before, const Row& after, std::vector<Index>& cells);
   RestrictedPolygons splice() const;
   void sum(Diagram& diagram);
 };
@@ -203,11 +260,12 @@ Clipper& Localiser::Work::clipper() {
 }
 
 // Has the clipper hold a polygon as its labels say, which is the same whatever computed them.
-void Localiser::Work::take(const Row& on, std::size_t polygon, Clipper& clipper) const {
+void Localiser::Work::take(const Row& on, std::size_t polygon, Clipper& clipper) {
   const RestrictedPolygons& polygons = *on.polygons;
   const auto& [triangle, cell] = polygons.pairs[polygon];
-  std::vector<Index> labels(polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon]),
-                            polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon + 1]));
+  std::vector<Index>& labels = scratches.local().labels;
+  labels.assign(polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon]),
+                polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon + 1]));
   for (Index& label : labels)
     if (!is_edge(label)) label = seeds.slot[label];
   clipper.begin(surface.facets[surface.facet_of[triangle]]);
@@ -215,7 +273,7 @@ void Localiser::Work::take(const Row& on, std::size_t polygon, Clipper& clipper)
 }
 
 // Of a cell's seed from its polygon on a triangle.
-double Localiser::Work::squared_distance(Index triangle, Index cell, Clipper& clipper) const {
+double Localiser::Work::squared_distance(Index triangle, Index cell, Clipper& clipper) {
   const Row on = row(triangle);
   take(on, on.find(cell), clipper);
   double least = norm2(clipper.vertex(0));
@@ -257,7 +315,7 @@ std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
   const std::span<const Index> triangles = triangles_of(cell);
   const std::size_t count = triangles.size();
   if (count < 2) return {};
-  std::vector<Index>& place = places.local();
+  std::vector<Index>& place = scratches.local().place;
   place.resize(surface.mesh.triangles.size());
   for (Index i = 0; i < count; ++i) place[triangles[i]] = i;
   DisjointSets<> parts(count);
@@ -304,8 +362,8 @@ void Localiser::Work::find_strays(const std::vector<Index>& cells) {
 }
 
 bool Localiser::Work::is_left_out(Index triangle, Index cell) const {
-  const auto at = among.find(triangle);
-  return at != among.end() && !at->second.admits(seeds.slot[cell]);
+  const Among* these = among.find(triangle);
+  return these && !regions.admits(*these, seeds.slot[cell]);
 }
 
 // Calls body(triangle, other) for the cells that a piece of a cell borders on, on its own triangles, and beyond mesh
@@ -343,41 +401,40 @@ Triangles Localiser::Work::leave_out() {
     const Triangles* triangles;
   };
   std::vector<Piece> pieces;
-  std::unordered_map<Index, std::size_t> first_of;  // piece of each cell
+  std::vector<std::size_t> first_of(seeds.slot.size(), std::numeric_limits<std::size_t>::max());  // piece of each cell
   for (const auto& [cell, of] : strays) {
     first_of[cell] = pieces.size();
     for (const Triangles& piece : of) pieces.push_back({cell, &piece});
   }
   // Where a triangle holds no piece of the cell, it is the cell's own.
   const auto piece_at = [&](Index triangle, Index cell) {
-    const auto at = first_of.find(cell);
-    if (at == first_of.end()) return pieces.size();
-    for (std::size_t k = at->second; k < pieces.size() && pieces[k].cell == cell; ++k)
+    for (std::size_t k = first_of[cell]; k < pieces.size() && pieces[k].cell == cell; ++k)
       if (std::binary_search(pieces[k].triangles->begin(), pieces[k].triangles->end(), triangle)) return k;
     return pieces.size();
   };
-  DisjointSets<> regions(pieces.size());
-  std::vector<std::vector<Index>> own(pieces.size());
+  DisjointSets<> together(pieces.size());
+  std::vector<std::pair<std::size_t, Index>> around;  // slots of own parts around each piece, later each region
   for (std::size_t k = 0; k < pieces.size(); ++k)
     each_cell_beside(pieces[k].cell, *pieces[k].triangles, [&](Index triangle, Index other) {
       const std::size_t piece = piece_at(triangle, other);
-      if (piece == pieces.size()) own[k].push_back(seeds.slot[other]);
-      else regions.join(k, piece);
+      if (piece == pieces.size()) around.push_back({k, seeds.slot[other]});
+      else together.join(k, piece);
     });
-  std::vector<std::shared_ptr<std::vector<Index>>> around(pieces.size());  // of each region, at its root
-  for (std::size_t k = 0; k < pieces.size(); ++k) {
-    auto& slots = around[regions.root(k)];
-    if (!slots) slots = std::make_shared<std::vector<Index>>();
-    slots->insert(slots->end(), own[k].begin(), own[k].end());
+  for (auto& piece : around) piece.first = together.root(piece.first);
+  std::sort(around.begin(), around.end());
+  around.erase(std::unique(around.begin(), around.end()), around.end());
+  std::vector<Index> region_of(pieces.size(), kNone);  // of the pieces that are the lowest of their regions
+  for (auto at = around.begin(); at != around.end();) {
+    const std::size_t root = at->first;
+    std::vector<Index> slots;
+    for (; at != around.end() && at->first == root; ++at) slots.push_back(at->second);
+    region_of[root] = regions.add(std::move(slots));
   }
-  for (const auto& slots : around)
-    if (slots) sort_unique(*slots);
 
-  Triangles triangles;
-  std::vector<std::pair<Index, std::size_t>> regions_at;  // of triangles
+  std::vector<std::pair<Index, Index>> regions_at;  // of triangles
   for (std::size_t k = 0; k < pieces.size(); ++k) {
-    const std::size_t region = regions.root(k);
-    if (around[region]->empty()) continue;
+    const Index region = region_of[together.root(k)];
+    if (region == kNone) continue;
     const Index slot = seeds.slot[pieces[k].cell];
     for (const Index t : *pieces[k].triangles) {
       if (has_slot(back, t, slot)) continue;
@@ -387,19 +444,19 @@ Triangles Localiser::Work::leave_out() {
   }
   std::sort(regions_at.begin(), regions_at.end());
   regions_at.erase(std::unique(regions_at.begin(), regions_at.end()), regions_at.end());
+  Triangles triangles;
   for (auto at = regions_at.begin(); at != regions_at.end();) {
     const Index t = at->first;
     Among& these = among[t];
     these.own.clear();
-    these.around.clear();
-    for (; at != regions_at.end() && at->first == t; ++at) these.around.push_back(around[at->second]);
+    these.regions.clear();
+    for (; at != regions_at.end() && at->first == t; ++at) these.regions.push_back(at->second);
     const auto left = [&](Index slot) { return !contains(these.left_out, slot); };
     const Row on = row(t);
     for (std::size_t p = on.begin; p < on.end; ++p)
       if (const Index slot = seeds.slot[on.polygons->pairs[p].cell]; left(slot)) these.own.push_back(slot);
-    sort_unique(these.own);
-    if (these.own.empty() && std::none_of(these.around.begin(), these.around.end(), [&](const auto& slots) {
-          return std::any_of(slots->begin(), slots->end(), left);
+    if (these.own.empty() && std::none_of(these.regions.begin(), these.regions.end(), [&](Index region) {
+          return std::any_of(regions.around(region).begin(), regions.around(region).end(), left);
         })) {
       // All that could have the triangle have left it before.
       for (std::size_t p = on.begin; p < on.end; ++p) {
@@ -408,7 +465,6 @@ Triangles Localiser::Work::leave_out() {
         these.own.push_back(slot);
         back[t].push_back(slot);
       }
-      sort_unique(these.own);
       continue;
     }
     triangles.push_back(t);
@@ -422,8 +478,8 @@ Triangles Localiser::Work::put_back_torn(const Triangles& those) {
   Triangles triangles;
   std::vector<std::pair<Index, Index>> torn;
   for (const Index triangle : those) {
-    const auto these = among.find(triangle);
-    if (these == among.end()) continue;
+    const Among* these = among.find(triangle);
+    if (!these) continue;
     for (Index k = 0; k < 3; ++k) {
       const std::size_t h = std::size_t{3} * triangle + k;
       if (!direct[h]) continue;
@@ -431,7 +487,7 @@ Triangles Localiser::Work::put_back_torn(const Triangles& those) {
         const Row there = row(static_cast<Index>(*other / 3));
         for (std::size_t q = there.begin; q < there.end; ++q) {
           const Index slot = seeds.slot[there.polygons->pairs[q].cell];
-          if (there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)) && !these->second.admits(slot))
+          if (there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)) && !regions.admits(*these, slot))
             torn.push_back({triangle, slot});
         }
       }
@@ -440,8 +496,7 @@ Triangles Localiser::Work::put_back_torn(const Triangles& those) {
   for (const auto& [triangle, slot] : torn) {
     Among& these = among[triangle];
     std::erase(these.left_out, slot);
-    these.own.push_back(slot);
-    sort_unique(these.own);
+    if (!contains(these.own, slot)) these.own.push_back(slot);
     if (!contains(back[triangle], slot)) back[triangle].push_back(slot);
     triangles.push_back(triangle);
   }
@@ -460,77 +515,92 @@ Triangles Localiser::Work::beside(const Triangles& triangles) const {
   return found;
 }
 
-// The division of a triangle among the seeds that are not left out.
-RestrictedPolygons Localiser::Work::clip(Index triangle, Clipper& clipper) const {
-  const Among& these = among.at(triangle);
-  clipper.begin(surface.facets[surface.facet_of[triangle]], &these);
-  std::vector<Index> met;
+// Appends the division of a triangle among the seeds that are not left out.
+void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons& out) {
+  const Among& these = *among.find(triangle);
+  const Admitted filter(regions, these);
+  clipper.begin(surface.facets[surface.facet_of[triangle]], &filter);
+  Scratch& scratch = scratches.local();
+  std::vector<Index>& met = scratch.met;
+  met.clear();
   const auto meet = [&](Index slot) {
-    if (!contains(met, slot) && these.admits(slot)) met.push_back(slot);
+    if (!contains(met, slot) && regions.admits(these, slot)) met.push_back(slot);
   };
   for (const Index slot : these.own) meet(slot);
   if (met.empty()) {
     // The seed nearest to a point of the triangle has a cell on it.
     const Vec3& q = surface.mesh.vertices[surface.mesh.triangles[triangle][0]];
-    std::vector<Index> candidates;
-    for (const auto& slots : these.around)
-      for (const Index slot : *slots)
-        if (these.admits(slot)) candidates.push_back(slot);
-    std::sort(candidates.begin(), candidates.end(), [&](Index a, Index b) {
-      return std::pair(norm2(seeds.x[a] - q), seeds.id[a]) < std::pair(norm2(seeds.x[b] - q), seeds.id[b]);
-    });
-    const auto nearest =
-        std::find_if(candidates.begin(), candidates.end(), [&](Index slot) { return clipper.clip(neighbours, slot); });
-    if (nearest != candidates.end()) meet(*nearest);
+    std::vector<std::pair<double, Index>> candidates;
+    for (const Index region : these.regions)
+      for (const Index slot : regions.around(region))
+        if (!contains(these.left_out, slot)) candidates.push_back({norm2(seeds.x[slot] - q), seeds.id[slot]});
+    std::make_heap(candidates.begin(), candidates.end(), std::greater<>());
+    for (; met.empty() && !candidates.empty(); candidates.pop_back()) {
+      std::pop_heap(candidates.begin(), candidates.end(), std::greater<>());
+      const Index slot = seeds.slot[candidates.back().second];
+      if (clipper.clip(neighbours, slot)) met.push_back(slot);
+    }
   }
-  RestrictedPolygons found;
-  found.offsets = {0};
+  RestrictedPolygons& found = scratch.found;
+  found.pairs.clear();
+  found.offsets.assign(1, 0);
+  found.labels.clear();
+  found.vertices.clear();
   for (std::size_t k = 0; k < met.size(); ++k) {
     if (!clipper.clip(neighbours, met[k])) continue;
     append_polygon(clipper, seeds, triangle, met[k], found);
     for (std::size_t e = 0; e < clipper.size(); ++e)
       if (!is_edge(clipper.label(e))) meet(clipper.label(e));
   }
-  std::vector<std::size_t> order(found.pairs.size());
+  std::vector<std::size_t>& order = scratch.order;
+  order.resize(found.pairs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return found.pairs[a].cell < found.pairs[b].cell; });
-  RestrictedPolygons sorted;
-  for (const std::size_t p : order) append_polygons(found, p, p + 1, sorted);
-  return sorted;
+  for (const std::size_t p : order) append_polygons(found, p, p + 1, out);
 }
 
-// Returns the cells that lost or won.
-std::vector<Index> Localiser::Work::clip_anew(const Triangles& triangles) {
-  std::vector<RestrictedPolygons> anew(triangles.size());
-  parallel_each(
-      triangles.size(), [&](std::size_t k) { anew[k] = clip(triangles[k], clipper()); }, kTrianglesAtOnce);
-  std::vector<Index> cells;
-  for (std::size_t k = 0; k < triangles.size(); ++k) {
-    const Index t = triangles[k];
-    const Row before = row(t);
-    for (std::size_t p = before.begin; p < before.end; ++p) cells.push_back(before.polygons->pairs[p].cell);
-    for (const auto& pair : anew[k].pairs) cells.push_back(pair.cell);
-  }
-  sort_unique(cells);
-  for (const Index cell : cells)
+// Keeps the lists of triangles of cells that lose or win one, and adds these to `cells`.
+void Localiser::Work::change(Index triangle, const Row& before, const Row& after, std::vector<Index>& cells) {
+  const auto list = [&](Index cell) -> Triangles& {
+    if (taken.mark(cell)) cells.push_back(cell);
     if (!cell_triangles.find(cell)) {
       const std::span<const Index> now = triangles_of(cell);
       cell_triangles[cell].assign(now.begin(), now.end());
     }
-  for (std::size_t k = 0; k < triangles.size(); ++k) {
-    const Index t = triangles[k];
-    const Row before = row(t);
-    for (std::size_t p = before.begin; p < before.end; ++p) {
-      Triangles& of = cell_triangles[before.polygons->pairs[p].cell];
-      of.erase(std::lower_bound(of.begin(), of.end(), t));
-    }
-    for (const auto& pair : anew[k].pairs) {
-      Triangles& of = cell_triangles[pair.cell];
-      of.insert(std::lower_bound(of.begin(), of.end(), t), t);
-    }
-    clipped[t] = std::move(anew[k]);
+    return cell_triangles[cell];
+  };
+  std::size_t p = before.begin, q = after.begin;
+  while (p < before.end || q < after.end) {
+    const Index old_cell = p < before.end ? before.polygons->pairs[p].cell : kNone;
+    const Index new_cell = q < after.end ? after.polygons->pairs[q].cell : kNone;
+    Triangles& of = list(std::min(old_cell, new_cell));
+    if (old_cell < new_cell) of.erase(std::lower_bound(of.begin(), of.end(), triangle));
+    if (new_cell < old_cell) of.insert(std::lower_bound(of.begin(), of.end(), triangle), triangle);
+    p += old_cell <= new_cell;
+    q += new_cell <= old_cell;
   }
+}
+
+// Returns the cells that lost or won, or have another polygon.
+std::vector<Index> Localiser::Work::clip_anew(const Triangles& triangles) {
+  std::vector<RestrictedPolygons> parts((triangles.size() + kTrianglesAtOnce - 1) / kTrianglesAtOnce);
+  parallel_chunks(triangles.size(), kTrianglesAtOnce, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) clip(triangles[k], clipper(), parts[chunk]);
+  });
+  std::size_t at = anew.pairs.size();
+  for (const RestrictedPolygons& part : parts) append_polygons(part, 0, part.pairs.size(), anew);
+  std::vector<Index> cells;
+  taken.begin(seeds.slot.size());
+  for (const Index t : triangles) {
+    const Row before = row(t);
+    Row after{&anew, at, at};
+    while (after.end < anew.pairs.size() && anew.pairs[after.end].triangle == t) ++after.end;
+    change(t, before, after, cells);
+    clipped[t] = {after.begin, after.end};
+    at = after.end;
+  }
+  std::sort(cells.begin(), cells.end());
   return cells;
 }
 
@@ -544,9 +614,9 @@ RestrictedPolygons Localiser::Work::splice() const {
   std::sort(triangles.begin(), triangles.end());
   std::size_t kept = 0;
   for (const Index t : triangles) {
-    const RestrictedPolygons& polygons = *clipped.find(t);
+    const Row now = row(t);
     append_polygons(*raw, kept, first[t], all);
-    append_polygons(polygons, 0, polygons.pairs.size(), all);
+    append_polygons(*now.polygons, now.begin, now.end, all);
     kept = first[t + 1];
   }
   append_polygons(*raw, kept, raw->pairs.size(), all);
@@ -596,10 +666,12 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
   first = first_polygons(*raw, surface.mesh.triangles.size());
   seeds = sort_seeds(given);
   clippers.clear();
+  anew = {};
   clipped.reset(surface.mesh.triangles.size());
   cell_triangles.reset(given.size());
   strays.clear();
-  among.clear();
+  among.reset(surface.mesh.triangles.size());
+  regions.reset(seeds.x.size());
   back.clear();
   std::vector<Index> cells(given.size());
   std::iota(cells.begin(), cells.end(), Index{0});
@@ -618,8 +690,7 @@ std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& d
     if (triangles.empty() || divided > kDivisions * surface.facets.size()) break;
     find_strays(clip_anew(triangles));
   }
-  Triangles changed;
-  for (const auto& at : among) changed.push_back(at.first);
+  const Triangles changed = among.items;
   // What else is torn then lies beside what is clipped anew.
   for (Triangles torn = put_back_torn(changed); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);
   if (clipped.items.empty()) return 0;
