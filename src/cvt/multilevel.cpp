@@ -15,6 +15,10 @@
 namespace bisector {
 namespace {
 
+// Rounds of seeds that follow a density, at most; and what a cell should be divided into to get another one.
+constexpr int kFollowingRounds = 6;
+constexpr double kTooFew = 1.5;
+
 constexpr std::size_t kPerComponent = 4;  // a tetrahedron
 constexpr std::size_t kCoarsest = 100;    // seeds on the coarsest level, at least
 constexpr int kLevels = 3;
@@ -236,6 +240,22 @@ void meet_count(CvtRun& run, std::size_t count) {
   for (std::size_t size = 0; run.seeds.size() != count && run.seeds.size() != size;) {
     run.context().check();
     size = run.seeds.size();
+    set_count(run.diagram(Want::polygons), count, run.seeds);
+  }
+}
+
+void follow_density(CvtRun& run) {
+  const std::size_t count = run.seeds.size();
+  for (int round = 0; round < kFollowingRounds; ++round) {
+    run.context().check();
+    const Diagram& diagram = run.diagram(Want::polygons);
+    const double mean = diagram.moments.energy / static_cast<double>(count);
+    // The energy of a cell falls with the square of the number that it is divided into. Each gets one more a round.
+    std::size_t few = 0;
+    for (std::size_t i = 0; i < count; ++i)
+      few += run.seeds.on_surface(i) && diagram.moments.cells[i].second > kTooFew * kTooFew * mean;
+    if (few == 0) return;
+    run.seeds.add(insertion_points(diagram, run.seeds, few));
     set_count(run.diagram(Want::polygons), count, run.seeds);
   }
 }

@@ -34,6 +34,10 @@ void meet_count(CvtRun& run, std::size_t count);
 // polygons.
 void set_count(const Diagram& diagram, std::size_t count, PlacedSeeds& seeds);
 
+// For seeds that were optimised for another density: adds some in cells with the energy of several, and removes as many
+// ends of the shortest edges. Throws Cancelled.
+void follow_density(CvtRun& run);
+
 // Pairs of seeds that follow each other on a feature curve, corners included, lower first, sorted.
 std::vector<std::array<Index, 2>> curve_neighbours(const FeatureCurves& curves, const std::vector<SeedPlace>& places);
 

@@ -12,8 +12,8 @@ namespace {
 
 // Rings of seeds around those that changed that move with them; beyond, the change is hardly felt.
 constexpr int kRings = 3;
-// Where more than one triangle in so many is in the piece, the whole surface is as good.
-constexpr std::size_t kLargePiece = 3;
+// Of the triangles; a larger piece costs as much as the whole surface.
+constexpr double kLargePiece = 0.75;
 
 // Positions in lexicographic order, to look others up.
 class PositionIndex {
@@ -123,7 +123,8 @@ void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptio
   std::size_t count = 0;
   for (std::size_t i = 0; i < inner.size(); ++i)
     for (const Index* t = cells.begin(i); inner[i] && t != cells.end(i); ++t) count += !std::exchange(triangles[*t], 1);
-  if (count == 0 || count * kLargePiece > triangles.size()) return optimise(run, options);
+  if (count == 0 || static_cast<double>(count) > kLargePiece * static_cast<double>(triangles.size()))
+    return optimise(run, options);
   const std::vector<Index> seeds = seeds_on(diagram.polygons, triangles, run.seeds.size());
   optimise_piece(run, {marked_surface(run.surface(), triangles), seeds}, free, options);
 }

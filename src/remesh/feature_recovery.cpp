@@ -24,7 +24,7 @@ constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
 constexpr double kWorthARound = 0.75;
 constexpr int kFirstSteps = 20, kLastSteps = 4;
 // Rounds of clearing curves at the end of a level, and steps after each.
-constexpr int kClearingRounds = 4, kClearingSteps = 15;
+constexpr int kClearingRounds = 2, kClearingSteps = 15;
 // Seeds that recovery may add, beside a quarter of those there are.
 constexpr std::size_t kMostAdded = 100;
 // Lengths of curve, in edges: what a cell must hold to be snapped to it; what is worth a seed, and in the last rounds;
@@ -358,19 +358,17 @@ void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& 
   const std::size_t count = seeds.size();
   options.iterations = kClearingSteps;
   for (int round = 0; round < kClearingRounds; ++round) {
-    std::vector<char> removed(seeds.size(), 0);
-    bool clear = true;
-    for (const std::vector<CurveInterval>& intervals : trace.trace(run.diagram(Want::polygons).polygons))
-      for (const CurveInterval& i : intervals)
-        if (seeds.on_surface(i.cell)) {
-          removed[i.cell] = 1;
-          clear = false;
-        }
-    const SeedsBefore before = clear ? SeedsBefore{} : seeds_before(run);
+    std::vector<char> removed(seeds.size(), 0), crossed(curves.size(), 0);
+    const std::vector<std::vector<CurveInterval>> traced = trace.trace(run.diagram(Want::polygons).polygons);
+    for (Index c = 0; c < curves.size(); ++c)
+      for (const CurveInterval& i : traced[c])
+        if (seeds.on_surface(i.cell)) removed[i.cell] = crossed[c] = 1;
+    if (std::find(crossed.begin(), crossed.end(), 1) == crossed.end()) return;
+    const SeedsBefore before = seeds_before(run);
     seeds.remove(removed);
     const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
-    for (Index c = 0; c < on.size(); ++c) space_evenly(curves, measure, c, on[c], seeds);
-    if (clear) return;
+    for (Index c = 0; c < on.size(); ++c)
+      if (crossed[c]) space_evenly(curves, measure, c, on[c], seeds);
     set_count(run.diagram(Want::polygons), count, seeds);
     optimise_around(run, before, options);
   }

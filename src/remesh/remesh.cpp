@@ -43,6 +43,7 @@ constexpr int kMendingRounds = 3;  // of features and topology
 // A run starts again with edges shorter by this where cells are no disks; not if more than one cell in so many is none.
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
+constexpr int kRefinements = 3;
 constexpr int kFreedSteps = 20;
 constexpr double kFitQuality = 0.7;  // what fitting may bring better triangles down to
 constexpr double kMaxAngle = 91;     // degrees; goal of the final pass
@@ -82,13 +83,18 @@ class Pipeline {
   Pipeline(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context)
       : surface_(backend.surface()), plan_(plan), curves_(features, surface_.mesh.vertices),
         measure_(surface_, curves_), trace_(surface_, curves_),
-        wanted_(plan.seeds.empty() ? plan.vertices : plan.seeds.size()), run_(backend, curves_, context) {
+        wanted_(plan.seeds.empty() ? plan.vertices : plan.seeds.size()),
+        input_topology_(analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size())),
+        run_(backend, curves_, context) {
     step_.tolerance = plan.tolerance;
     step_.share = 0;
   }
 
   // Places seeds and optimises them.
   void place();
+  // The same for seeds that a run for another density on the same surface has placed: on the finest level alone.
+  void place_again(const PlacedSeeds& earlier);
+  const PlacedSeeds& seeds() const { return run_.seeds; }
   // Where cells are still no disks then, and how long edges should be there. Empty if topology is not enforced, or if
   // so many cells fail that the seeds are too few.
   SizeBounds crowded();
@@ -113,7 +119,8 @@ class Pipeline {
   std::vector<std::size_t> choose_levels() const;
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
-  void optimise_levels();
+  void begin();
+  void optimise_levels(const std::vector<std::size_t>& counts, std::size_t levels);
   bool can_localise() const;
   bool dual_suffices();
   bool free_tips();
@@ -132,6 +139,7 @@ class Pipeline {
   const CurveMeasure measure_;
   const FeatureTrace trace_;
   const std::size_t wanted_;
+  const MeshTopology input_topology_;
   // Not where seeds were given, which are the start of as many as the surface needs.
   bool localises_ = false;
   CvtRun run_;
@@ -145,7 +153,7 @@ class Pipeline {
 std::vector<std::size_t> Pipeline::choose_levels() const {
   if (!plan_.seeds.empty()) return {wanted_};
   std::vector<std::size_t> counts =
-      level_counts(wanted_, result_.input_topology.euler, result_.input_topology.components, plan_.levels);
+      level_counts(wanted_, input_topology_.euler, input_topology_.components, plan_.levels);
   const auto crowded = [&](std::size_t count) {
     return 2 * seeds_on_features(curves_, measure_, measure_.scale(count)).size() > count;
   };
@@ -171,23 +179,16 @@ void Pipeline::to_next_level(std::size_t count) {
   meet_count(run_, count);
 }
 
-void Pipeline::optimise_levels() {
-  const std::vector<std::size_t> counts = choose_levels();
-  if (!plan_.places.empty()) {
-    run_.seeds = PlacedSeeds(plan_.seeds, plan_.places);
-  } else {
-    run_.seeds =
-        PlacedSeeds(plan_.seeds.empty() ? initial_seeds(surface_, counts.front(), plan_.random_seed) : plan_.seeds);
-    place_on_features(counts.front());
-  }
-
+// With seeds for the first of these levels, which are the last of so many.
+void Pipeline::optimise_levels(const std::vector<std::size_t>& counts, std::size_t levels) {
+  const std::size_t skipped = levels - counts.size();
   // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
   double total = plan_.constrained ? kConstrainedShare * cost(counts.back()) : 0;
   for (std::size_t level = 0; level < counts.size(); ++level)
-    total += steps_share(level, counts.size()) * cost(counts[level]);
+    total += steps_share(skipped + level, levels) * cost(counts[level]);
   for (std::size_t level = 0; level < counts.size(); ++level) {
     step_.phase = counts.size() > 1 ? fmt::format("level {}/{}", level + 1, counts.size()) : "optimising";
-    const double share = steps_share(level, counts.size());
+    const double share = steps_share(skipped + level, levels);
     step_.done += std::exchange(step_.share, share * cost(counts[level]) / total);
     const int steps = share_of(plan_.iterations, share);
     const bool may_localise = level + 1 == counts.size() && can_localise();
@@ -216,14 +217,14 @@ void Pipeline::optimise_levels() {
 
 // Whether diagrams may be localised while seeds move far. Where sheets touch or are joined to more than one, the seeds
 // of each have to keep away from the curves of the others.
-bool Pipeline::can_localise() const { return localises_ && plan_.constrained && result_.input_topology.manifold; }
+bool Pipeline::can_localise() const { return localises_ && plan_.constrained && input_topology_.manifold; }
 
 // Folds of a rough surface give cells pieces that leave no trace in the dual.
 bool Pipeline::dual_suffices() {
   if (plan_.constrained) return false;
   std::vector<Triangle> dual = run_.diagram(Want::polygons | Want::dual).dual.triangles;
   orient(dual, run_.seeds.size());
-  return same_topology(analyse_topology(dual, run_.seeds.size()), result_.input_topology);
+  return same_topology(analyse_topology(dual, run_.seeds.size()), input_topology_);
 }
 
 // Seeds at tips where topology fails are no longer held there: two cells may wrap around a tip that is thin. True if
@@ -264,7 +265,7 @@ void Pipeline::mend_features_and_topology() {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
-    topology_ = enforce_topology(run_, trace_, result_.input_topology, step_);
+    topology_ = enforce_topology(run_, trace_, input_topology_, step_);
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
       step_.iterations = kFreedSteps;
       optimise(run_, step_);
@@ -327,7 +328,7 @@ void Pipeline::extract() {
   const Divided divided = divide_sheets();
   const Dual dual = divided.polygons ? extract_dual(*divided.polygons) : diagram.dual;
   result_.mesh = dual_mesh(divided.vertices, dual);
-  if (result_.input_topology.oriented) orient(result_.mesh.triangles, result_.mesh.vertices.size());
+  if (input_topology_.oriented) orient(result_.mesh.triangles, result_.mesh.vertices.size());
   const std::vector<Index> vertex_of = dual_vertices(dual, divided.vertices.size());
   result_.places.resize(result_.mesh.vertices.size());
   for (Index i = 0; i < run_.seeds.size(); ++i)
@@ -336,7 +337,7 @@ void Pipeline::extract() {
     for (Index t : dual.mesh_triangle) result_.mesh.labels.push_back(surface_.mesh.labels[t]);
   extract_features(vertex_of);
   result_.topology = analyse_topology(result_.mesh.triangles, result_.mesh.vertices.size());
-  result_.topology_matches = same_topology(result_.topology, result_.input_topology);
+  result_.topology_matches = same_topology(result_.topology, input_topology_);
   result_.ball_property = divided.ball.holds;
   result_.divided = divided.vertices.size() - run_.seeds.size();
   result_.faults = topology_faults(divided.ball, divided.vertices);
@@ -358,16 +359,38 @@ void Pipeline::fit() {
   result_.seconds.fit += watch.seconds();
 }
 
-void Pipeline::place() {
+void Pipeline::begin() {
   result_.wanted = wanted_;
-  result_.input_topology = analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size());
+  result_.input_topology = input_topology_;
   localises_ = plan_.topology != TopologyControl::off && (plan_.seeds.empty() || !plan_.places.empty());
-  optimise_levels();
+}
+
+void Pipeline::place() {
+  begin();
+  const std::vector<std::size_t> counts = choose_levels();
+  if (!plan_.places.empty()) {
+    run_.seeds = PlacedSeeds(plan_.seeds, plan_.places);
+  } else {
+    run_.seeds =
+        PlacedSeeds(plan_.seeds.empty() ? initial_seeds(surface_, counts.front(), plan_.random_seed) : plan_.seeds);
+    place_on_features(counts.front());
+  }
+  optimise_levels(counts, counts.size());
+}
+
+void Pipeline::place_again(const PlacedSeeds& earlier) {
+  begin();
+  run_.seeds = seeds_on_features(curves_, measure_, measure_.scale(wanted_));
+  for (std::size_t i = 0; i < earlier.size(); ++i)
+    if (earlier.on_surface(i)) run_.seeds.add(earlier.position(i));
+  meet_count(run_, wanted_);
+  follow_density(run_);
+  optimise_levels({wanted_}, 2);
 }
 
 SizeBounds Pipeline::crowded() {
   SizeBounds found;
-  const MeshTopology& input = result_.input_topology;
+  const MeshTopology& input = input_topology_;
   if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !input.manifold || !input.oriented)
     return found;
   run_.localise(localises_);
@@ -460,10 +483,12 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   double preparing = watch.seconds();
   // Once for cells that are no disks, and once for slivers and triangles that cross, the run starts again with shorter
   // edges there.
-  bool may_shorten = options.seeds.empty() && options.detail != DetailMode::off, may_refine = may_shorten;
+  bool may_shorten = options.seeds.empty() && options.detail != DetailMode::off;
+  int refinements = may_shorten ? kRefinements : 0;
   Spent before;
   RunProgress progress(context);
   std::optional<JudgedResult> best;
+  std::optional<PlacedSeeds> earlier;
   std::optional<bool> input_crosses;
   for (;;) {
     const Stopwatch laying_down;
@@ -476,11 +501,13 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     const std::unique_ptr<Backend> backend = compute.backend(surface);
     Pipeline pipeline(*backend, prepared.features, plan, progress.context());
     pipeline.count(before);
-    pipeline.place();
+    if (earlier) pipeline.place_again(*earlier);
+    else pipeline.place();
     if (std::exchange(may_shorten, false)) {
       const SizeBounds crowded = pipeline.crowded();
       if (!crowded.points.empty()) {
         preparation.bound(crowded);
+        earlier = pipeline.seeds();
         before = pipeline.spent();
         progress.start_again("shorter edges for topology");
         continue;
@@ -493,7 +520,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     before = {pipeline.spent().totals, result.seconds};
     Slivers slivers = find_slivers(result.mesh);
     JudgedResult judged{std::move(result)};
-    const bool last = !std::exchange(may_refine, false) || !plan.constrained || plan.min_angle == 0;
+    const bool last = refinements-- == 0 || !plan.constrained || plan.min_angle == 0;
     if (!last || best) {
       // Where the input crosses itself, smaller triangles do so in more pairs.
       const Crossings crossings = find_crossings(judged.result.mesh);
@@ -503,11 +530,20 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
         slivers.bounds.add(crossings.bounds);
       }
     }
-    const bool crosses = judged.crossings > 0;
-    if (!best || is_better(judged, *best)) best = std::move(judged);
-    if (!last && (slivers.worth_another_run || crosses)) {
+    const char* why = nullptr;
+    if (slivers.worth_another_run) why = "shorter edges for angles";
+    if (judged.crossings > 0) why = "shorter edges where it crosses";
+    if (!last && !judged.result.topology_matches) {
+      const SizeBounds torn = pipeline.crowded();
+      slivers.bounds.add(torn);
+      if (!torn.points.empty()) why = "shorter edges for topology";
+    }
+    const bool better = !best || is_better(judged, *best);
+    if (better) best = std::move(judged);
+    if (!last && better && why) {
       preparation.bound(slivers.bounds);
-      progress.start_again(slivers.worth_another_run ? "shorter edges for angles" : "shorter edges where it crosses");
+      earlier = pipeline.seeds();
+      progress.start_again(why);
       continue;
     }
     RemeshResult& chosen = best->result;

@@ -598,6 +598,47 @@ TEST(Multilevel, SetCountGetsFarByRepetition) {
   }
 }
 
+// Seeds that were optimised for one length, with another near a corner: their number there comes nearer to its share of
+// the integral of sqrt(rho), the energy falls, and as many are left in all.
+TEST(Multilevel, SeedsFollowAnotherDensity) {
+  const TriangleMesh mesh = grid_patch(16, 16);
+  const Surface uniform(mesh);
+  CpuBackend before(uniform, NeighbourSource::nearest);
+  FreeRun start(before, initial_seeds(uniform, 500, 3));
+  optimise(start.run, {});
+  for (const double least : {0.3, 0.5}) {
+    const auto length = [&](const Vec3& p) { return std::min(1.0, least + 0.1 * norm(p)); };
+    std::vector<double> density;
+    for (const Vec3& p : mesh.vertices) density.push_back(std::pow(length(p), -4));
+    double dense = 0, all = 0;
+    for (const Triangle& t : mesh.triangles) {
+      const Vec3 middle = (1.0 / 3) * (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]);
+      const double h = length(middle), share = 1 / (h * h);
+      all += share;
+      if (norm(middle) < 4) dense += share;
+    }
+    const Surface surface(mesh, density);
+    CpuBackend backend(surface, NeighbourSource::nearest);
+    FreeRun run(backend, start.seeds());
+    const auto count_dense = [&] {
+      return static_cast<double>(
+          std::count_if(run.seeds().begin(), run.seeds().end(), [](const Vec3& p) { return norm(p) < 4; }));
+    };
+    const double wanted = 500 * dense / all, given = count_dense();
+    ASSERT_GT(wanted, 1.4 * given);
+    const double energy = energy_at(backend, run.seeds());
+    follow_density(run.run);
+    EXPECT_LT(energy_at(backend, run.seeds()), 0.9 * energy) << least;
+    EXPECT_EQ(run.seeds().size(), 500u);
+    EXPECT_GT(count_dense(), given + 0.35 * (wanted - given)) << least;
+    EXPECT_LT(count_dense(), 1.2 * wanted) << least;
+  }
+  // Seeds that are spread as the density asks for stay where they are.
+  const std::vector<Vec3> spread = start.seeds();
+  follow_density(start.run);
+  EXPECT_TRUE(same_bits(start.seeds(), spread));
+}
+
 TEST(Multilevel, InitialSeedsLieOnTheSurfaceAndOnEveryComponent) {
   TriangleMesh mesh = two_spheres();
   const std::size_t half = mesh.vertices.size() / 2;
