@@ -24,7 +24,7 @@ constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
 constexpr double kWorthARound = 0.75;
 constexpr int kFirstSteps = 20, kLastSteps = 4;
 // Rounds of clearing curves at the end of a level, and steps after each.
-constexpr int kClearingRounds = 2, kClearingSteps = 15;
+constexpr int kClearingRounds = 2, kClearingSteps = 20;
 // Seeds that recovery may add, beside a quarter of those there are.
 constexpr std::size_t kMostAdded = 100;
 // Lengths of curve, in edges: what a cell must hold to be snapped to it; what is worth a seed, and in the last rounds;

@@ -98,6 +98,8 @@ class Pipeline {
   // Where cells are still no disks then, and how long edges should be there. Empty if topology is not enforced, or if
   // so many cells fail that the seeds are too few.
   SizeBounds crowded();
+  // After finish(), the curves that are no chains of edges, and how long edges should be along them.
+  SizeBounds broken_curves() const;
   Spent spent() const { return {run_.totals, result_.seconds}; }
   // Counts what earlier runs took.
   void count(const Spent& before) {
@@ -416,6 +418,20 @@ SizeBounds Pipeline::crowded() {
   return found;
 }
 
+SizeBounds Pipeline::broken_curves() const {
+  SizeBounds found;
+  if (features_.broken.size() * kTooManyFailures > curves_.size()) return found;
+  const double scale = measure_.scale(wanted_);
+  for (const Index c : features_.broken)
+    for (double at = 0; at <= curves_.length(c);) {
+      const double length = kShorter * measure_.edge_length(c, at, scale);
+      found.points.push_back(curves_.point(c, at));
+      found.lengths.push_back(length);
+      at += length;
+    }
+  return found;
+}
+
 RemeshResult Pipeline::finish() {
   mend_features_and_topology();
   if (run_.has_features()) complete(run_, plan_.constrained);
@@ -537,6 +553,11 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
       const SizeBounds torn = pipeline.crowded();
       slivers.bounds.add(torn);
       if (!torn.points.empty()) why = "shorter edges for topology";
+    }
+    if (!last && judged.result.features.broken > 0) {
+      const SizeBounds broken = pipeline.broken_curves();
+      slivers.bounds.add(broken);
+      if (!broken.points.empty()) why = "shorter edges for curves";
     }
     const bool better = !best || is_better(judged, *best);
     if (better) best = std::move(judged);
