@@ -43,7 +43,7 @@ constexpr int kMendingRounds = 3;  // of features and topology
 // A run starts again with edges shorter by this where cells are no disks; not if more than one cell in so many is none.
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
-constexpr int kRefinements = 3;
+constexpr int kRefinements = 3;  // of a result, while that makes it better
 constexpr int kFreedSteps = 20;
 constexpr double kFitQuality = 0.7;  // what fitting may bring better triangles down to
 constexpr double kMaxAngle = 91;     // degrees; goal of the final pass
@@ -472,6 +472,45 @@ class RunProgress {
   double fraction_ = 0;
 };
 
+// Where triangles cross though the input's do not. Where those do, smaller ones cross in more pairs.
+class NewCrossings {
+ public:
+  explicit NewCrossings(const TriangleMesh& input) : input_(input) {}
+
+  Crossings of(const TriangleMesh& mesh) {
+    Crossings found = find_crossings(mesh);
+    if (found.pairs == 0) return found;
+    if (!std::exchange(knows_input_, true)) input_crosses_ = count_self_intersections(input_) > 0;
+    return input_crosses_ ? Crossings{} : found;
+  }
+
+ private:
+  const TriangleMesh& input_;
+  bool knows_input_ = false, input_crosses_ = false;
+};
+
+// Why a result is to be made once more, and how long edges should be there; null if it is not.
+struct AnotherRun {
+  const char* why = nullptr;
+  SizeBounds bounds;
+
+  void add(const char* reason, const SizeBounds& more) {
+    bounds.add(more);
+    if (!more.points.empty()) why = reason;
+  }
+};
+
+AnotherRun another_run(Pipeline& pipeline, const RemeshResult& result, const Crossings& crossings) {
+  AnotherRun next;
+  Slivers slivers = find_slivers(result.mesh);
+  if (slivers.worth_another_run) next.why = "shorter edges for angles";
+  next.bounds = std::move(slivers.bounds);
+  next.add("shorter edges where it crosses", crossings.bounds);
+  if (!result.topology_matches) next.add("shorter edges for topology", pipeline.crowded());
+  if (result.features.broken > 0) next.add("shorter edges for curves", pipeline.broken_curves());
+  return next;
+}
+
 }  // namespace
 
 RemeshPlan plan_of(const RemeshOptions& options) {
@@ -497,7 +536,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   Preparation preparation(input, options, context);
   Compute compute(options.compute, context);
   double preparing = watch.seconds();
-  // Once for cells that are no disks, and once for slivers and triangles that cross, the run starts again with shorter
+  // The run starts again once where cells are no disks, and some times for what is wrong with its result, with shorter
   // edges there.
   bool may_shorten = options.seeds.empty() && options.detail != DetailMode::off;
   int refinements = may_shorten ? kRefinements : 0;
@@ -505,7 +544,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   RunProgress progress(context);
   std::optional<JudgedResult> best;
   std::optional<PlacedSeeds> earlier;
-  std::optional<bool> input_crosses;
+  NewCrossings new_crossings(preparation.mesh());
   for (;;) {
     const Stopwatch laying_down;
     PreparedInput prepared = preparation.lay_down();
@@ -534,37 +573,20 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
     before = {pipeline.spent().totals, result.seconds};
-    Slivers slivers = find_slivers(result.mesh);
     JudgedResult judged{std::move(result)};
     const bool last = refinements-- == 0 || !plan.constrained || plan.min_angle == 0;
+    AnotherRun next;
     if (!last || best) {
-      // Where the input crosses itself, smaller triangles do so in more pairs.
-      const Crossings crossings = find_crossings(judged.result.mesh);
-      if (crossings.pairs > 0 && !input_crosses) input_crosses = count_self_intersections(preparation.mesh()) > 0;
-      if (crossings.pairs > 0 && !*input_crosses) {
-        judged.crossings = crossings.pairs;
-        slivers.bounds.add(crossings.bounds);
-      }
-    }
-    const char* why = nullptr;
-    if (slivers.worth_another_run) why = "shorter edges for angles";
-    if (judged.crossings > 0) why = "shorter edges where it crosses";
-    if (!last && !judged.result.topology_matches) {
-      const SizeBounds torn = pipeline.crowded();
-      slivers.bounds.add(torn);
-      if (!torn.points.empty()) why = "shorter edges for topology";
-    }
-    if (!last && judged.result.features.broken > 0) {
-      const SizeBounds broken = pipeline.broken_curves();
-      slivers.bounds.add(broken);
-      if (!broken.points.empty()) why = "shorter edges for curves";
+      const Crossings crossings = new_crossings.of(judged.result.mesh);
+      judged.crossings = crossings.pairs;
+      if (!last) next = another_run(pipeline, judged.result, crossings);
     }
     const bool better = !best || is_better(judged, *best);
     if (better) best = std::move(judged);
-    if (!last && better && why) {
-      preparation.bound(slivers.bounds);
+    if (better && next.why) {
+      preparation.bound(next.bounds);
       earlier = pipeline.seeds();
-      progress.start_again(why);
+      progress.start_again(next.why);
       continue;
     }
     RemeshResult& chosen = best->result;
