@@ -122,7 +122,7 @@ class Pipeline {
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
   void begin();
-  void optimise_levels(const std::vector<std::size_t>& counts, std::size_t levels);
+  void optimise_levels(const std::vector<std::size_t>& counts);
   bool can_localise() const;
   bool dual_suffices();
   bool free_tips();
@@ -181,16 +181,15 @@ void Pipeline::to_next_level(std::size_t count) {
   meet_count(run_, count);
 }
 
-// With seeds for the first of these levels, which are the last of so many.
-void Pipeline::optimise_levels(const std::vector<std::size_t>& counts, std::size_t levels) {
-  const std::size_t skipped = levels - counts.size();
+// With seeds for the first of these levels.
+void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
   // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
   double total = plan_.constrained ? kConstrainedShare * cost(counts.back()) : 0;
   for (std::size_t level = 0; level < counts.size(); ++level)
-    total += steps_share(skipped + level, levels) * cost(counts[level]);
+    total += steps_share(level, counts.size()) * cost(counts[level]);
   for (std::size_t level = 0; level < counts.size(); ++level) {
     step_.phase = counts.size() > 1 ? fmt::format("level {}/{}", level + 1, counts.size()) : "optimising";
-    const double share = steps_share(skipped + level, levels);
+    const double share = steps_share(level, counts.size());
     step_.done += std::exchange(step_.share, share * cost(counts[level]) / total);
     const int steps = share_of(plan_.iterations, share);
     const bool may_localise = level + 1 == counts.size() && can_localise();
@@ -377,7 +376,7 @@ void Pipeline::place() {
         PlacedSeeds(plan_.seeds.empty() ? initial_seeds(surface_, counts.front(), plan_.random_seed) : plan_.seeds);
     place_on_features(counts.front());
   }
-  optimise_levels(counts, counts.size());
+  optimise_levels(counts);
 }
 
 void Pipeline::place_again(const PlacedSeeds& earlier) {
@@ -387,7 +386,7 @@ void Pipeline::place_again(const PlacedSeeds& earlier) {
     if (earlier.on_surface(i)) run_.seeds.add(earlier.position(i));
   meet_count(run_, wanted_);
   follow_density(run_);
-  optimise_levels({wanted_}, 2);
+  optimise_levels({wanted_});
 }
 
 SizeBounds Pipeline::crowded() {
