@@ -502,6 +502,7 @@ struct AnotherRun {
 AnotherRun another_run(Pipeline& pipeline, const RemeshResult& result, const Crossings& crossings) {
   AnotherRun next;
   Slivers slivers = find_slivers(result.mesh);
+  if (slivers.hopeless) return next;
   if (slivers.worth_another_run) next.why = "shorter edges for angles";
   next.bounds = std::move(slivers.bounds);
   next.add("shorter edges where it crosses", crossings.bounds);

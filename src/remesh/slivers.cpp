@@ -51,7 +51,8 @@ Slivers find_slivers(const TriangleMesh& mesh) {
   }
   const double share =
       static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(mesh.triangles.size(), 1));
-  found.worth_another_run = (has_bad_one || share > kShare) && share < kHopeless;
+  found.hopeless = share >= kHopeless;
+  found.worth_another_run = (has_bad_one || share > kShare) && !found.hopeless;
   return found;
 }
 

@@ -10,6 +10,7 @@ struct Slivers {
   SizeBounds bounds;  // for better triangles in their places
   // More than a mesh has that anyone would call good, but so few that they are for the edge lengths.
   bool worth_another_run = false;
+  bool hopeless = false;  // so many that they have other reasons
 };
 
 // Of a result with its feature edges. An angle that two feature edges enclose does not count: what is acute stays so.
