@@ -119,6 +119,7 @@ void check_usage(const RemeshCommand& command, const Usage& usage) {
   if (usage.given("--seeds")) {
     for (const char* option : {"--edge-min", "--edge-max"})
       usage.refuse(option, "seeds from a file have their own number; leave one of the two out");
+    usage.refuse("--detail", "edges are as long as seeds from a file make them; leave one of the two out");
     if (command.options.levels > 1) throw CLI::ValidationError("--levels: seeds from a file imply one level");
   }
   const SizingOptions& sizing = command.options.sizing;

@@ -599,6 +599,7 @@ TEST_F(CliRemesh, OptionsThatContradictEachOther) {
   for (const char* option : {"--edge-min", "--edge-max"})
     refused({"--seeds", in("points.xyz"), "--density", "lfs", option, "0.1"}, option);
   refused({"--seeds", in("points.xyz"), "--random-seed", "2"}, "--random-seed");
+  refused({"--seeds", in("points.xyz"), "--detail", "off"}, "--detail");
   expect_failure(2, {"rvd", in("sphere.off"), "--seeds", in("points.xyz"), "--random-seed", "2"}, "--random-seed");
   refused({"-n", "100", "--density", "lfs", "--edge-min", "0.2", "--edge-max", "0.1"}, "--edge-min");
   refused({"--edge-length", "0.1", "--density", "lfs", "--edge-min", "0.2"}, "--edge-min");
