@@ -40,7 +40,8 @@ constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0
 constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
 constexpr int kMendingRounds = 3;  // of features and topology
-// A run starts again with edges shorter by this where cells are no disks; not if more than one cell in so many is none.
+// A run starts again with edges shorter by this where cells are no disks, or along broken curves; not if more than one
+// cell, or curve, in so many is such.
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
 constexpr int kRefinements = 3;  // of a result, while that makes it better
@@ -85,9 +86,12 @@ class Pipeline {
         measure_(surface_, curves_), trace_(surface_, curves_),
         wanted_(plan.seeds.empty() ? plan.vertices : plan.seeds.size()),
         input_topology_(analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size())),
+        localises_(plan.topology != TopologyControl::off && (plan.seeds.empty() || !plan.places.empty())),
         run_(backend, curves_, context) {
     step_.tolerance = plan.tolerance;
     step_.share = 0;
+    result_.wanted = wanted_;
+    result_.input_topology = input_topology_;
   }
 
   // Places seeds and optimises them.
@@ -121,7 +125,6 @@ class Pipeline {
   std::vector<std::size_t> choose_levels() const;
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
-  void begin();
   void optimise_levels(const std::vector<std::size_t>& counts);
   bool can_localise() const;
   bool dual_suffices();
@@ -142,8 +145,8 @@ class Pipeline {
   const FeatureTrace trace_;
   const std::size_t wanted_;
   const MeshTopology input_topology_;
-  // Not where seeds were given, which are the start of as many as the surface needs.
-  bool localises_ = false;
+  // Not where seeds were given without places: they are the start of as many as the surface needs.
+  const bool localises_;
   CvtRun run_;
   OptimiseOptions step_;
   FeatureReport features_;
@@ -360,14 +363,7 @@ void Pipeline::fit() {
   result_.seconds.fit += watch.seconds();
 }
 
-void Pipeline::begin() {
-  result_.wanted = wanted_;
-  result_.input_topology = input_topology_;
-  localises_ = plan_.topology != TopologyControl::off && (plan_.seeds.empty() || !plan_.places.empty());
-}
-
 void Pipeline::place() {
-  begin();
   const std::vector<std::size_t> counts = choose_levels();
   if (!plan_.places.empty()) {
     run_.seeds = PlacedSeeds(plan_.seeds, plan_.places);
@@ -380,7 +376,6 @@ void Pipeline::place() {
 }
 
 void Pipeline::place_again(const PlacedSeeds& earlier) {
-  begin();
   run_.seeds = seeds_on_features(curves_, measure_, measure_.scale(wanted_));
   for (std::size_t i = 0; i < earlier.size(); ++i)
     if (earlier.on_surface(i)) run_.seeds.add(earlier.position(i));
@@ -488,7 +483,7 @@ class NewCrossings {
   bool knows_input_ = false, input_crosses_ = false;
 };
 
-// Why a result is to be made once more, and how long edges should be there; null if it is not.
+// Why a result is to be made once more, or null, and how long edges should be where it is not good.
 struct AnotherRun {
   const char* why = nullptr;
   SizeBounds bounds;
@@ -499,12 +494,13 @@ struct AnotherRun {
   }
 };
 
-AnotherRun another_run(Pipeline& pipeline, const RemeshResult& result, const Crossings& crossings) {
+// `judged` is what the pipeline finished with.
+AnotherRun another_run(Pipeline& pipeline, const JudgedResult& judged, const Crossings& crossings) {
+  const RemeshResult& result = judged.result;
   AnotherRun next;
-  Slivers slivers = find_slivers(result.mesh);
-  if (slivers.hopeless) return next;
-  if (slivers.worth_another_run) next.why = "shorter edges for angles";
-  next.bounds = std::move(slivers.bounds);
+  if (judged.slivers.hopeless) return next;
+  if (judged.slivers.worth_another_run) next.why = "shorter edges for angles";
+  next.bounds = judged.slivers.bounds;
   next.add("shorter edges where it crosses", crossings.bounds);
   if (!result.topology_matches) next.add("shorter edges for topology", pipeline.crowded());
   if (result.features.broken > 0) next.add("shorter edges for curves", pipeline.broken_curves());
@@ -573,31 +569,27 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
     before = {pipeline.spent().totals, result.seconds};
-    JudgedResult judged{std::move(result)};
+    JudgedResult judged = judge(std::move(result));
     const bool last = refinements-- == 0 || !plan.constrained || plan.min_angle == 0;
-    AnotherRun next;
-    if (!last || best) {
-      const Crossings crossings = new_crossings.of(judged.result.mesh);
-      judged.crossings = crossings.pairs;
-      if (!last) next = another_run(pipeline, judged.result, crossings);
-    }
-    const bool better = !best || is_better(judged, *best);
-    if (better) best = std::move(judged);
-    if (better && next.why) {
-      preparation.bound(next.bounds);
-      earlier = pipeline.seeds();
-      progress.start_again(next.why);
-      continue;
-    }
-    RemeshResult& chosen = best->result;
-    chosen.iterations = before.totals.iterations;
-    chosen.evaluations = before.totals.evaluations;
-    chosen.seconds = before.seconds;
-    chosen.seconds.prepare = preparing;
-    chosen.seconds.total = watch.seconds();
-    chosen.welded = preparation.welded();
-    return std::move(chosen);
+    const Crossings crossings = last && !best ? Crossings{} : new_crossings.of(judged.result.mesh);
+    judged.crossings = crossings.pairs;
+    if (best && !is_better(judged, *best)) break;
+    best = std::move(judged);
+    if (last) break;
+    const AnotherRun next = another_run(pipeline, *best, crossings);
+    if (!next.why) break;
+    preparation.bound(next.bounds);
+    earlier = pipeline.seeds();
+    progress.start_again(next.why);
   }
+  RemeshResult& chosen = best->result;
+  chosen.iterations = before.totals.iterations;
+  chosen.evaluations = before.totals.evaluations;
+  chosen.seconds = before.seconds;
+  chosen.seconds.prepare = preparing;
+  chosen.seconds.total = watch.seconds();
+  chosen.welded = preparation.welded();
+  return std::move(chosen);
 }
 
 RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "bisector/quality.h"
@@ -77,10 +78,15 @@ Crossings find_crossings(const TriangleMesh& mesh) {
   return found;
 }
 
+JudgedResult judge(RemeshResult result) {
+  Slivers slivers = find_slivers(result.mesh);
+  return {std::move(result), std::move(slivers)};
+}
+
 bool is_better(const JudgedResult& judged, const JudgedResult& than) {
   const auto rank = [](const JudgedResult& j) {
     const RemeshResult& r = j.result;
-    return std::tuple(!r.topology_matches, r.features.broken, j.crossings, find_slivers(r.mesh).bounds.points.size());
+    return std::tuple(!r.topology_matches, r.features.broken, j.crossings, j.slivers.bounds.points.size());
   };
   return rank(judged) < rank(than);
 }

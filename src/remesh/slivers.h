@@ -23,12 +23,16 @@ struct Crossings {
 };
 Crossings find_crossings(const TriangleMesh& mesh);
 
-// Whether a run is to be preferred to another on the same input: for its topology, then for the curves it keeps, then
-// for fewer pairs of triangles that cross though the input's do not, then for fewer slivers.
 struct JudgedResult {
   RemeshResult result;
+  Slivers slivers;
   std::size_t crossings = 0;  // 0 as well if the input crosses itself
 };
+// With its slivers.
+JudgedResult judge(RemeshResult result);
+
+// Whether a run is to be preferred to another on the same input: for its topology, then for the curves it keeps, then
+// for fewer pairs of triangles that cross though the input's do not, then for fewer slivers.
 bool is_better(const JudgedResult& judged, const JudgedResult& than);
 
 }  // namespace bisector

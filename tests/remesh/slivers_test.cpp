@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "support/models.h"
 
@@ -57,11 +58,14 @@ TEST(Slivers, AskForEdgesAsShortAsTheirHeight) {
 }
 
 TEST(Slivers, DecideAfterTopologyCurvesAndCrossings) {
-  JudgedResult good;
-  good.result.mesh = acute(60);
-  good.result.topology_matches = true;
-  JudgedResult poor = good, crossing = good, broken = good, torn = good;
-  poor.result.mesh = acute(20);
+  const auto judged = [](double degrees) {
+    RemeshResult result;
+    result.mesh = acute(degrees);
+    result.topology_matches = true;
+    return judge(std::move(result));
+  };
+  const JudgedResult good = judged(60), poor = judged(20);
+  JudgedResult crossing = good, broken = good, torn = good;
   crossing.crossings = 1;
   broken.result.features.broken = 1;
   torn.result.topology_matches = false;
