@@ -29,6 +29,7 @@ constexpr double kPerVolume = 2 * 0.9235 * 0.9235 * 0.9235;
 // is outside.
 constexpr double kPerArea = 1 / std::numbers::sqrt3;
 constexpr double kMostVertices = 1e8;         // that may be asked for
+constexpr double kMostFactor = 2;             // of lengths beside a bound, in lengths without
 constexpr double kLongest = 2;                // lengths h at an edge's end, beyond which the edge is bisected
 constexpr double kReach = 0.87;               // of a tetrahedron from the middle of its longest edge, by that
 constexpr std::size_t kMostTets = 2'000'000;  // unless the input has more
@@ -463,7 +464,7 @@ double estimate_tet_vertices(double volume, double area, double h) {
 }
 
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
-                            const SizingTarget& target, const SizeField* bound, double longer) {
+                            const SizingTarget& target, const SizeField* bound, bool more_vertices) {
   check(mesh, options, target);
   SizedSolid sized;
   sized.mesh = mesh;
@@ -479,7 +480,7 @@ SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, c
     ScaledField unbounded(samples, options.field, sized.edge_length, nullptr);
     calibrate(Extent(mesh, boundary), mesh, boundary, target, unbounded, most, factor);
   }
-  if (bound) most = longer * factor;
+  if (bound) most = more_vertices ? factor : kMostFactor * factor;
   ScaledField field(samples, options.field, sized.edge_length, bound);
   const std::size_t limit = std::max(kMostTets, mesh.tets.size());
   for (int round = 0;; ++round) {
@@ -488,7 +489,7 @@ SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, c
     sized.lengths = calibrate(extent, sized.mesh, surface, target, field, most, factor);
     const TetEstimate e = estimate(extent, sized.mesh, surface, sized.lengths);
     sized.edge_length = e.mean_edge;
-    if (target.vertices == 0 || (bound && longer == 1))
+    if (target.vertices == 0 || more_vertices)
       sized.vertices = std::max(target.vertices, static_cast<std::size_t>(std::llround(e.vertices)));
     if (round == kRounds || !Refiner(sized, surface, field, sized.lengths).run(limit)) break;
   }

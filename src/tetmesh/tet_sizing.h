@@ -36,9 +36,9 @@ double estimate_tet_vertices(double volume, double area, double h);
 // eight times as many tetrahedra. A uniform size bisects nothing, nor does a bound where it does not reach.
 // `target.vertices` is of the whole mesh. Stops at 2 million tetrahedra or the input's number, if that is larger.
 // `boundary` is the mesh's, on the same vertices. `bound`, in the mesh's unit, is what edges should not be longer than;
-// the others become at most `longer` times as long for it, and where that does not meet the number aimed at, the result
-// has more vertices if `longer` is 1. Throws Error as refine_for_density does.
+// the others become at most twice as long for it. With `more_vertices` they stay as they are, and the result has as
+// many vertices as that takes. Throws Error as refine_for_density does.
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
-                            const SizingTarget& target, const SizeField* bound = nullptr, double longer = 2);
+                            const SizingTarget& target, const SizeField* bound = nullptr, bool more_vertices = false);
 
 }  // namespace bisector

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -11,7 +10,6 @@
 
 #include "bisector/error.h"
 #include "compute/compute.h"
-#include "core/degenerate.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "features/size_field.h"
@@ -35,10 +33,9 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kFewest = 8;       // vertices or seeds that a result can be made of
-constexpr double kLongerForDetails = 2;  // become the other edges at most, by this factor
-constexpr double kEnough = 0.97;         // of the sites wanted; with fewer the boundary takes more
-constexpr double kGoalBeyond = 5;        // degrees: aiming a little higher than asked for raises the mean as well
+constexpr std::size_t kFewest = 8;  // vertices or seeds that a result can be made of
+constexpr double kEnough = 0.97;    // of the sites wanted; with fewer the boundary takes more
+constexpr double kGoalBeyond = 5;   // degrees: aiming a little higher than asked for raises the mean as well
 // Fractions of the whole run, about, for progress.
 constexpr double kPlaced = 0.82, kExtracted = 0.85;
 
@@ -238,8 +235,7 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
   const BoundaryDetail detail = plan_boundary(surface, sized, options);
   const SizeField* bound = detail.bound ? &*detail.bound : nullptr;
-  const double longer = options.detail == DetailMode::all ? 1 : kLongerForDetails;
-  if (bound) sized = refine_for_sizes(mesh, surface, options.sizing, target, bound, longer);
+  if (bound) sized = refine_for_sizes(mesh, surface, options.sizing, target, bound, options.detail == DetailMode::all);
   if (sized.vertices < kFewest)
     throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones",
                             options.edge_length, sized.vertices, kFewest));

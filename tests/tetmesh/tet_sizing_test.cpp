@@ -101,7 +101,7 @@ TEST(TetSizing, VerticesGrowWhereOtherEdgesMayNotBecomeLonger) {
   target.vertices = 5000;
   const SizedSolid plain = refine_for_sizes(box, surface_of(box), {}, target);
   const SizeField bound({{0, 0, 0}}, {0.2 * plain.edge_length}, 0.2);
-  const SizedSolid sized = refine_for_sizes(box, surface_of(box), {}, target, &bound, 1);
+  const SizedSolid sized = refine_for_sizes(box, surface_of(box), {}, target, &bound, true);
   EXPECT_GT(sized.vertices, 5000u);
   EXPECT_NEAR(*std::max_element(sized.lengths.begin(), sized.lengths.end()), plain.edge_length, 1e-9);
 }
