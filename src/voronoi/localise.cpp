@@ -90,7 +90,7 @@ class Regions {
     of_.assign(slots, kNone);
     links_.clear();
   }
-  // Adds a region with these seeds around it, ascending.
+  // Adds a region with these seeds around it.
   Index add(std::vector<Index> slots) {
     const auto region = static_cast<Index>(around_.size());
     for (const Index slot : slots) {
@@ -132,6 +132,7 @@ class Admitted : public SlotFilter {
 struct Scratch {
   std::vector<Index> place;  // of triangles in the list of one cell; anything for others
   std::vector<Index> labels, met;
+  std::vector<std::pair<double, Index>> candidates;  // squared distance and index of a seed
   std::vector<std::size_t> order;
   RestrictedPolygons found;
 };
@@ -527,10 +528,12 @@ void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons&
     if (!contains(met, slot) && regions.admits(these, slot)) met.push_back(slot);
   };
   for (const Index slot : these.own) meet(slot);
-  if (met.empty()) {
+  const bool search = met.empty();
+  if (search) {
     // The seed nearest to a point of the triangle has a cell on it.
     const Vec3& q = surface.mesh.vertices[surface.mesh.triangles[triangle][0]];
-    std::vector<std::pair<double, Index>> candidates;
+    std::vector<std::pair<double, Index>>& candidates = scratch.candidates;
+    candidates.clear();
     for (const Index region : these.regions)
       for (const Index slot : regions.around(region))
         if (!contains(these.left_out, slot)) candidates.push_back({norm2(seeds.x[slot] - q), seeds.id[slot]});
@@ -547,7 +550,8 @@ void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons&
   found.labels.clear();
   found.vertices.clear();
   for (std::size_t k = 0; k < met.size(); ++k) {
-    if (!clipper.clip(neighbours, met[k])) continue;
+    const bool clipped_already = search && k == 0;
+    if (!clipped_already && !clipper.clip(neighbours, met[k])) continue;
     append_polygon(clipper, seeds, triangle, met[k], found);
     for (std::size_t e = 0; e < clipper.size(); ++e)
       if (!is_edge(clipper.label(e))) meet(clipper.label(e));
@@ -690,9 +694,8 @@ std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& d
     if (triangles.empty() || divided > kDivisions * surface.facets.size()) break;
     find_strays(clip_anew(triangles));
   }
-  const Triangles changed = among.items;
   // What else is torn then lies beside what is clipped anew.
-  for (Triangles torn = put_back_torn(changed); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);
+  for (Triangles torn = put_back_torn(among.items); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);
   if (clipped.items.empty()) return 0;
   sum(diagram);
   diagram.polygons = splice();
