@@ -182,6 +182,21 @@ TEST(TetrahedraliseDetails, AreMergedOrGetShorterEdges) {
   }
 }
 
+// Along acute edges the seeds of both sides tear each other's cells on the boundary, unless these are localised.
+TEST(TetrahedraliseDetails, AcuteEdgesLeaveTheBoundaryEven) {
+  TriangleMesh acute;
+  acute.vertices = {{0, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}};
+  acute.triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {0, 2, 3}};
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    TetOptions options = options_for(600);
+    options.random_seed = seed;
+    const TetResult result = tetrahedralise(acute, options);
+    EXPECT_TRUE(result.boundary.ball_property);
+    EXPECT_GT(measure_tet_quality(result.mesh).dihedral_min, 25) << seed;
+    EXPECT_NEAR(static_cast<double>(result.mesh.vertices.size()), 600, 6) << seed;
+  }
+}
+
 TEST(TetrahedraliseAgain, GivesTheSameWithAnyThreadsAndNeighbours) {
   const TetMesh solid = tet_box(3);
   TetOptions options = options_for(400);
