@@ -76,8 +76,9 @@ struct RemeshOptions {
   TopologyControl topology = TopologyControl::enforce;
   double min_angle = 40;  // degrees; goal of the final pass (improve.h), 0: none
   bool fit = false;       // move the result's vertices off the surface, nearer to it on both sides (fit.h)
-  // Length within which borders are joined (weld.h). Without a value vertices of borders at the same point are joined,
-  // if that closes borders and makes no edge non-manifold.
+  // Length within which borders are joined (weld()). Without a value 0, 1e-7, 1e-6 and 1e-5 of the bounding box's
+  // diagonal are tried, for files round their coordinates: the first that leaves fewest border and non-manifold edges
+  // is taken, if it leaves more of neither.
   std::optional<double> weld;
   ComputeOptions compute;
   unsigned threads = 0;  // 0: all cores

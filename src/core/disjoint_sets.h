@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <numeric>
 #include <vector>
 
 namespace bisector {
@@ -12,7 +11,9 @@ namespace bisector {
 template <class I = std::size_t>
 class DisjointSets {
  public:
-  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), I{0}); }
+  explicit DisjointSets(std::size_t n) : parent_(n) {
+    for (std::size_t i = 0; i < n; ++i) parent_[i] = static_cast<I>(i);
+  }
 
   // The lowest item of the set that i is in.
   I root(I i) {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <set>
-#include <unordered_map>
 #include <utility>
 
 #include "bisector/quality.h"
@@ -136,51 +134,6 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
   }
   topology.euler = vertices - static_cast<long long>(table.edges.size()) + static_cast<long long>(triangles.size());
   return topology;
-}
-
-std::vector<Index> split_fans(TriangleMesh& mesh) {
-  const std::size_t count = mesh.vertices.size();
-  std::vector<Index> original(count);
-  std::iota(original.begin(), original.end(), Index{0});
-  const EdgeTable table = edge_table(mesh.triangles, count);
-  DisjointSets<> fans(3 * mesh.triangles.size());
-  for (std::size_t e = 0; e < table.edges.size(); ++e) join_fans(mesh.triangles, table, e, fans);
-  constexpr std::size_t kUnseen = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> first(count, kUnseen);  // fan of each vertex
-  std::unordered_map<std::size_t, Index> copies;   // of the other fans
-  const std::vector<Triangle> before = mesh.triangles;
-  for (std::size_t corner = 0; corner < 3 * before.size(); ++corner) {
-    const Index v = origin(before, corner);
-    const std::size_t fan = fans.root(corner);
-    if (first[v] == kUnseen) first[v] = fan;
-    if (first[v] == fan) continue;
-    const auto [copy, is_new] = copies.try_emplace(fan, static_cast<Index>(mesh.vertices.size()));
-    if (is_new) {
-      mesh.vertices.push_back(Vec3(mesh.vertices[v]));
-      original.push_back(v);
-    }
-    mesh.triangles[corner / 3][corner % 3] = copy->second;
-  }
-  mesh.feature_edges = edges_after_split(mesh, original, mesh.feature_edges);
-  return original;
-}
-
-std::vector<std::array<Index, 2>> edges_after_split(const TriangleMesh& mesh, const std::vector<Index>& original,
-                                                    const std::vector<std::array<Index, 2>>& edges) {
-  const auto ascending = [](Index a, Index b) { return std::array<Index, 2>{std::min(a, b), std::max(a, b)}; };
-  std::set<std::array<Index, 2>> named, met, found;
-  for (const auto& [a, b] : edges) named.insert(ascending(a, b));
-  for (const Triangle& t : mesh.triangles)
-    for (std::size_t k = 0; k < 3 && !named.empty(); ++k) {
-      const Index a = t[k], b = t[(k + 1) % 3];
-      const std::array<Index, 2> before = ascending(original[a], original[b]);
-      if (!named.contains(before)) continue;
-      met.insert(before);
-      found.insert(ascending(a, b));
-    }
-  for (const auto& edge : named)
-    if (!met.contains(edge)) found.insert(edge);
-  return {found.begin(), found.end()};
 }
 
 std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count) {

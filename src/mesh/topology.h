@@ -23,13 +23,6 @@ Csr<Index> vertex_neighbours(const std::vector<Triangle>& triangles, std::size_t
 // first.
 std::array<bool, 3> edges_among(const Triangle& t, const std::vector<std::array<Index, 2>>& edges);
 
-// Where fans of triangles touch in a vertex that they share no edge at, gives each but the first a copy of that vertex.
-// Feature edges are renamed with their triangles. Returns the vertex that each was, old ones being what they were.
-std::vector<Index> split_fans(TriangleMesh& mesh);
-// The edges of a mesh whose ends were these, `original` being what split_fans gave, and those that are no edges of it.
-std::vector<std::array<Index, 2>> edges_after_split(const TriangleMesh& mesh, const std::vector<Index>& original,
-                                                    const std::vector<std::array<Index, 2>>& edges);
-
 // The component of each vertex, connected through triangles, numbered from 0 by lowest vertex; kNone for vertices that
 // no triangle uses.
 std::vector<Index> label_components(const std::vector<Triangle>& triangles, std::size_t vertex_count);

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "bisector/error.h"
@@ -12,7 +12,7 @@
 #include "bisector/repair.h"
 #include "core/geometry.h"
 #include "features/normals.h"
-#include "mesh/topology.h"
+#include "mesh/touching.h"
 #include "remesh/detail.h"
 #include "remesh/sizing.h"
 
@@ -25,6 +25,8 @@ constexpr std::size_t kLeastForDensity = 3000;
 constexpr std::size_t kMostVertices = 100'000'000;
 // Of the diagonal: how far vertices are moved that would be at the same point.
 constexpr double kApart = 1e-7;
+// Of the diagonal: how far apart rounding leaves points that were one, from none to files of six digits.
+constexpr double kRoundings[] = {0, 1e-7, 1e-6, 1e-5};
 
 std::size_t non_manifold_edges(const TriangleMesh& mesh) {
   return analyse_topology(mesh.triangles, mesh.vertices.size()).non_manifold_edges;
@@ -88,22 +90,43 @@ void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
       mesh.vertices[v] += (step / length) * inwards[v];
 }
 
-// Where the surface touches itself in points alone, it is meshed as if it did not: it is a manifold then. Returns the
-// vertex of each that it was before.
-std::vector<Index> split_fans_with_warning(TriangleMesh& mesh, const Context& context) {
-  const MeshTopology topology = analyse_topology(mesh.triangles, mesh.vertices.size());
-  const std::size_t points = topology.non_manifold_vertices;
-  if (points > 0 && topology.non_manifold_edges == 0) {
+// Where parts of the surface touch in points, or solids along edges, they are meshed as if they did not: the surface is
+// a manifold then.
+class Separation {
+ public:
+  Separation(TriangleMesh& mesh, const Context& context)
+      : given_(mesh.vertices.size()), halved_(halve_touching_edges(mesh)), vertices_(mesh.vertices.size()) {
+    const std::vector<Triangle> before = mesh.triangles;
+    const MeshTopology touching = analyse_topology(before, vertices_);
+    original_ = separate_touching(mesh);
+    if (original_.size() == vertices_) return;
+    part_fans(mesh, original_);
+    const std::size_t edges = touching.non_manifold_edges - non_manifold_edges(mesh);
+    std::vector<std::string> where;
+    if (touching.non_manifold_vertices > 0) where.push_back("in " + plural(touching.non_manifold_vertices, "point"));
+    if (edges > 0) where.push_back("along " + plural(edges, "edge"));
     context.warn(
-        fmt::format("parts of the surface touch in {}; they are meshed as if they did not", plural(points, "point")));
-    std::vector<Index> original = split_fans(mesh);
-    part_fans(mesh, original);
-    return original;
+        fmt::format("parts of the surface touch {}; they are meshed as if they did not", fmt::join(where, " and ")));
   }
-  std::vector<Index> same(mesh.vertices.size());
-  std::iota(same.begin(), same.end(), Index{0});
-  return same;
-}
+
+  std::vector<std::array<Index, 2>> edges(const TriangleMesh& mesh,
+                                          const std::vector<std::array<Index, 2>>& given) const {
+    if (mesh.vertices.size() == given_) return given;
+    return edges_after_separating(mesh, original_, edges_after_halving(given, halved_, vertices_));
+  }
+  // Of each vertex, from those that were given.
+  std::vector<double> values(std::vector<double> given) const {
+    for (const auto& [a, b] : halved_) given.push_back(0.5 * (given[a] + given[b]));
+    for (std::size_t v = vertices_; v < original_.size(); ++v) given.push_back(double{given[original_[v]]});
+    return given;
+  }
+
+ private:
+  std::size_t given_;
+  std::vector<std::array<Index, 2>> halved_;
+  std::size_t vertices_;
+  std::vector<Index> original_;
+};
 
 SizingTarget target_of(const RemeshOptions& options) {
   if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
@@ -116,11 +139,21 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   if (tolerance) return weld(input, *tolerance);
   const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
   if (topology.boundary_edges + topology.non_manifold_edges == 0) return keep_apart(input, 0);
-  WeldResult welded = weld(input, 0);
-  const std::size_t borders = welded.border_after, non_manifold = non_manifold_edges(welded.mesh);
-  const bool useful = borders <= topology.boundary_edges && non_manifold <= topology.non_manifold_edges &&
-                      borders + non_manifold < topology.boundary_edges + topology.non_manifold_edges;
-  return useful ? welded : keep_apart(input, topology.boundary_edges);
+  WeldResult best = keep_apart(input, topology.boundary_edges);
+  std::size_t borders = topology.boundary_edges, non_manifold = topology.non_manifold_edges;
+  const double diagonal = bounding_box(input.vertices).diagonal();
+  for (const double rounding : kRoundings) {
+    if (borders + non_manifold == 0) break;
+    WeldResult welded = weld(input, rounding * diagonal);
+    const std::size_t borders_now = welded.border_after, non_manifold_now = non_manifold_edges(welded.mesh);
+    if (borders_now > borders || non_manifold_now > non_manifold ||
+        borders_now + non_manifold_now == borders + non_manifold)
+      continue;
+    best = std::move(welded);
+    borders = borders_now;
+    non_manifold = non_manifold_now;
+  }
+  return best;
 }
 
 Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options, const Context& context)
@@ -139,8 +172,8 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
     b = vertex_of[b];
   }
   std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
-  const std::vector<Index> before = split_fans_with_warning(mesh_, context);
-  if (before.size() > vertices) features.given = edges_after_split(mesh_, before, features.given);
+  const Separation separation(mesh_, context);
+  features.given = separation.edges(mesh_, features.given);
   if (options.energy == Energy::automatic) find_noise(features);
   features_ = detect_features(mesh_, features);
 
@@ -150,8 +183,7 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
                               sizing_.attribute.size(), input.vertices.size()));
     std::vector<double> values(vertices);
     for (std::size_t v = input.vertices.size(); v-- > 0;) values[vertex_of[v]] = sizing_.attribute[v];
-    for (std::size_t v = vertices; v < before.size(); ++v) values.push_back(double{values[before[v]]});
-    sizing_.attribute = std::move(values);
+    sizing_.attribute = separation.values(std::move(values));
   }
   sizing_.sharp = features_.edges;
   // Where sheets meet in one edge, curves cannot be led elsewhere; the folds of noise are no details.

@@ -27,8 +27,8 @@ struct SizeBounds {
   void add(const SizeBounds& others);
 };
 
-// The input with its borders joined: within `tolerance`, or, without one, at the same point, if that leaves fewer
-// border or fewer non-manifold edges, and more of neither. Triangles that are there twice are then taken once.
+// The input with its borders joined: within `tolerance`, or, without one, as RemeshOptions::weld says. Triangles that
+// are there twice are then taken once.
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
 
 // What is done to an input before seeds are placed.

@@ -150,42 +150,6 @@ TEST(Topology, FindsWhatIsNotManifold) {
   EXPECT_FALSE(topology_of(repeated).manifold);
 }
 
-TEST(Topology, SplitsWhatTouchesInPoints) {
-  // Three boxes in a row, corner to corner.
-  TriangleMesh boxes = joined(joined(box(2), box(2), {1, 1, 1}), box(2), {2, 2, 2});
-  const std::size_t apart = boxes.vertices.size();
-  std::vector<Index> first(apart);
-  for (Index v = 0; v < apart; ++v)
-    first[v] = static_cast<Index>(std::find(boxes.vertices.begin(), boxes.vertices.end(), boxes.vertices[v]) -
-                                  boxes.vertices.begin());
-  for (Triangle& t : boxes.triangles)
-    for (Index& v : t) v = first[v];
-  ASSERT_EQ(topology_of(boxes).non_manifold_vertices, 2u);
-  boxes.feature_edges = {{boxes.triangles[0][0], boxes.triangles[0][1]}};
-  for (const Triangle& t : boxes.triangles)
-    for (std::size_t k = 0; k < 3; ++k)
-      if (t[k] == first[apart - 1]) boxes.feature_edges.push_back({t[k], t[(k + 1) % 3]});
-  const TriangleMesh before = boxes;
-  const std::vector<Index> original = split_fans(boxes);
-  const MeshTopology topology = topology_of(boxes);
-  EXPECT_TRUE(topology.manifold && topology.closed && topology.oriented);
-  EXPECT_EQ(topology.components, 3u);
-  EXPECT_EQ(topology.euler, 6);
-  ASSERT_EQ(original.size(), boxes.vertices.size());
-  EXPECT_EQ(boxes.vertices.size(), before.vertices.size() + 2);
-  for (Index v = 0; v < original.size(); ++v) EXPECT_EQ(boxes.vertices[v], before.vertices[original[v]]);
-  for (std::size_t t = 0; t < before.triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(original[boxes.triangles[t][k]], before.triangles[t][k]);
-  const EdgeTable table = edge_table(boxes.triangles, boxes.vertices.size());
-  for (const std::array<Index, 2>& edge : boxes.feature_edges)
-    EXPECT_TRUE(std::binary_search(table.edges.begin(), table.edges.end(), edge));
-  EXPECT_EQ(edges_after_split(boxes, original, {{0, 0}}), (std::vector<std::array<Index, 2>>{{0, 0}}));
-
-  TriangleMesh sphere = icosphere(1);
-  split_fans(sphere);
-  EXPECT_EQ(sphere.triangles, icosphere(1).triangles);
-}
-
 TEST(Topology, FindsWhatIsNotOriented) {
   TriangleMesh mesh = icosphere(1);
   std::swap(mesh.triangles[7][0], mesh.triangles[7][1]);
