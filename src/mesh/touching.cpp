@@ -6,12 +6,12 @@
 #include <numbers>
 #include <numeric>
 #include <set>
-#include <span>
 #include <unordered_map>
 #include <utility>
 
 #include "core/disjoint_sets.h"
 #include "core/geometry.h"
+#include "mesh/edge_splitter.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -141,46 +141,6 @@ DisjointSets<> find_fans(const TriangleMesh& mesh, const EdgeTable& table, const
   return fans;
 }
 
-// Halves edges of a mesh one after the other.
-class Halving {
- public:
-  explicit Halving(TriangleMesh& mesh) : mesh_(mesh) {
-    if (!mesh.face_of_triangle.empty()) return;
-    mesh.face_of_triangle.resize(mesh.triangles.size());
-    std::iota(mesh.face_of_triangle.begin(), mesh.face_of_triangle.end(), Index{0});
-  }
-
-  // `sides` are the edge's half-edges in the mesh as it was at first.
-  void halve(const std::array<Index, 2>& edge, std::span<const std::size_t> sides) {
-    const auto middle = static_cast<Index>(mesh_.vertices.size());
-    mesh_.vertices.push_back(0.5 * (mesh_.vertices[edge[0]] + mesh_.vertices[edge[1]]));
-    for (const std::size_t side : sides) {
-      std::vector<Index>& parts = parts_[static_cast<Index>(side / 3)];
-      if (parts.empty()) parts.push_back(static_cast<Index>(side / 3));
-      const auto [part, corner] = find(parts, edge);
-      Triangle second = mesh_.triangles[part];
-      second[corner] = middle;
-      mesh_.triangles[part][(corner + 1) % 3] = middle;
-      parts.push_back(static_cast<Index>(mesh_.triangles.size()));
-      mesh_.triangles.push_back(second);
-      mesh_.face_of_triangle.push_back(Index{mesh_.face_of_triangle[part]});
-      if (!mesh_.labels.empty()) mesh_.labels.push_back(std::int32_t{mesh_.labels[part]});
-    }
-  }
-
- private:
-  // The triangle that has the edge, and the corner that the edge begins at there.
-  std::pair<Index, std::size_t> find(const std::vector<Index>& parts, const std::array<Index, 2>& edge) const {
-    for (const Index part : parts)
-      for (std::size_t k = 0; k < 3; ++k)
-        if (ascending(mesh_.triangles[part][k], mesh_.triangles[part][(k + 1) % 3]) == edge) return {part, k};
-    return {parts.front(), 0};
-  }
-
-  TriangleMesh& mesh_;
-  std::unordered_map<Index, std::vector<Index>> parts_;  // of triangles with an edge that was halved
-};
-
 }  // namespace
 
 std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh) {
@@ -198,11 +158,12 @@ std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh) {
   }
   if (held.empty()) return {};
   std::sort(held.begin(), held.end());
-  Halving halving(mesh);
+  EdgeSplitter splitter(mesh);
   std::vector<std::array<Index, 2>> halved;
   for (const std::size_t e : held) {
-    halved.push_back(table.edges[e]);
-    halving.halve(table.edges[e], {table.half_edges.begin(e), table.half_edges.end(e)});
+    const auto [low, high] = table.edges[e];
+    splitter.split(low, high, 0.5);
+    halved.push_back({low, high});
   }
   mesh.feature_edges = edges_after_halving(mesh.feature_edges, halved, mesh.vertices.size());
   return halved;

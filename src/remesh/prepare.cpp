@@ -12,6 +12,7 @@
 #include "bisector/repair.h"
 #include "core/geometry.h"
 #include "features/normals.h"
+#include "features/wedges.h"
 #include "mesh/touching.h"
 #include "remesh/detail.h"
 #include "remesh/sizing.h"
@@ -198,11 +199,27 @@ void Preparation::find_noise(FeatureOptions& features) {
   if (noisy_ && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
 }
 
-void Preparation::plan(const RemeshOptions& options) {
+// Without details. Returns the edge length at each vertex.
+std::vector<double> Preparation::lay_down_plain() {
   unbounded_ = refine_for_density(mesh_, sizing_, target_);
-  const Sizing& plain = unbounded_->sizing;
   std::vector<double> lengths(mesh_.vertices.size());
-  for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(plain, v);
+  for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(unbounded_->sizing, v);
+  return lengths;
+}
+
+void Preparation::plan(const RemeshOptions& options) {
+  std::vector<double> lengths = lay_down_plain();
+  const std::size_t vertices = mesh_.vertices.size();
+  const std::vector<EdgePoint> added = link_wedges(mesh_, features_, lengths);
+  if (!added.empty()) {
+    features_ = split_features(features_, splits_of(added, vertices));
+    sizing_.sharp = features_.edges;
+    std::vector<double>& values = sizing_.attribute;
+    for (const auto& [a, b, t] : added)
+      if (!values.empty()) values.push_back(values[a] + t * (values[b] - values[a]));
+    lengths = lay_down_plain();
+  }
+  const Sizing& plain = unbounded_->sizing;
   DetailPlan plan = plan_details(mesh_, features_, lengths, plain.vertices, options.detail == DetailMode::all);
   features_ = std::move(plan.features);
   detail_ = plan.result;

@@ -47,6 +47,7 @@ class Preparation {
 
  private:
   void find_noise(FeatureOptions& features);
+  std::vector<double> lay_down_plain();
   void plan(const RemeshOptions& options);
 
   WeldResult welded_;  // without its mesh
