@@ -228,6 +228,7 @@ class Control {
     cuts_.clear();
     keep_best();
     if (!holds()) {
+      const SavedSeeds given = best_;
       grow();
       const SavedSeeds start = best_;
       most_ = budget();
@@ -244,7 +245,8 @@ class Control {
         polish();
         smooth();
       } else {
-        restore(best_);
+        // More seeds are worth nothing where too many cells fail in any case.
+        restore(best_has_too_few_ ? given : best_);
       }
       finish();
     }

@@ -644,5 +644,23 @@ TEST(TopologyControlTest, RealModelsGrowFromFourSeeds) {
   }
 }
 
+// Where nearly every cell has parts of many triangles, more seeds do not help, and none is left.
+TEST(TopologyControlTest, ADenseSoupGetsNoSeedsInVain) {
+  const TriangleMesh mesh = soup(800, 7);
+  const Surface surface(mesh);
+  CpuBackend backend(surface, NeighbourSource::nearest);
+  FreeRun free(backend, random_seeds(mesh, 200, 3));
+  OptimiseOptions options;
+  options.constrained = true;
+  options.iterations = 10;
+  optimise(free.run, options);
+  const TopologyOutcome outcome =
+      enforce_topology(free.run, FeatureTrace(surface, free.curves), topology_of(mesh), options);
+  EXPECT_GT(outcome.rounds, 0);
+  EXPECT_FALSE(outcome.ball.holds);
+  EXPECT_GT(outcome.ball.cells.size(), 100u);
+  EXPECT_EQ(free.seeds().size(), 200u);
+}
+
 }  // namespace
 }  // namespace bisector::test
