@@ -45,8 +45,8 @@ struct TopologyOutcome {
 // TopologyOutcome::sheets by indices after those of the seeds.
 //
 // Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to
-// the seeds with the fewest failures, which topology_faults lists, or to those given if an eighth of the cells fail with
-// any. Surfaces that are not manifold and oriented are only checked.
+// the seeds with the fewest failures, which topology_faults lists, or to those given if an eighth of the cells fail
+// with any. Surfaces that are not manifold and oriented are only checked.
 TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
                                  OptimiseOptions options);
 
