@@ -8,6 +8,7 @@
 #include "core/geometry.h"
 #include "core/grouping.h"
 #include "core/parallel.h"
+#include "mesh/half_edges.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -30,8 +31,6 @@ struct Walk {
 Vec3 corner(const Walk& walk, std::size_t half_edge) {
   return walk.points[walk.triangles[half_edge / 3][half_edge % 3]];
 }
-
-std::size_t next_half_edge(std::size_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
 
 // Flat triangles take the normal of the neighbour through which they are reached first.
 void lend_normals(Walk& walk, const std::vector<char>& flat) {

@@ -10,6 +10,7 @@
 #include "core/geometry.h"
 #include "features/curves.h"
 #include "mesh/edge_splitter.h"
+#include "mesh/half_edges.h"
 #include "spatial/kd_tree.h"
 
 namespace bisector {
@@ -20,8 +21,9 @@ constexpr double kGaps[] = {1.0 / 16, 1.0 / 8, 1.0 / 4, 1.0 / 2, 1};
 // A wedge has a gap farther from its corner than so many times the gap: it is narrower than about 30 degrees. Those of
 // less than a degree are curves beside each other.
 constexpr double kNarrow = 2, kNarrowest = 60;
-// So far from the corner, in edge lengths, their gap is less than this part of the way. Seeds on wider ones stand at
-// the same distances from the corner instead (remesh/feature_recovery), and only the tip keeps its angle.
+// So far from the corner, in edge lengths, the gap of a wedge that is linked is less than this part of the way. Seeds
+// on wider ones stand at the same distances from the corner instead (remesh/feature_recovery), and only the tip keeps
+// its angle.
 constexpr double kTip = 1.0 / 8, kAcute = 0.2;
 // Corners nearer to each other than this, in edge lengths, are taken for one.
 constexpr double kSameCorner = 0.25;
@@ -31,8 +33,6 @@ constexpr double kStep = 0.25;
 // from the corner.
 constexpr double kNear = 0.3;
 constexpr int kMostSteps = 100;  // across triangles
-
-std::array<Index, 2> ascending(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 
 // A curve at one of its ends.
 struct Arm {
@@ -62,7 +62,7 @@ class WedgeLinker {
       for (const Arm& from : arms[k])
         for (const auto& [other, squared] : near)
           for (const Arm& to : arms[other])
-            if (from.curve != to.curve && (is_crease(from) || is_crease(to)))
+            if (from.curve != to.curve && (is_crease(from) || is_crease(to)) && is_acute(from, to))
               for (const double gap : kGaps) link(from, to, gap);
     }
     return std::move(added_);
@@ -85,13 +85,16 @@ class WedgeLinker {
     return norm(curves_.point(to.curve, nearest(to, p, way)) - p);
   }
 
+  bool is_acute(const Arm& from, const Arm& to) const {
+    const double tip = kTip * edge_length_[corner_of(from)];
+    return gap_at(from, to, tip) < kAcute * tip;
+  }
+
   void link(const Arm& from, const Arm& to, double gap_in_edges) {
     const Index corner = corner_of(from);
     const double gap = gap_in_edges * edge_length_[corner], length = curves_.length(from.curve);
     const double most = std::min(length, kNarrowest * gap);
     if (kNarrow * gap >= most || gap_at(from, to, kNarrow * gap) >= gap) return;
-    const double tip = kTip * edge_length_[corner];
-    if (gap_at(from, to, tip) >= kAcute * tip) return;
     double way = kNarrow * gap;
     while (way < most && gap_at(from, to, way) < gap) way += kStep * gap;
     if (way >= most) return;

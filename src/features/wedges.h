@@ -15,11 +15,12 @@ struct EdgePoint {
   double t;
 };
 
-// Two curves that leave a corner at less than about 30 degrees can only be parted where edges of the mesh lead from one
-// to the other (features/simplify.h). A straight edge of a part may have no vertex as far as that, so the two get
-// vertices and edges from one to the other where they are a sixteenth of an edge length apart, an eighth, and so on up
-// to one; the surface stays as it is. `edge_length` has one value per vertex, in the mesh's unit. Labels and
-// face_of_triangle follow. Returns the vertices that were added, in order, of edges as they were when each was.
+// Curves can only be parted where edges of the mesh lead from one to the other (features/simplify.h). A straight edge
+// of a part may have no vertex as far as that, so two curves that leave a corner, or corners near each other, at less
+// than about 12 degrees get vertices and edges from one to the other where they are a sixteenth of an edge length
+// apart, an eighth, and so on up to one, as far as they open by less than 30 degrees; the surface stays as it is.
+// `edge_length` has one value per vertex, in the mesh's unit. Labels and face_of_triangle follow. Returns the vertices
+// that were added, in order, of edges as they were when each was.
 std::vector<EdgePoint> link_wedges(TriangleMesh& mesh, const FeatureGraph& features,
                                    const std::vector<double>& edge_length);
 

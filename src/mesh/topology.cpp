@@ -8,21 +8,11 @@
 #include "bisector/repair.h"
 #include "core/disjoint_sets.h"
 #include "core/grouping.h"
+#include "mesh/half_edges.h"
 
 namespace bisector {
 
 namespace {
-
-Index origin(const std::vector<Triangle>& triangles, std::size_t half_edge) {
-  return triangles[half_edge / 3][half_edge % 3];
-}
-
-std::size_t next_half_edge(std::size_t half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
-
-// The corner of the half-edge's triangle that lies at an end of its edge; half-edge h starts at corner h.
-std::size_t corner_at(const std::vector<Triangle>& triangles, std::size_t half_edge, Index vertex) {
-  return origin(triangles, half_edge) == vertex ? half_edge : next_half_edge(half_edge);
-}
 
 // Links the corners (3 t + k) at both ends of an edge over all its triangles.
 void join_fans(const std::vector<Triangle>& triangles, const EdgeTable& table, std::size_t edge, DisjointSets<>& fans) {

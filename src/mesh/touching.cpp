@@ -12,6 +12,7 @@
 #include "core/disjoint_sets.h"
 #include "core/geometry.h"
 #include "mesh/edge_splitter.h"
+#include "mesh/half_edges.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -21,19 +22,6 @@ using HalfEdgePair = std::array<std::size_t, 2>;
 
 // Of the largest coordinate: what files in single precision round.
 constexpr double kRounding = 0x1p-22;
-
-std::array<Index, 2> ascending(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
-
-Index origin(const std::vector<Triangle>& triangles, std::size_t half_edge) {
-  return triangles[half_edge / 3][half_edge % 3];
-}
-
-std::size_t next_half_edge(std::size_t half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
-
-// The corner of the half-edge's triangle that lies at an end of its edge; half-edge h starts at corner h.
-std::size_t corner_at(const std::vector<Triangle>& triangles, std::size_t half_edge, Index vertex) {
-  return origin(triangles, half_edge) == vertex ? half_edge : next_half_edge(half_edge);
-}
 
 // A triangle at an edge, seen along it.
 struct Wing {
