@@ -95,10 +95,11 @@ void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
 // a manifold then.
 class Separation {
  public:
-  Separation(TriangleMesh& mesh, const Context& context)
-      : given_(mesh.vertices.size()), halved_(halve_touching_edges(mesh)), vertices_(mesh.vertices.size()) {
-    const std::vector<Triangle> before = mesh.triangles;
-    const MeshTopology touching = analyse_topology(before, vertices_);
+  Separation(TriangleMesh& mesh, const Context& context) : given_(mesh.vertices.size()), vertices_(given_) {
+    const MeshTopology touching = analyse_topology(mesh.triangles, given_);
+    if (touching.manifold) return;
+    halved_ = halve_touching_edges(mesh);
+    vertices_ = mesh.vertices.size();
     original_ = separate_touching(mesh);
     if (original_.size() == vertices_) return;
     part_fans(mesh, original_);
