@@ -14,16 +14,6 @@
 namespace bisector::test {
 namespace {
 
-MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
-
-TriangleMesh joined(const TriangleMesh& a, const TriangleMesh& b, const Vec3& offset) {
-  TriangleMesh mesh = a;
-  const auto base = static_cast<Index>(a.vertices.size());
-  for (const Vec3& v : b.vertices) mesh.vertices.push_back(v + offset);
-  for (const Triangle& t : b.triangles) mesh.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
-  return mesh;
-}
-
 TEST(Quality, OfAnIcosahedron) {
   const QualityReport report = measure_quality(icosphere(0));
   const double edge = 1 / std::sin(2 * std::numbers::pi / 5);  // of circumradius 1

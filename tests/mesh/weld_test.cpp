@@ -19,23 +19,6 @@
 namespace bisector::test {
 namespace {
 
-// Every triangle with vertices of its own, each moved by up to `size` along each axis.
-TriangleMesh torn(const TriangleMesh& mesh, double size = 0) {
-  TriangleMesh soup;
-  SplitMix64 random(11);
-  for (const Triangle& t : mesh.triangles) {
-    const Index first = static_cast<Index>(soup.vertices.size());
-    for (const Index v : t) {
-      Vec3 p = mesh.vertices[v];
-      for (int k = 0; k < 3; ++k) p[k] += random.range(-size, size);
-      soup.vertices.push_back(p);
-    }
-    soup.triangles.push_back({first, first + 1, first + 2});
-  }
-  soup.labels = mesh.labels;
-  return soup;
-}
-
 double area(const TriangleMesh& mesh) {
   double sum = 0;
   for (const Triangle& t : mesh.triangles)

@@ -36,13 +36,6 @@ TriangleMesh reversed(TriangleMesh mesh) {
   return mesh;
 }
 
-TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
-  const auto first = static_cast<Index>(a.vertices.size());
-  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const Triangle& t : b.triangles) a.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  return a;
-}
-
 // The worst triangles of a generated mesh are many, so that its own smallest angle as the bound would stop all of it.
 FitOptions with_bounds(double angle, double quality) {
   FitOptions options;

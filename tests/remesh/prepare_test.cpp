@@ -3,31 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <vector>
 
 #include "bisector/quality.h"
 #include "bisector/remesh.h"
-#include "core/random.h"
+#include "bisector/repair.h"
 #include "support/models.h"
 
 namespace bisector::test {
 namespace {
-
-// Every triangle with vertices of its own, moved by up to `size` along each axis.
-TriangleMesh torn(const TriangleMesh& mesh, double size) {
-  TriangleMesh soup;
-  SplitMix64 random(5);
-  for (const Triangle& t : mesh.triangles) {
-    const auto first = static_cast<Index>(soup.vertices.size());
-    for (const Index v : t) {
-      Vec3 p = mesh.vertices[v];
-      for (int k = 0; k < 3; ++k) p[k] += random.range(-size, size);
-      soup.vertices.push_back(p);
-    }
-    soup.triangles.push_back({first, first + 1, first + 2});
-  }
-  return soup;
-}
 
 TEST(JoinBorders, ClosesWhatRoundingOpens) {
   const TriangleMesh sphere = icosphere(3);
@@ -51,24 +36,8 @@ TEST(JoinBorders, MovesNothingOfAClosedSurface) {
 
 // Two boxes over one edge, with the same vertices there.
 TEST(Preparation, SolidsThatTouchAlongAnEdgeAreMeshedApart) {
-  TriangleMesh boxes = box(4);
-  const std::size_t count = boxes.vertices.size();
-  TriangleMesh second = box(4);
-  std::vector<Index> names;
-  for (Vec3 p : second.vertices) {
-    p.x += 1;
-    p.y += 1;
-    Index name = kNone;
-    for (Index v = 0; v < count; ++v)
-      if (boxes.vertices[v] == p) name = v;
-    if (name == kNone) {
-      name = static_cast<Index>(boxes.vertices.size());
-      boxes.vertices.push_back(p);
-    }
-    names.push_back(name);
-  }
-  for (const Triangle& t : second.triangles) boxes.triangles.push_back({names[t[0]], names[t[1]], names[t[2]]});
-  ASSERT_EQ(analyse_topology(boxes.triangles, boxes.vertices.size()).non_manifold_edges, 4u);
+  const TriangleMesh boxes = weld(joined(box(4), box(4), {1, 1, 0}), 0).mesh;
+  ASSERT_EQ(topology_of(boxes).non_manifold_edges, 4u);
   RemeshOptions options;
   options.vertices = 600;
   options.sizing.kind = DensityKind::attribute;

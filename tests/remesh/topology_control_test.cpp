@@ -43,16 +43,6 @@ struct Checked {
         report(check_ball_property(surface, diagram.polygons)) {}
 };
 
-MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
-
-TriangleMesh merged(const TriangleMesh& a, const TriangleMesh& b) {
-  TriangleMesh mesh = a;
-  const Index base = static_cast<Index>(a.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const Triangle& t : b.triangles) mesh.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
-  return mesh;
-}
-
 TriangleMesh scaled(TriangleMesh mesh, const Vec3& s, const Vec3& offset = {}) {
   for (Vec3& v : mesh.vertices) v = Vec3{s.x * v.x, s.y * v.y, s.z * v.z} + offset;
   return mesh;
@@ -440,7 +430,7 @@ TEST(Sheets, CrossingSheetsGetAVertexEach) {
   const TriangleMesh flat = scaled(grid_patch(8, 8), {0.125, 0.125, 1}, {0, 0, 0.31});
   TriangleMesh upright = flat;
   for (Vec3& v : upright.vertices) v = {0.43 + 0.1 * (v.z - v.y), v.x, v.y};
-  const TriangleMesh mesh = merged(flat, upright);
+  const TriangleMesh mesh = joined(flat, upright);
   const std::vector<Vec3> seeds = random_seeds(mesh, 600, 1);
   Checked c(mesh, seeds);
   ASSERT_FALSE(c.report.holds);
@@ -492,7 +482,7 @@ std::vector<Start> starts() {
           {"lens_30", scaled(icosphere(4), {1, 1, 0.02}), 30},
           {"needle_10", scaled(icosphere(3), {0.03, 0.03, 1}), 10},
           {"thin_ring_30", scaled(torus(60, 36), {1, 1, 0.1}), 30},
-          {"crossing_spheres_120", merged(icosphere(2), scaled(icosphere(2), {1, 1, 1}, {0.7, 0.3, 0.2})), 120}};
+          {"crossing_spheres_120", joined(icosphere(2), scaled(icosphere(2), {1, 1, 1}, {0.7, 0.3, 0.2})), 120}};
 }
 
 void PrintTo(const Start& start, std::ostream* out) { *out << start.name; }

@@ -387,4 +387,29 @@ SmallCase integer_case(std::uint64_t random_seed) {
   return problem;
 }
 
+TriangleMesh torn(const TriangleMesh& mesh, double size) {
+  TriangleMesh soup;
+  SplitMix64 random(11);
+  for (const Triangle& t : mesh.triangles) {
+    const Index first = static_cast<Index>(soup.vertices.size());
+    for (const Index v : t) {
+      Vec3 p = mesh.vertices[v];
+      for (int k = 0; k < 3; ++k) p[k] += random.range(-size, size);
+      soup.vertices.push_back(p);
+    }
+    soup.triangles.push_back({first, first + 1, first + 2});
+  }
+  soup.labels = mesh.labels;
+  return soup;
+}
+
+TriangleMesh joined(TriangleMesh a, const TriangleMesh& b, const Vec3& offset) {
+  const auto base = static_cast<Index>(a.vertices.size());
+  for (const Vec3& v : b.vertices) a.vertices.push_back(v + offset);
+  for (const Triangle& t : b.triangles) a.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+  return a;
+}
+
+MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
+
 }  // namespace bisector::test

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bisector/quality.h"
 #include "core/geometry.h"
 
 namespace bisector::test {
@@ -37,9 +38,14 @@ TriangleMesh wavy_patch(int n);                                   // open height
 TriangleMesh pages();                                             // three sheets that share one edge
 TriangleMesh two_spheres();                                       // disjoint
 TriangleMesh soup(std::size_t count, std::uint64_t random_seed);  // triangles without common vertices, in the unit cube
-TriangleMesh duplicated_triangles();                              // a square whose triangles occur twice and reversed
-TriangleMesh needles();                                           // a fan of triangles with aspect ratios up to 2^40
-TriangleMesh collinear_among_good();                              // 1 is exactly collinear, 3 has a repeated corner
+// Every triangle with vertices of its own, each moved by up to `size` along each axis.
+TriangleMesh torn(const TriangleMesh& mesh, double size = 0);
+// Both, the second moved. Nothing but vertices and triangles of the second is kept.
+TriangleMesh joined(TriangleMesh a, const TriangleMesh& b, const Vec3& offset = {});
+MeshTopology topology_of(const TriangleMesh& mesh);
+TriangleMesh duplicated_triangles();  // a square whose triangles occur twice and reversed
+TriangleMesh needles();               // a fan of triangles with aspect ratios up to 2^40
+TriangleMesh collinear_among_good();  // 1 is exactly collinear, 3 has a repeated corner
 
 double enclosed_volume(const TriangleMesh& mesh);  // of a closed mesh; positive if it is oriented outward
 

@@ -37,13 +37,6 @@ TriangleMesh moved(TriangleMesh mesh, double scale, const Vec3& by, bool turn = 
   return mesh;
 }
 
-TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
-  const auto shift = static_cast<Index>(a.vertices.size());
-  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const Triangle& t : b.triangles) a.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
-  return a;
-}
-
 void expect_error(const std::function<void()>& body, const std::string& part) {
   try {
     body();
