@@ -224,7 +224,7 @@ void add_feature_file(CLI::App* app, std::string& path) {
 void add_weld(CLI::App* app, double& tolerance) {
   app->add_option("--weld", tolerance,
                   "join borders that are no farther apart, in the mesh's\n"
-                  "unit; default: only what lies at the same point")
+                  "unit; default: what rounding has parted")
       ->type_name("T")
       ->check(number_below(1e100))
       ->group("Features");
