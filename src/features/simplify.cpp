@@ -266,6 +266,40 @@ void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& v
   curves.resize(kept);
 }
 
+// Divides curves where they turn back: what of its seeds is on one arm would own the other arm as well. A way that leads
+// a curve to another corner may leave the way that it came.
+void divide_where_they_turn_back(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices, double width) {
+  const double limit = kShared * width;
+  std::vector<FeatureCurve> parts;
+  for (FeatureCurve& curve : curves) {
+    if (curve.closed) {
+      parts.push_back(std::move(curve));
+      continue;
+    }
+    const std::vector<Index>& chain = curve.vertices;
+    const std::vector<double> at = arc_lengths(chain, vertices);
+    std::vector<std::pair<double, std::size_t>> turns;  // cosine of the angle between the arms, place in the chain
+    for (std::size_t k = 1; k + 1 < chain.size(); ++k) {
+      if (at[k] < limit || at.back() - at[k] < limit) continue;
+      const auto middle = chain.begin() + static_cast<std::ptrdiff_t>(k);
+      const FeatureCurve before{{chain.begin(), middle + 1}}, after{{middle, chain.end()}};
+      const Vec3 u = leaving(before, false, vertices, width), v = leaving(after, true, vertices, width);
+      if (const double cosine = dot(u, v) / (norm(u) * norm(v)); cosine > 0) turns.push_back({cosine, k});
+    }
+    std::sort(turns.begin(), turns.end(), [](const auto& a, const auto& b) {
+      return a.first != b.first ? a.first > b.first : a.second < b.second;
+    });
+    std::vector<std::size_t> cuts;
+    for (const auto& turn : turns)
+      if (std::none_of(cuts.begin(), cuts.end(),
+                       [&, k = turn.second](std::size_t cut) { return std::abs(at[cut] - at[k]) < width; }))
+        cuts.push_back(turn.second);
+    std::sort(cuts.begin(), cuts.end());
+    for (std::vector<Index>& part : divided(chain, cuts)) parts.push_back({std::move(part), false, curve.kind});
+  }
+  curves = std::move(parts);
+}
+
 }  // namespace
 
 std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
@@ -352,6 +386,7 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   const double limit = kShared * width;
   left = divided_where_they_meet(without_shared_edges(left, vertices, limit), vertices, limit);
   join_straight(left, vertices, width);
+  divide_where_they_turn_back(left, vertices, width);
   for (const FeatureCurve& curve : left)
     if (!curve.closed)
       for (const Index v : {curve.vertices.front(), curve.vertices.back()}) result.graph.corners.push_back(v);

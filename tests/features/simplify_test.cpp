@@ -239,6 +239,25 @@ TEST(SimplifiedFeatures, LeadCurvesToTheCornerThatRemains) {
   EXPECT_EQ(merged.graph.curves.size(), 4u);
 }
 
+// A curve that is led to another corner by a way that it runs back beside has a corner where it turns.
+TEST(SimplifiedFeatures, HaveCornersWhereTheyTurnBack) {
+  for (const int degrees : {10, 40, 80, 100, 140, 170}) {
+    Chains net;
+    const double angle = degrees * std::numbers::pi / 180;
+    const Index a = net.corner({0, 0, 0}), b = net.corner({0.3, 0, 0});
+    const Index far = net.corner({0.3 - 4 * std::cos(angle), 4 * std::sin(angle), 0});
+    net.curve(a, b);
+    net.curve(b, far);
+    for (const Vec3& p : {Vec3{-3, -3, 0}, Vec3{0, -3, 0}, Vec3{3, -3, 0}}) net.curve(a, net.corner(p));
+    const SimplifiedFeatures led = simplify_features(net.graph, net.points, {0.1, 1, 3, 3, 3}, 0.5);
+    expect_sound(led.graph, net.graph);
+    EXPECT_EQ(led.merged, 1u);
+    EXPECT_TRUE(std::binary_search(led.graph.corners.begin(), led.graph.corners.end(), a));
+    EXPECT_EQ(std::binary_search(led.graph.corners.begin(), led.graph.corners.end(), b), degrees < 90) << degrees;
+    EXPECT_EQ(led.graph.curves.size(), degrees < 90 ? 5u : 4u);
+  }
+}
+
 TEST(SimplifiedFeatures, DoNotDependOnWhichWayCurvesRun) {
   const TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}});
   const FeatureGraph graph = sharp_graph(slab);
