@@ -188,9 +188,8 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
     sizing_.attribute = separation.values(std::move(values));
   }
   sizing_.sharp = features_.edges;
-  // Where sheets meet in one edge, curves cannot be led elsewhere; the folds of noise are no details.
-  const bool manifold = analyse_topology(mesh_.triangles, mesh_.vertices.size()).manifold;
-  if (given_seeds_ == 0 && options.detail != DetailMode::off && manifold && !noisy_) plan(options);
+  // The folds of noise are no details.
+  if (given_seeds_ == 0 && options.detail != DetailMode::off && !noisy_) plan(options);
 }
 
 // What noise folds is no feature.

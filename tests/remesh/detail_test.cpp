@@ -11,6 +11,7 @@
 #include "remesh/detail.h"
 #include "remesh/sizing.h"
 #include "support/featured.h"
+#include "support/models.h"
 
 namespace bisector::test {
 namespace {
@@ -74,6 +75,27 @@ TEST(Detail, ThinWallsHaveGoodTriangles) {
     EXPECT_EQ(result.mesh.vertices.size(), vertices);
     EXPECT_GT(quality.theta_min, 25);
   }
+}
+
+// A thinner slab with a fin on one of its edges, where three sheets meet.
+TEST(Detail, ThinWallsHaveGoodTrianglesWhereSheetsMeet) {
+  TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}});
+  const auto at = [&](const Vec3& p) {
+    const auto found = std::find(slab.vertices.begin(), slab.vertices.end(), p);
+    EXPECT_NE(found, slab.vertices.end());
+    return static_cast<Index>(found - slab.vertices.begin());
+  };
+  const Index low = at({0, 0, 0}), high = at({0, 0, 1}), far = static_cast<Index>(slab.vertices.size());
+  slab.vertices.insert(slab.vertices.end(), {{-1, 0, 0}, {-1, 0, 1}});
+  slab.triangles.insert(slab.triangles.end(), {{low, far, far + 1}, {low, far + 1, high}});
+  ASSERT_EQ(topology_of(slab).non_manifold_edges, 1u);
+  RemeshOptions options;
+  options.compute.device = DeviceRequest{.kind = DeviceRequest::Kind::cpu};
+  options.vertices = 400;
+  const RemeshResult result = remesh(slab, options);
+  EXPECT_EQ(result.features.broken, 0u);
+  EXPECT_EQ(result.mesh.vertices.size(), 400u);
+  EXPECT_GT(measure_quality(result.mesh).theta_min, 25);
 }
 
 TEST(Detail, IsTheSameWithAnyNumberOfThreads) {
