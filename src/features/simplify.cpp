@@ -266,8 +266,8 @@ void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& v
   curves.resize(kept);
 }
 
-// Divides curves where they turn back: what of its seeds is on one arm would own the other arm as well. A way that leads
-// a curve to another corner may leave the way that it came.
+// Divides curves where they turn back: what of its seeds is on one arm would own the other arm as well. A way that
+// leads a curve to another corner may leave the way that it came.
 void divide_where_they_turn_back(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices, double width) {
   const double limit = kShared * width;
   std::vector<FeatureCurve> parts;
