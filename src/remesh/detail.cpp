@@ -13,6 +13,7 @@
 #include "core/degenerate.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
+#include "features/candidates.h"
 #include "features/curve_network.h"
 #include "features/curves.h"
 #include "features/disk_radius.h"
@@ -120,6 +121,17 @@ class Planner {
     return edge_length_[curves.graph().curves[curve].vertices[curves.segment_at(curve, position)]];
   }
 
+  // Marks the points of a network that are on curves that are no creases.
+  static std::vector<char> on_curves_that_stay(const FeatureCurves& curves, const CurveNetwork& network) {
+    std::vector<char> marks(network.points().size(), 0);
+    for (std::size_t p = curves.graph().corners.size(); p < marks.size(); ++p)
+      marks[p] = !is_crease(curves.graph().curves[network.curve(static_cast<Index>(p))]);
+    for (Index c = 0; c < curves.size(); ++c)
+      for (const Index end : curves.ends(c))
+        if (end != kNone && !is_crease(curves.graph().curves[c])) marks[end] = 1;
+    return marks;
+  }
+
   void find_sizes(Trial& t, double coarsening) const {
     const FeatureCurves curves(t.simplified.graph, mesh_.vertices);
     double total = 0;
@@ -139,8 +151,11 @@ class Planner {
         if (end != kNone) bound[end] = std::min(bound[end], curves.length(c));
     std::vector<double> reach(plain.size());
     for (std::size_t p = 0; p < reach.size(); ++p) reach[p] = plain[p] / kPerGap;
-    const std::vector<double> gaps = curve_gaps(network, reach);
+    std::vector<double> gaps = curve_gaps(network, reach);
+    const std::vector<char> stays = on_curves_that_stay(curves, network);
     for (std::size_t p = 0; p < plain.size(); ++p) {
+      // What lies between curves that stay however near they are is of slivers with edges of any length.
+      if (stays[p] && kPerGap * gaps[p] < kBelowWidth * t.width) gaps[p] = kInfinity;
       const double length = std::max(std::min(bound[p], kPerGap * gaps[p]), kBelowWidth * t.width);
       if (length >= plain[p]) continue;
       t.points.push_back(network.points()[p]);

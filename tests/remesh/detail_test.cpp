@@ -61,6 +61,19 @@ TEST(Detail, LengthsAreThoseOfTheGaps) {
   EXPECT_NEAR(*std::min_element(plan.lengths.begin(), plan.lengths.end()), width, 1e-9);
 }
 
+// Borders stay however near to each other they are, so shorter edges between them are no use.
+TEST(Detail, NarrowRibbonsKeepTheirEdgeLength) {
+  for (const double width : {0.002, 0.2}) {
+    TriangleMesh mesh;
+    mesh.vertices = {{0, 0, 0}, {4, 0, 0}, {4, width, 0}, {0, width, 0}, {0, 0, 1}, {4, 0, 1}, {4, 2, 1}, {0, 2, 1}};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+    const DetailPlan plan = plan_for(mesh, 400);
+    const bool bounded = std::any_of(plan.points.begin(), plan.points.end(),
+                                     [](const Vec3& p) { return p.z == 0 && p.x > 1 && p.x < 3; });
+    EXPECT_EQ(bounded, width == 0.2) << width;
+  }
+}
+
 // A slab thinner than its edges: one row of slivers around it without the budget.
 TEST(Detail, ThinWallsHaveGoodTriangles) {
   const TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.1}, {0, 0.1}});
