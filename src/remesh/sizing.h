@@ -56,8 +56,8 @@ struct SizedMesh {
   EdgeSplits splits;
 };
 
-// Bisects edges over which rho changes by more than a factor of 3 unless they are shorter than 0.7 h, and those longer
-// than 2 h if rho between vertices is not known (lfs) or, because of `bound`, not within a factor of 1.2 of the linear
+// Bisects edges over which rho changes by more than a factor of 6 unless they are shorter than 0.7 h, and those longer
+// than 2 h if rho between vertices is not known (lfs) or, because of `bound`, not within a factor of 1.5 of the linear
 // one, as far as points about h apart tell, along the edge or in its triangles; longer than 32 h, all. Longer edges of
 // the triangles at such an edge go first (Rivara 1984), and all triangles at an edge are bisected with it, so no
 // T-junction and no ever thinner triangle appears. New vertices are middles as rounded; lfs is measured there, other
