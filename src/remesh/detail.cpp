@@ -220,11 +220,26 @@ class Planner {
   std::vector<Limb> limbs_;
 };
 
+// The corners of curves that are no creases. Each takes a vertex, whatever the width.
+std::size_t corners_that_stay(const FeatureGraph& features) {
+  std::vector<Index> corners;
+  for (const FeatureCurve& curve : features.curves)
+    if (!curve.closed && !is_crease(curve))
+      corners.insert(corners.end(), {curve.vertices.front(), curve.vertices.back()});
+  std::sort(corners.begin(), corners.end());
+  return static_cast<std::size_t>(std::unique(corners.begin(), corners.end()) - corners.begin());
+}
+
 }  // namespace
 
 DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
                         std::size_t vertices, bool all) {
   DetailPlan plan;
+  // A soup of so many sheets leaves nothing to plan with.
+  if (!all && corners_that_stay(features) > vertices / 2) {
+    plan.features = features;
+    return plan;
+  }
   const Planner planner(mesh, features, edge_length, vertices);
   Planner::Trial best = planner.finest(all ? 1 : kCoarsening);
   const double needed = best.vertices;

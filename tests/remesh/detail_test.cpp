@@ -74,6 +74,24 @@ TEST(Detail, NarrowRibbonsKeepTheirEdgeLength) {
   }
 }
 
+// Separate triangles, whose corners alone are more than half of the vertices wanted.
+TEST(Detail, OfASoupIsNotPlanned) {
+  TriangleMesh soup;
+  for (Index k = 0; k < 100; ++k) {
+    const double x = k % 10, y = 0.001 * k;
+    soup.vertices.insert(soup.vertices.end(), {{x, y, 0}, {x + 0.9, y, 0}, {x, y, 1}});
+    soup.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+  }
+  FeatureGraph borders = sharp_graph(soup);
+  for (FeatureCurve& curve : borders.curves) curve.kind = FeatureKind::border;
+  ASSERT_EQ(borders.corners.size(), 300u);
+  const std::vector<double> lengths(soup.vertices.size(), 0.9);
+  const DetailPlan few = plan_details(soup, borders, lengths, 400, false);
+  EXPECT_EQ(few.features.edges, borders.edges);
+  EXPECT_TRUE(few.points.empty());
+  EXPECT_FALSE(plan_details(soup, borders, lengths, 4000, false).points.empty());
+}
+
 // A slab thinner than its edges: one row of slivers around it without the budget.
 TEST(Detail, ThinWallsHaveGoodTriangles) {
   const TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.1}, {0, 0.1}});
