@@ -213,16 +213,20 @@ std::vector<FeatureCurve> divided_where_they_meet(const std::vector<FeatureCurve
   return parts;
 }
 
-// The direction in which a curve leaves the corner at one of its ends, over a length of about `width`.
-Vec3 leaving(const FeatureCurve& curve, bool from_start, const std::vector<Vec3>& vertices, double width) {
-  const std::size_t count = curve.vertices.size();
-  const auto at = [&](std::size_t k) { return vertices[curve.vertices[from_start ? k : count - 1 - k]]; };
+// The vector from vertex `from` of a chain to the first one that is at least `width` away along the chain, onwards or
+// backwards, or else to the chain's end.
+Vec3 arm_of(const std::vector<Index>& chain, std::size_t from, bool onwards, const std::vector<Vec3>& vertices,
+            double width) {
+  const auto last = static_cast<std::ptrdiff_t>(onwards ? chain.size() - 1 : 0),
+             step = std::ptrdiff_t{onwards ? 1 : -1};
+  const auto at = [&](std::ptrdiff_t k) { return vertices[chain[static_cast<std::size_t>(k)]]; };
+  auto k = static_cast<std::ptrdiff_t>(from);
   double length = 0;
-  for (std::size_t k = 1; k < count; ++k) {
-    length += norm(at(k) - at(k - 1));
-    if (length >= width) return at(k) - at(0);
+  while (k != last && length < width) {
+    length += norm(at(k + step) - at(k));
+    k += step;
   }
-  return at(count - 1) - at(0);
+  return at(k) - vertices[chain[from]];
 }
 
 // Joins curves where just two end, and they run on or one of them is shorter than the width; a curve whose own ends run
@@ -240,7 +244,11 @@ void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& v
     const bool a_starts = curves[a].vertices.front() == corner;
     const bool b_starts = a == b ? !a_starts : curves[b].vertices.front() == corner;
     const auto is_short = [&](std::size_t c) { return length_of(curves[c].vertices, false, vertices) < width; };
-    const Vec3 u = leaving(curves[a], a_starts, vertices, width), v = leaving(curves[b], b_starts, vertices, width);
+    const auto leaving = [&](std::size_t c, bool starts) {
+      const std::vector<Index>& chain = curves[c].vertices;
+      return arm_of(chain, starts ? 0 : chain.size() - 1, starts, vertices, width);
+    };
+    const Vec3 u = leaving(a, a_starts), v = leaving(b, b_starts);
     const bool straight = -dot(u, v) >= std::cos(kStraight) * norm(u) * norm(v);
     if (!straight && !is_short(a) && !is_short(b)) continue;
     if (a == b) {
@@ -281,9 +289,7 @@ void divide_where_they_turn_back(std::vector<FeatureCurve>& curves, const std::v
     std::vector<std::pair<double, std::size_t>> turns;  // cosine of the angle between the arms, place in the chain
     for (std::size_t k = 1; k + 1 < chain.size(); ++k) {
       if (at[k] < limit || at.back() - at[k] < limit) continue;
-      const auto middle = chain.begin() + static_cast<std::ptrdiff_t>(k);
-      const FeatureCurve before{{chain.begin(), middle + 1}}, after{{middle, chain.end()}};
-      const Vec3 u = leaving(before, false, vertices, width), v = leaving(after, true, vertices, width);
+      const Vec3 u = arm_of(chain, k, false, vertices, width), v = arm_of(chain, k, true, vertices, width);
       if (const double cosine = dot(u, v) / (norm(u) * norm(v)); cosine > 0) turns.push_back({cosine, k});
     }
     std::sort(turns.begin(), turns.end(), [](const auto& a, const auto& b) {

@@ -46,6 +46,8 @@ constexpr double kPiece = 1.5;
 constexpr int kDepth = 12;
 // Vertices, in those wanted, beyond which nobody needs to know how many it would be.
 constexpr double kFarTooMany = 50;
+// Of the vertices wanted, what the corners of curves that stay may take at most for details to be planned.
+constexpr double kMostCorners = 0.5;
 
 class Planner {
  public:
@@ -154,7 +156,8 @@ class Planner {
     std::vector<double> gaps = curve_gaps(network, reach);
     const std::vector<char> stays = on_curves_that_stay(curves, network);
     for (std::size_t p = 0; p < plain.size(); ++p) {
-      // What lies between curves that stay however near they are is of slivers with edges of any length.
+      // Curves that are no creases stay however near to each other they are, and edges that are too long for the gap
+      // leave slivers in it: shorter ones would be wasted.
       if (stays[p] && kPerGap * gaps[p] < kBelowWidth * t.width) gaps[p] = kInfinity;
       const double length = std::max(std::min(bound[p], kPerGap * gaps[p]), kBelowWidth * t.width);
       if (length >= plain[p]) continue;
@@ -235,8 +238,9 @@ std::size_t corners_that_stay(const FeatureGraph& features) {
 DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
                         std::size_t vertices, bool all) {
   DetailPlan plan;
-  // A soup of so many sheets leaves nothing to plan with.
-  if (!all && corners_that_stay(features) > vertices / 2) {
+  // Corners of a soup, where all facets meet others in their edges, leave no vertices for details, and looking for
+  // gaps between so many curves would take longer than the run.
+  if (!all && static_cast<double>(corners_that_stay(features)) > kMostCorners * static_cast<double>(vertices)) {
     plan.features = features;
     return plan;
   }
