@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <unordered_map>
+#include <queue>
+#include <utility>
 
 #include "core/grouping.h"
 #include "core/parallel.h"
-#include "core/shortest_ways.h"
 #include "spatial/kd_tree.h"
 
 namespace bisector {
@@ -18,87 +19,101 @@ namespace {
 // than edges may grow away from a strip (kDetailGradation), so that sizes follow every strip up to its corner.
 constexpr double kAcute = 0.15;
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 }  // namespace
 
 CurveNetwork::CurveNetwork(const FeatureCurves& curves, double spacing) {
-  struct Both {
-    Index a, b;
-    double length;
-  };
-  std::vector<Both> pairs;
-  for (Index c = 0; c < curves.graph().corners.size(); ++c) points_.push_back(curves.corner(c));
-  curve_.assign(points_.size(), kNone);
-  position_.assign(points_.size(), 0);
+  const std::size_t corners = curves.graph().corners.size();
+  for (Index c = 0; c < corners; ++c) points_.push_back(curves.corner(c));
+  curve_.assign(corners, kNone);
+  position_.assign(corners, 0);
   for (Index c = 0; c < curves.size(); ++c) {
     const double length = curves.length(c);
     const bool closed = curves.closed(c);
+    lines_.push_back({curves.ends(c), length});
     const auto parts = std::max<std::size_t>(closed ? 3 : 2, static_cast<std::size_t>(std::ceil(length / spacing)));
     const double part = length / static_cast<double>(parts);
-    const auto first = static_cast<Index>(points_.size());
-    const auto inner = static_cast<Index>(parts - (closed ? 0 : 1));
-    for (Index k = 0; k < inner; ++k) {
-      position_.push_back(part * static_cast<double>(closed ? k : k + 1));
+    for (std::size_t k = closed ? 0 : 1; k < parts; ++k) {
+      position_.push_back(part * static_cast<double>(k));
       points_.push_back(curves.point(c, position_.back()));
       curve_.push_back(c);
-      if (k > 0) pairs.push_back({first + k - 1, first + k, part});
-    }
-    const auto [start, end] = curves.ends(c);
-    if (closed) {
-      pairs.push_back({first + inner - 1, first, part});
-    } else {
-      pairs.push_back({start, first, part});
-      pairs.push_back({first + inner - 1, end, part});
     }
   }
-  links_ = group_into_rows<Link>(points_.size(), [&](const auto& put) {
-    for (const auto& [a, b, length] : pairs) {
-      put(a, Link{b, length});
-      put(b, Link{a, length});
+  links_ = group_into_rows<Link>(corners, [&](const auto& put) {
+    for (const auto& [ends, length] : lines_) {
+      if (ends[0] == kNone) continue;
+      put(ends[0], Link{ends[1], length});
+      put(ends[1], Link{ends[0], length});
     }
   });
 }
 
-std::vector<CurveNetwork::Way> CurveNetwork::within(Index from, double reach) const {
-  std::unordered_map<Index, Index> corners;  // on the ways to the points that were reached
-  std::vector<Way> ways;
-  const auto links = [&](Index at, const auto& visit) {
-    for (const Link* link = links_.begin(at); link != links_.end(at); ++link) visit(link->to, link->length, kNone);
+CurveNetwork::Search::Search(const CurveNetwork& network)
+    : network_(network), to_corner_(network.links_.rows(), Way{kInfinity, 0}) {}
+
+void CurveNetwork::Search::start(Index from, double reach) {
+  for (const Index corner : reached_) to_corner_[corner].length = kInfinity;
+  reached_.clear();
+  from_ = from;
+  reach_ = reach;
+  using Step = std::pair<Way, Index>;
+  std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
+  const auto step = [&](const Way& way, Index corner) {
+    if (way.length > reach_ || !(way < to_corner_[corner])) return;
+    if (std::isinf(to_corner_[corner].length)) reached_.push_back(corner);
+    to_corner_[corner] = way;
+    steps.push({way, corner});
   };
-  shortest_ways(from, reach, links, [&](Index at, double length, Index before, Index) {
-    const bool by_corner = before != kNone && before != from && curve_[before] == kNone;
-    const Index count = before == kNone ? 0 : corners.at(before) + (by_corner ? 1 : 0);
-    if (!corners.try_emplace(at, count).second) return false;
-    ways.push_back({at, length, count});
-    return true;
+  network_.nearest_corners(from, [&](Index corner, double length) { step({length, 0}, corner); });
+  while (!steps.empty()) {
+    const auto [way, corner] = steps.top();
+    steps.pop();
+    if (to_corner_[corner] < way) continue;
+    const Index passed = way.corners + (corner == from ? 0 : 1);
+    for (const Link* link = network_.links_.begin(corner); link != network_.links_.end(corner); ++link)
+      step({way.length + link->length, passed}, link->to);
+  }
+}
+
+CurveNetwork::Way CurveNetwork::Search::to(Index point) const {
+  Way best{kInfinity, 0};
+  network_.nearest_corners(point, [&](Index corner, double length) {
+    const Way& way = to_corner_[corner];
+    const bool is_end = corner == from_ || corner == point;
+    best = std::min(best, Way{way.length + length, way.corners + (is_end ? 0 : 1)});
   });
-  std::sort(ways.begin(), ways.end(), [](const Way& a, const Way& b) { return a.to < b.to; });
-  return ways;
+  if (const Index c = network_.curve_[point]; c != kNone && c == network_.curve_[from_]) {
+    const Line& line = network_.lines_[c];
+    double along = std::abs(network_.position_[point] - network_.position_[from_]);
+    if (line.ends[0] == kNone) along = std::min(along, line.length - along);
+    best = std::min(best, Way{along, 0});
+  }
+  return best.length <= reach_ ? best : Way{kInfinity, 0};
 }
 
 std::vector<double> curve_gaps(const CurveNetwork& network, const std::vector<double>& reach) {
   const std::vector<Vec3>& points = network.points();
-  std::vector<double> gaps(points.size(), std::numeric_limits<double>::infinity());
+  std::vector<double> gaps(points.size(), kInfinity);
   if (points.empty()) return gaps;
   const PointSet set{points};
   const KdTree tree(3, set);
-  constexpr std::size_t kChunk = 64;
+  constexpr std::size_t kChunk = 1024;
   parallel_chunks(points.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     std::vector<std::pair<Index, double>> near;
-    for (std::size_t i = begin; i < end; ++i) {
+    CurveNetwork::Search search(network);
+    for (auto i = static_cast<Index>(begin); i < end; ++i) {
       const Vec3& p = points[i];
       const double q[3] = {p.x, p.y, p.z};
       tree.radiusSearch(q, reach[i] * reach[i], near, nanoflann::SearchParams());
       if (near.size() < 2) continue;
-      const std::vector<CurveNetwork::Way> ways = network.within(static_cast<Index>(i), kDetour * reach[i]);
+      search.start(i, kDetour * reach[i]);
       for (const auto& [other, squared] : near) {
-        const double distance = std::sqrt(squared);
-        const auto way = std::lower_bound(ways.begin(), ways.end(), other,
-                                          [](const CurveNetwork::Way& w, Index to) { return w.to < to; });
         if (other == i) continue;
-        if (way != ways.end() && way->to == other) {
-          if (way->length <= kDetour * distance) continue;
-          if (way->corners == 1 && distance >= kAcute * way->length) continue;
-        }
+        const double distance = std::sqrt(squared);
+        const CurveNetwork::Way way = search.to(other);
+        if (way.length <= kDetour * distance) continue;
+        if (way.corners == 1 && distance >= kAcute * way.length) continue;
         gaps[i] = distance;
         break;
       }

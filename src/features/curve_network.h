@@ -1,6 +1,8 @@
 // Feature curves as a graph of points, for distances along them and gaps between them.
 #pragma once
 
+#include <array>
+#include <compare>
 #include <cstddef>
 #include <vector>
 
@@ -18,23 +20,54 @@ class CurveNetwork {
   // The curve that a point lies on; kNone of a corner.
   Index curve(Index point) const { return curve_[point]; }
   double position(Index point) const { return position_[point]; }  // arc length along that curve
+
   struct Way {
-    Index to;
     double length;
     Index corners;  // on the way, without its ends
+
+    friend auto operator<=>(const Way&, const Way&) = default;
   };
-  // The shortest ways along the curves from a point to all within `reach`, by ascending point.
-  std::vector<Way> within(Index from, double reach) const;
+
+  // The shortest ways along the curves from one point to others. Memory is kept from search to search.
+  class Search {
+   public:
+    explicit Search(const CurveNetwork& network);
+    void start(Index from, double reach);
+    // Of the shortest ways to a point that with the fewest corners. An infinite length if it is longer than the reach.
+    Way to(Index point) const;
+
+   private:
+    const CurveNetwork& network_;
+    Index from_ = kNone;
+    double reach_ = 0;
+    std::vector<Way> to_corner_;
+    std::vector<Index> reached_;
+  };
 
  private:
   struct Link {
-    Index to;
+    Index to;  // corner
     double length;
   };
+  struct Line {
+    std::array<Index, 2> ends;
+    double length;
+  };
+  // Calls visit(corner, length) for the nearest corners along a point's curve, for a corner with itself.
+  template <class Visit>
+  void nearest_corners(Index point, const Visit& visit) const {
+    if (curve_[point] == kNone) return visit(point, 0.0);
+    const Line& line = lines_[curve_[point]];
+    if (line.ends[0] == kNone) return;
+    visit(line.ends[0], position_[point]);
+    visit(line.ends[1], line.length - position_[point]);
+  }
+
   std::vector<Vec3> points_;
   std::vector<Index> curve_;
   std::vector<double> position_;
-  Csr<Link> links_;
+  std::vector<Line> lines_;  // the curves
+  Csr<Link> links_;          // of corners
 };
 
 // How far each point of a network is from other curves, or other parts of its own: the distance to the nearest point

@@ -73,6 +73,8 @@ double SizeField::operator()(const Vec3& x) const {
   return query(x, std::numeric_limits<double>::infinity(), at);
 }
 
+double SizeField::at_most(const Vec3& x, double most, Index& near) const { return query(x, most, near); }
+
 std::vector<double> SizeField::at(const std::vector<Vec3>& points, std::vector<Index>& near) const {
   std::vector<double> h(points.size());
   const bool guessed = near.size() == points.size();

@@ -19,6 +19,9 @@ class SizeField {
 
   double gradation() const { return gradation_; }
   double operator()(const Vec3& x) const;
+  // The lesser of h and `most`. `near` is a sample that limited h nearby, and becomes one that limits it here: the
+  // search is quicker from there, and where h is more than `most`.
+  double at_most(const Vec3& x, double most, Index& near) const;
   // h at each point. `near`, if as long as the points, says for each a sample that limited it before, and is written
   // likewise: the search is quicker from there.
   std::vector<double> at(const std::vector<Vec3>& points, std::vector<Index>& near) const;

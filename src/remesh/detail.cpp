@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -41,9 +42,11 @@ constexpr double kDiskReach = 1.15, kPerDisk = 0.6;
 constexpr double kLimbSamples = 6, kMostLimbVertices = 50'000;
 constexpr int kBisections = 7;
 constexpr std::size_t kMostPoints = 100'000;  // of the curves
-// Triangles are divided until they are no longer than so many edges, for integrals.
+// Triangles are halved until they are no longer than so many edges, for integrals.
 constexpr double kPiece = 1.5;
-constexpr int kDepth = 12;
+constexpr int kDepth = 24;
+// What a sum is more than in whatever order it is added up, in sums that threads add to as they go.
+constexpr double kSurely = 1 + 1e-6;
 // Vertices, in those wanted, beyond which nobody needs to know how many it would be.
 constexpr double kFarTooMany = 50;
 // Of the vertices wanted, what the corners of curves that stay may take at most for details to be planned.
@@ -68,29 +71,30 @@ class Planner {
     SimplifiedFeatures simplified;
     std::vector<Vec3> points;
     std::vector<double> lengths;
-    double vertices = 0;  // that it takes
+    double vertices = 0;  // that it takes; infinity if these are more than need be told
   };
 
-  Trial trial(double width, double coarsening) const {
+  // `most`: more vertices need not be told from one another.
+  Trial trial(double width, double coarsening, double most) const {
     Trial t;
     t.width = width;
     t.simplified = simplify_features(features_, mesh_.vertices, weights_, width, links_, neighbours_);
     find_sizes(t, coarsening);
-    t.vertices = count(t, coarsening);
+    t.vertices = count(t, coarsening, most);
     return t;
   }
 
   // What resolves all details.
-  Trial finest(double coarsening) const { return trial(kFinest * mean_, coarsening); }
+  Trial finest(double coarsening) const { return trial(kFinest * mean_, coarsening, kFarTooMany * vertices_); }
 
   // The least width that there are vertices for. `all` is what resolves all details.
   Trial within_budget(Trial all) const {
     if (all.vertices <= vertices_) return all;
     double fine = kFinest * mean_, coarse = kCoarsest * mean_;
-    Trial best = trial(coarse, kCoarsening);
+    Trial best = trial(coarse, kCoarsening, vertices_);
     for (int k = 0; k < kBisections; ++k) {
       const double middle = std::sqrt(fine * coarse);
-      Trial t = trial(middle, kCoarsening);
+      Trial t = trial(middle, kCoarsening, vertices_);
       if (t.vertices <= vertices_) {
         coarse = middle;
         best = std::move(t);
@@ -172,40 +176,55 @@ class Planner {
     }
   }
 
-  // The vertices of equilateral triangles of the lengths wanted, as in estimate_mesh.
-  double count(const Trial& t, double coarsening) const {
+  // The vertices of equilateral triangles of the lengths wanted, as in estimate_mesh; infinity if they are more than
+  // `most`.
+  double count(const Trial& t, double coarsening, double most) const {
     std::optional<SizeField> field;
     if (!t.points.empty()) field.emplace(t.points, t.lengths, kDetailGradation);
-    const double most = kFarTooMany * vertices_;
     constexpr std::size_t kChunk = 256;
     std::vector<double> sums((mesh_.triangles.size() + kChunk - 1) / kChunk, 0);
+    std::atomic<double> total = 0;
     parallel_chunks(mesh_.triangles.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end && sums[chunk] < most; ++k) {
+      Counter counter{field, most};
+      for (std::size_t k = begin; k < end && total <= kSurely * most; ++k) {
         const Triangle& v = mesh_.triangles[k];
         const double plain = coarsening * (edge_length_[v[0]] + edge_length_[v[1]] + edge_length_[v[2]]) / 3;
-        add_piece({mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]}, plain, field, 0, most,
-                  sums[chunk]);
+        const double before = counter.sum;
+        counter.add({mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]}, plain);
+        total += counter.sum - before;
       }
+      sums[chunk] = counter.sum;
     });
     double sum = 0;
     for (const double s : sums) sum += s;
-    return sum;
+    return sum <= most ? sum : kInfinity;
   }
 
-  static void add_piece(const std::array<Vec3, 3>& p, double plain, const std::optional<SizeField>& field, int depth,
-                        double most, double& sum) {
-    if (sum > most) return;
-    const Vec3 middle = (1.0 / 3) * (p[0] + p[1] + p[2]);
-    const double bound = field ? (*field)(middle) : kInfinity, h = std::min(plain, bound);
-    const double longest = std::sqrt(std::max({norm2(p[1] - p[0]), norm2(p[2] - p[1]), norm2(p[0] - p[2])}));
-    if (depth < kDepth && longest > kPiece * h && bound - kDetailGradation * longest < plain) {
-      const std::array<Vec3, 3> m{0.5 * (p[1] + p[2]), 0.5 * (p[2] + p[0]), 0.5 * (p[0] + p[1])};
-      for (int k = 0; k < 3; ++k) add_piece({p[k], m[(k + 2) % 3], m[(k + 1) % 3]}, plain, field, depth + 1, most, sum);
-      add_piece(m, plain, field, depth + 1, most, sum);
-      return;
+  // Sums up vertices over pieces of triangles in which the lengths wanted change little.
+  struct Counter {
+    const std::optional<SizeField>& field;
+    double most;
+    double sum = 0;
+    Index near = 0;
+
+    void add(const std::array<Vec3, 3>& p, double plain, int depth = 0) {
+      if (sum > most) return;
+      const std::array<double, 3> squares{norm2(p[2] - p[1]), norm2(p[0] - p[2]), norm2(p[1] - p[0])};
+      const auto opposite =
+          static_cast<std::size_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
+      const double longest = std::sqrt(squares[opposite]), plain_all_over = plain + kDetailGradation * longest;
+      const Vec3 middle = (1.0 / 3) * (p[0] + p[1] + p[2]);
+      const double bound = field ? field->at_most(middle, plain_all_over, near) : kInfinity;
+      const double h = std::min(plain, bound);
+      if (depth < kDepth && longest > kPiece * h && bound < plain_all_over) {
+        const Vec3 &a = p[opposite], &b = p[(opposite + 1) % 3], &c = p[(opposite + 2) % 3], m = 0.5 * (b + c);
+        add({a, b, m}, plain, depth + 1);
+        add({a, m, c}, plain, depth + 1);
+        return;
+      }
+      sum += 2 / std::sqrt(3.0) * triangle_area(p[0], p[1], p[2]) / (h * h);
     }
-    sum += 2 / std::sqrt(3.0) * triangle_area(p[0], p[1], p[2]) / (h * h);
-  }
+  };
 
   struct Limb {
     Vec3 point;
@@ -248,7 +267,7 @@ DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, 
   Planner::Trial best = planner.finest(all ? 1 : kCoarsening);
   const double needed = best.vertices;
   if (!all) best = planner.within_budget(std::move(best));
-  else if (needed > kFarTooMany * static_cast<double>(vertices))
+  else if (std::isinf(needed))
     throw Error(
         fmt::format("all details take more than {:.0f} times the vertices asked for; ask for more of them, or "
                     "let finer details go",
@@ -259,7 +278,7 @@ DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, 
   plan.result.merged = best.simplified.merged;
   plan.result.let_go = best.simplified.let_go;
   if (plan.result.merged + plan.result.let_go > 0) plan.result.width = best.width;
-  if (needed < kFarTooMany * static_cast<double>(vertices)) plan.result.vertices = static_cast<std::size_t>(needed);
+  if (std::isfinite(needed)) plan.result.vertices = static_cast<std::size_t>(needed);
   return plan;
 }
 

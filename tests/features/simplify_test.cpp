@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <random>
 #include <set>
 
 #include "features/curve_network.h"
@@ -35,6 +36,76 @@ struct Chains {
     std::sort(graph.edges.begin(), graph.edges.end());
   }
 };
+
+// All shortest ways between a network's points by Floyd and Warshall, over links between points next to each other.
+std::vector<std::vector<CurveNetwork::Way>> all_ways(const FeatureCurves& curves, const CurveNetwork& network) {
+  const std::size_t count = network.points().size(), corners = curves.graph().corners.size();
+  std::vector<std::vector<CurveNetwork::Way>> ways(count, std::vector<CurveNetwork::Way>(count, {kInfinity, 0}));
+  const auto link = [&](Index a, Index b, double length) {
+    ways[a][b] = ways[b][a] = std::min(ways[a][b], CurveNetwork::Way{length, 0});
+  };
+  for (Index p = 0; p < count; ++p) ways[p][p] = {0, 0};
+  for (Index c = 0; c < curves.size(); ++c) {
+    std::vector<Index> on;
+    for (auto p = static_cast<Index>(corners); p < count; ++p)
+      if (network.curve(p) == c) on.push_back(p);
+    for (std::size_t k = 1; k < on.size(); ++k)
+      link(on[k - 1], on[k], network.position(on[k]) - network.position(on[k - 1]));
+    const double rest = curves.length(c) - network.position(on.back());
+    if (curves.closed(c)) {
+      link(on.back(), on.front(), rest + network.position(on.front()));
+    } else {
+      link(curves.ends(c)[0], on.front(), network.position(on.front()));
+      link(on.back(), curves.ends(c)[1], rest);
+    }
+  }
+  for (Index k = 0; k < count; ++k)
+    for (Index a = 0; a < count; ++a)
+      for (Index b = 0; b < count; ++b) {
+        if (a == k || b == k) continue;
+        const auto &first = ways[a][k], &second = ways[k][b];
+        const Index between = first.corners + second.corners + (k < corners ? 1 : 0);
+        ways[a][b] = std::min(ways[a][b], CurveNetwork::Way{first.length + second.length, between});
+      }
+  return ways;
+}
+
+TEST(CurveNetwork, WaysAreTheShortest) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    Chains chains;
+    for (int k = 0; k < 9; ++k) chains.corner({unit(random), unit(random), unit(random)});
+    for (int k = 0; k < 13; ++k) {
+      // Some curves join corners that others join, or come back to their own.
+      const Index a = k % 9, b = k == 4 ? a : static_cast<Index>(random() % 9);
+      chains.points.push_back({unit(random), unit(random), unit(random)});
+      const auto middle = static_cast<Index>(chains.points.size() - 1);
+      chains.points.push_back({unit(random), unit(random), unit(random)});
+      chains.graph.curves.push_back({{a, middle, middle + 1, b}});
+    }
+    for (int k = 0; k < 3; ++k) chains.points.push_back({unit(random), unit(random), unit(random)});
+    const auto last = static_cast<Index>(chains.points.size() - 1);
+    chains.graph.curves.push_back({{last - 2, last - 1, last}, true});
+    const FeatureCurves curves(chains.graph, chains.points);
+    const CurveNetwork network(curves, 0.2);
+    const auto expected = all_ways(curves, network);
+    CurveNetwork::Search search(network);
+    for (const double reach : {0.4, 1.5, 100.0})
+      for (Index a = 0; a < expected.size(); ++a) {
+        search.start(a, reach);
+        for (Index b = 0; b < expected.size(); ++b) {
+          const CurveNetwork::Way way = search.to(b);
+          if (expected[a][b].length > reach) {
+            EXPECT_EQ(way.length, kInfinity);
+            continue;
+          }
+          EXPECT_NEAR(way.length, expected[a][b].length, 1e-12);
+          EXPECT_EQ(way.corners, expected[a][b].corners) << a << " to " << b;
+        }
+      }
+  }
+}
 
 std::vector<double> gaps_of(const CurveNetwork& network, double reach) {
   return curve_gaps(network, std::vector<double>(network.points().size(), reach));
