@@ -32,6 +32,7 @@ class CurveNetwork {
   class Search {
    public:
     explicit Search(const CurveNetwork& network);
+    // Searches from a point, for ways no longer than `reach`.
     void start(Index from, double reach);
     // Of the shortest ways to a point that with the fewest corners. An infinite length if it is longer than the reach.
     Way to(Index point) const;

@@ -19,8 +19,8 @@ class SizeField {
 
   double gradation() const { return gradation_; }
   double operator()(const Vec3& x) const;
-  // The lesser of h and `most`. `near` is a sample that limited h nearby, and becomes one that limits it here: the
-  // search is quicker from there, and where h is more than `most`.
+  // The lesser of h and `most`, which is found sooner where h is more than that. `near` is the index of a sample that
+  // limited h nearby, or 0; the search starts there, and leaves the one that limits h here.
   double at_most(const Vec3& x, double most, Index& near) const;
   // h at each point. `near`, if as long as the points, says for each a sample that limited it before, and is written
   // likewise: the search is quicker from there.

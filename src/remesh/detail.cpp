@@ -45,7 +45,7 @@ constexpr std::size_t kMostPoints = 100'000;  // of the curves
 // Triangles are halved until they are no longer than so many edges, for integrals.
 constexpr double kPiece = 1.5;
 constexpr int kDepth = 24;
-// What a sum is more than in whatever order it is added up, in sums that threads add to as they go.
+// Threads add to a total in any order: only one that is beyond its limit by more than rounding ends the counting.
 constexpr double kSurely = 1 + 1e-6;
 // Vertices, in those wanted, beyond which nobody needs to know how many it would be.
 constexpr double kFarTooMany = 50;
