@@ -30,10 +30,9 @@ constexpr std::size_t kMostAdded = 100;
 // Lengths of curve, in edges: what a cell must hold to be snapped to it; what is worth a seed, and in the last rounds;
 // and links along a curve that are shorter are not divided.
 constexpr double kRoomToSnap = 0.4, kSmallest = 0.05, kTiniest = 0.002, kShortLink = 0.5;
-// Two curves from the same corner need protection where they are nearer than this, in edges. The shells of protecting
-// seeds are kStepPerGap gaps apart, where triangles between the curves have 34 degrees and their neighbours longer
-// edges than at a gap; but at least kLeastStep edges, and at most one. So many at most.
-constexpr double kAcute = 0.8, kStepPerGap = 1.5, kLeastStep = 0.3;
+// Two curves from the same corner need protection where they are nearer than this, in edges; the shells of protecting
+// seeds are at least kLeastStep edges apart, and so many at most.
+constexpr double kAcute = 0.8, kLeastStep = 0.3;
 constexpr std::size_t kMostShells = 1000;
 // Of the stretch of a curve in a corner's cell: how near the curve passes the corner then.
 constexpr double kPassing = 0.2;
@@ -190,7 +189,8 @@ void protect_arms(const FeatureCurves& curves, const CurveMeasure& measure, doub
       arms[a].positions.push_back(at[a]);
       arms[a].reach = length_along(curves, arms[a], at[a]) + 0.5 * edge;
     }
-    radius += std::clamp(kStepPerGap * narrowest, kLeastStep * edge, edge);
+    // Between close curves triangles are as large as the gap, if that is not too small.
+    radius += std::clamp(narrowest, kLeastStep * edge, edge);
   }
 }
 
