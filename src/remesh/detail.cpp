@@ -43,7 +43,7 @@ constexpr double kLimbSamples = 6, kMostLimbVertices = 50'000;
 constexpr int kBisections = 7;
 constexpr std::size_t kMostPoints = 100'000;  // of the curves
 // Triangles are halved until they are no longer than so many edges, for integrals.
-constexpr double kPiece = 1.5;
+constexpr double kPiece = 1;
 constexpr int kDepth = 24;
 // Threads add to a total in any order: only one that is beyond its limit by more than rounding ends the counting.
 constexpr double kSurely = 1 + 1e-6;
