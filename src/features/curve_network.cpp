@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <queue>
 #include <utility>
 
 #include "core/grouping.h"
 #include "core/parallel.h"
+#include "core/shortest_ways.h"
 #include "spatial/kd_tree.h"
 
 namespace bisector {
@@ -57,23 +56,20 @@ void CurveNetwork::Search::start(Index from, double reach) {
   reached_.clear();
   from_ = from;
   reach_ = reach;
-  using Step = std::pair<Way, Index>;
-  std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
-  const auto step = [&](const Way& way, Index corner) {
-    if (way.length > reach_ || !(way < to_corner_[corner])) return;
-    if (std::isinf(to_corner_[corner].length)) reached_.push_back(corner);
-    to_corner_[corner] = way;
-    steps.push({way, corner});
+  const auto links = [&](Index at, const auto& visit) {
+    if (network_.curve_[at] != kNone)
+      return network_.nearest_corners(at, [&](Index corner, double length) { visit(corner, length, kNone); });
+    for (const Link* link = network_.links_.begin(at); link != network_.links_.end(at); ++link)
+      visit(link->to, link->length, kNone);
   };
-  network_.nearest_corners(from, [&](Index corner, double length) { step({length, 0}, corner); });
-  while (!steps.empty()) {
-    const auto [way, corner] = steps.top();
-    steps.pop();
-    if (to_corner_[corner] < way) continue;
-    const Index passed = way.corners + (corner == from ? 0 : 1);
-    for (const Link* link = network_.links_.begin(corner); link != network_.links_.end(corner); ++link)
-      step({way.length + link->length, passed}, link->to);
-  }
+  shortest_ways(from, reach, links, [&](Index at, double length, Index before, Index) {
+    if (network_.curve_[at] != kNone) return true;
+    const Way way{length, before == kNone || before == from ? 0 : to_corner_[before].corners + 1};
+    if (!(way < to_corner_[at])) return false;
+    if (std::isinf(to_corner_[at].length)) reached_.push_back(at);
+    to_corner_[at] = way;
+    return true;
+  });
 }
 
 CurveNetwork::Way CurveNetwork::Search::to(Index point) const {

@@ -61,19 +61,16 @@ void SizeField::descend(std::size_t level, std::size_t i, const Vec3& q, double&
   for (std::size_t k = 0; k < count && order[k].first < best; ++k) descend(level - 1, order[k].second, q, best, at);
 }
 
-// `at` is a first guess, and becomes a sample that limits q.
-double SizeField::query(const Vec3& q, double best, Index& at) const {
-  best = std::min(best, lengths_[at] + gradation_ * norm(q - points_[at]));
-  descend(levels_.size() - 1, 0, q, best, at);
+double SizeField::at_most(const Vec3& x, double most, Index& near) const {
+  double best = std::min(most, lengths_[near] + gradation_ * norm(x - points_[near]));
+  descend(levels_.size() - 1, 0, x, best, near);
   return best;
 }
 
 double SizeField::operator()(const Vec3& x) const {
-  Index at = 0;
-  return query(x, std::numeric_limits<double>::infinity(), at);
+  Index near = 0;
+  return at_most(x, std::numeric_limits<double>::infinity(), near);
 }
-
-double SizeField::at_most(const Vec3& x, double most, Index& near) const { return query(x, most, near); }
 
 std::vector<double> SizeField::at(const std::vector<Vec3>& points, std::vector<Index>& near) const {
   std::vector<double> h(points.size());
@@ -83,7 +80,7 @@ std::vector<double> SizeField::at(const std::vector<Vec3>& points, std::vector<I
     Index last = 0;
     for (std::size_t k = begin; k < end; ++k) {
       if (guessed && near[k] < points_.size()) last = near[k];
-      h[k] = query(points[k], std::numeric_limits<double>::infinity(), last);
+      h[k] = at_most(points[k], std::numeric_limits<double>::infinity(), last);
       near[k] = last;
     }
   });

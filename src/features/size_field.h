@@ -33,7 +33,6 @@ class SizeField {
     double least = 0;
   };
 
-  double query(const Vec3& q, double best, Index& at) const;
   void descend(std::size_t level, std::size_t i, const Vec3& q, double& best, Index& at) const;
 
   double gradation_;

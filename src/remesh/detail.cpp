@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -45,8 +44,6 @@ constexpr std::size_t kMostPoints = 100'000;  // of the curves
 // Triangles are halved until they are no longer than so many edges, for integrals.
 constexpr double kPiece = 1;
 constexpr int kDepth = 24;
-// Threads add to a total in any order: only one that is beyond its limit by more than rounding ends the counting.
-constexpr double kSurely = 1 + 1e-6;
 // Vertices, in those wanted, beyond which nobody needs to know how many it would be.
 constexpr double kFarTooMany = 50;
 // Of the vertices wanted, what the corners of curves that stay may take at most for details to be planned.
@@ -160,8 +157,8 @@ class Planner {
     std::vector<double> gaps = curve_gaps(network, reach);
     const std::vector<char> stays = on_curves_that_stay(curves, network);
     for (std::size_t p = 0; p < plain.size(); ++p) {
-      // Curves that are no creases stay however near to each other they are, and edges that are too long for the gap
-      // leave slivers in it: shorter ones would be wasted.
+      // Curves that are no creases stay however near to each other they are. Where the shortest edges to be had are
+      // still too long for the gap, they would leave slivers in it all the same.
       if (stays[p] && kPerGap * gaps[p] < kBelowWidth * t.width) gaps[p] = kInfinity;
       const double length = std::max(std::min(bound[p], kPerGap * gaps[p]), kBelowWidth * t.width);
       if (length >= plain[p]) continue;
@@ -183,15 +180,12 @@ class Planner {
     if (!t.points.empty()) field.emplace(t.points, t.lengths, kDetailGradation);
     constexpr std::size_t kChunk = 256;
     std::vector<double> sums((mesh_.triangles.size() + kChunk - 1) / kChunk, 0);
-    std::atomic<double> total = 0;
     parallel_chunks(mesh_.triangles.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
       Counter counter{field, most};
-      for (std::size_t k = begin; k < end && total <= kSurely * most; ++k) {
+      for (std::size_t k = begin; k < end; ++k) {
         const Triangle& v = mesh_.triangles[k];
         const double plain = coarsening * (edge_length_[v[0]] + edge_length_[v[1]] + edge_length_[v[2]]) / 3;
-        const double before = counter.sum;
         counter.add({mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]}, plain);
-        total += counter.sum - before;
       }
       sums[chunk] = counter.sum;
     });

@@ -200,7 +200,6 @@ struct Localiser::Work {
   Clipper& clipper();
   void take(const Row& on, std::size_t polygon, Clipper& clipper);
   double squared_distance(Index triangle, Index cell, Clipper& clipper);
-  std::vector<Index> cells_in_parts() const;
   std::vector<std::size_t> nearest_to_seed(Index cell, std::span<const Index> triangles);
   std::vector<Triangles> find_strays(Index cell);
   void find_strays(const std::vector<Index>& cells);
@@ -310,28 +309,6 @@ std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, std::span<
   for (const auto& [distance, i] : tried)
     if (distance <= least + same) nearest.push_back(i);
   return nearest;
-}
-
-// The cells of several components in `raw`.
-std::vector<Index> Localiser::Work::cells_in_parts() const {
-  DisjointSets<> together(raw->pairs.size());
-  std::vector<Index> components(seeds.slot.size(), 0);
-  for (std::size_t p = 0; p < raw->pairs.size(); ++p) {
-    const auto& [triangle, cell] = raw->pairs[p];
-    ++components[cell];
-    for (std::size_t e = raw->offsets[p]; e < raw->offsets[p + 1]; ++e) {
-      if (!is_edge(raw->labels[e])) continue;
-      const std::size_t h = std::size_t{3} * triangle + (raw->labels[e] & ~kEdgeLabel);
-      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
-        const Row there{raw, first[*other / 3], first[*other / 3 + 1]};
-        if (const std::size_t q = there.find(cell); q < there.end) components[cell] -= together.join(p, q);
-      }
-    }
-  }
-  std::vector<Index> cells;
-  for (Index cell = 0; cell < components.size(); ++cell)
-    if (components[cell] > 1) cells.push_back(cell);
-  return cells;
 }
 
 // The components of a cell but for that nearest to its seed, or those that it is on.
@@ -700,7 +677,9 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
   among.reset(surface.mesh.triangles.size());
   regions.reset(seeds.x.size());
   back.clear();
-  find_strays(cells_in_parts());
+  std::vector<Index> cells(given.size());
+  std::iota(cells.begin(), cells.end(), Index{0});
+  find_strays(cells);
   return strays.size();
 }
 
