@@ -333,7 +333,10 @@ std::optional<Primitive> as_cone(const PrincipalForm& form) {
   const Vec3 apex = odd->point(odd->middle(0), odd->middle(1), odd->middle(2));
   if (!std::isfinite(norm2(apex))) return std::nullopt;
   const Vec3 axis = dot(odd->axes[2], apex) > 0 ? -odd->axes[2] : odd->axes[2];
-  return make_cone(apex, axis, std::atan(std::sqrt(-odd->lambda[2] / mean)));
+  // Eigenvalues of very different size give an angle that rounds to that of a line or of a plane.
+  const double angle = std::atan(std::sqrt(-odd->lambda[2] / mean));
+  if (!(angle > 0 && angle < std::acos(0.0))) return std::nullopt;
+  return make_cone(apex, axis, angle);
 }
 
 std::optional<Primitive> as_parallel_planes(const PrincipalForm& form) {

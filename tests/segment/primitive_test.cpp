@@ -321,6 +321,22 @@ TEST(Classify, QuadricsWithoutPointsAreFinite) {
   EXPECT_EQ(type_of(classify({}, {1, 2, 3}, 1, 0.1)), SurfaceType::plane);
 }
 
+TEST(Classify, EigenvaluesOfAnySizeGiveASurface) {
+  SplitMix64 random(9);
+  for (int i = 0; i < 2000; ++i) {
+    // In turned frames rounding sets small eigenvalues.
+    const std::array<Vec3, 3> axes = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+    const Vec3 centre;
+    std::array<double, 3> lambda;
+    for (double& x : lambda) x = (random.unit() < 0.5 ? -1 : 1) * std::pow(10.0, random.range(-80, 0));
+    const double c = i % 3 == 0 ? 0 : random.range(-1, 1) * std::pow(10.0, i % 3 == 1 ? 0 : random.range(-80, 0));
+    const Quadric quadric = test::placed(axes, centre, {lambda[0], lambda[1], lambda[2]}, 0, c);
+    Primitive found;
+    ASSERT_NO_THROW(found = classify(quadric, centre, 1, 1e-9)) << i;
+    EXPECT_TRUE(std::isfinite(distance(found, centre + random_point(random, 1)))) << i;
+  }
+}
+
 // ---- Fits.
 
 // Of a patch of `arc` radians each way, or as long; normals with noise as points.
