@@ -337,28 +337,33 @@ void PartitionEditor::teleport(Partition& partition) {
   int refusals = 0;
   for (std::size_t k = 0; k < most && refusals < kMostRefusals && lloyd_.counts.evaluations < budget; ++k) {
     lloyd_.context().check();
-    // The removal and the division that gain most together, unless they were tried.
+    // The removal and the division that gain most together, unless they were tried. Divisions in descending order of
+    // gain: the first that goes with a removal is the best for it.
     const std::vector<Removal> all = removals(partition);
+    const double energy = partition.energy();
+    std::vector<std::pair<double, Index>> gains;
+    for (Index d = 0; d < partition.regions.size(); ++d)
+      if (const double gain = division(partition, d).gain; gain > 0 && gain >= kWorthwhile * energy)
+        gains.emplace_back(gain, d);
+    std::stable_sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
     const auto version = [&](Index r) { return r == kNone ? 0 : partition.regions[r].version; };
     double best = -std::numeric_limits<double>::infinity();
     const Removal* removal = nullptr;
     Index region = kNone;
     for (const Removal& r : all)
-      for (Index d = 0; d < partition.regions.size(); ++d) {
-        if (d == r.region || d == r.into) continue;
-        const double divided = division(partition, d).gain, gain = divided - r.cost;
-        if (!(divided > 0) || divided < kLeastShare * r.cost || divided < kWorthwhile * partition.energy()) continue;
-        if (gain > best && !refused.count({version(r.region), version(r.into), version(d)})) {
-          best = gain;
-          removal = &r;
-          region = d;
-        }
+      for (const auto& [gain, d] : gains) {
+        if (gain - r.cost <= best || gain < kLeastShare * r.cost) break;
+        if (d == r.region || d == r.into || refused.count({version(r.region), version(r.into), version(d)})) continue;
+        best = gain - r.cost;
+        removal = &r;
+        region = d;
+        break;
       }
     if (!removal) break;
     refused.insert({version(removal->region), version(removal->into), version(region)});
     Partition next = divided(partition, region);
     next = without(next, *removal);
-    const double goal = (1 - kWorthwhile) * partition.energy();
+    const double goal = (1 - kWorthwhile) * energy;
     lloyd_.try_out(next, std::min(kTrialSteps, iterations_), goal);
     if (next.energy() < goal) {
       partition = std::move(next);
