@@ -8,6 +8,7 @@
 #include <set>
 #include <tuple>
 
+#include "core/parallel.h"
 #include "segment/flood.h"
 
 namespace bisector {
@@ -126,26 +127,23 @@ std::set<std::pair<Index, Index>> neighbouring(const SegmentDomain& domain, cons
 
 }  // namespace
 
-void PartitionEditor::divide(const Partition& partition, Index region, int steps, Division& division) {
+void PartitionEditor::divide(const Partition& partition, Index region, int steps, Division& division,
+                             Trial& trial) const {
   const SegmentDomain& domain = lloyd_.domain();
-  constexpr Index kBlocked = 2;
   const Index *begin = partition.triangles.begin(region), *end = partition.triangles.end(region);
-  std::vector<Index> labels;
-  std::vector<double> distances(domain.triangles.size());
   std::array<Proxy, 2> proxies = division.proxies;
   std::array<Index, 2> seeds = division.seeds;
   for (int k = 0; k < steps && seeds[0] != seeds[1]; ++k) {
-    labels.assign(domain.triangles.size(), kBlocked);
-    for (const Index* t = begin; t != end; ++t) labels[*t] = kNone;
-    flood(domain, {proxies[0], proxies[1]}, {{seeds[0], 0}, {seeds[1], 1}}, labels, distances,
-          lloyd_.counts.evaluations);
+    for (const Index* t = begin; t != end; ++t) trial.labels[*t] = kNone;
+    flood(domain, {proxies[0], proxies[1]}, {{seeds[0], 0}, {seeds[1], 1}}, trial.labels, trial.distances,
+          trial.evaluations);
     std::array<std::vector<Index>, 2> parts;
-    for (const Index* t = begin; t != end; ++t) parts[labels[*t]].push_back(*t);
+    for (const Index* t = begin; t != end; ++t) parts[trial.labels[*t]].push_back(*t);
     double energy = 0;
     for (std::size_t i = 0; i < 2; ++i) {
       const Index *first = parts[i].data(), *last = first + parts[i].size();
-      const RegionProxy fit =
-          lloyd_.refit(first, last, sum_of_moments(domain, first, last), nullptr, distances, k % 2 == 1);
+      const RegionProxy fit = lloyd_.refit(first, last, sum_of_moments(domain, first, last), nullptr, trial.distances,
+                                           trial.evaluations, k % 2 == 1);
       energy += fit.energy;
       proxies[i] = fit.proxy;
       seeds[i] = nearest_triangle(domain, parts[i], fit.proxy);
@@ -156,16 +154,15 @@ void PartitionEditor::divide(const Partition& partition, Index region, int steps
   }
 }
 
-const PartitionEditor::Division& PartitionEditor::division(const Partition& partition, Index region) {
-  const auto [at, fresh] = divisions_.try_emplace(partition.regions[region].version);
-  Division& best = at->second;
-  if (!fresh || partition.triangles.size(region) < 2) return best;
+PartitionEditor::Division PartitionEditor::find_division(const Partition& partition, Index region, Trial& trial) const {
+  Division best;
+  if (partition.triangles.size(region) < 2) return best;
   const SegmentDomain& domain = lloyd_.domain();
   const Index *begin = partition.triangles.begin(region), *end = partition.triangles.end(region);
   // A few steps from each start, and more from where the best has come to.
   const auto start = [&](const std::array<Proxy, 2>& proxies, const std::array<Index, 2>& seeds) {
     Division division{0, {}, proxies, seeds};
-    divide(partition, region, kFirstSteps, division);
+    divide(partition, region, kFirstSteps, division, trial);
     if (division.gain > best.gain) best = std::move(division);
   };
   const Index worst = farthest_triangle(partition, region);
@@ -174,16 +171,47 @@ const PartitionEditor::Division& PartitionEditor::division(const Partition& part
     if (parts[0].empty() || parts[1].empty()) continue;
     std::array<Proxy, 2> proxies;
     std::array<Index, 2> seeds;
-    std::vector<double> distances(domain.triangles.size());
     for (std::size_t i = 0; i < 2; ++i) {
       const Index *first = parts[i].data(), *last = first + parts[i].size();
-      proxies[i] = lloyd_.refit(first, last, sum_of_moments(domain, first, last), nullptr, distances, false).proxy;
+      proxies[i] = lloyd_
+                       .refit(first, last, sum_of_moments(domain, first, last), nullptr, trial.distances,
+                              trial.evaluations, false)
+                       .proxy;
       seeds[i] = nearest_triangle(domain, parts[i], proxies[i]);
     }
     start(proxies, seeds);
   }
-  if (best.gain > 0) divide(partition, region, kMoreSteps, best);
+  if (best.gain > 0) divide(partition, region, kMoreSteps, best, trial);
   return best;
+}
+
+void PartitionEditor::find_divisions(const Partition& partition) {
+  std::vector<Index> missing;
+  for (Index r = 0; r < partition.regions.size(); ++r)
+    if (!divisions_.count(partition.regions[r].version)) missing.push_back(r);
+  std::vector<Division> found(missing.size());
+  std::vector<std::size_t> evaluations(missing.size(), 0);
+  const std::size_t n = partition.labels.size();
+  constexpr Index kBlocked = 2;
+  constexpr std::size_t kAtOnce = 8;  // regions that share a trial's arrays
+  parallel_chunks(missing.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t last) {
+    Trial trial{std::vector<Index>(n, kBlocked), std::vector<double>(n), 0};
+    for (std::size_t k = first; k < last; ++k) {
+      trial.evaluations = 0;
+      found[k] = find_division(partition, missing[k], trial);
+      evaluations[k] = trial.evaluations;
+      for (const Index* t = partition.triangles.begin(missing[k]); t != partition.triangles.end(missing[k]); ++t)
+        trial.labels[*t] = kBlocked;
+    }
+  });
+  for (std::size_t k = 0; k < missing.size(); ++k) {
+    lloyd_.counts.evaluations += evaluations[k];
+    divisions_.emplace(partition.regions[missing[k]].version, std::move(found[k]));
+  }
+}
+
+const PartitionEditor::Division& PartitionEditor::division(const Partition& partition, Index region) const {
+  return divisions_.at(partition.regions[region].version);
 }
 
 Partition PartitionEditor::divided(const Partition& partition, Index region) {
@@ -193,21 +221,19 @@ Partition PartitionEditor::divided(const Partition& partition, Index region) {
   return lloyd_.fit(std::move(labels), count + 1, &partition);
 }
 
-double PartitionEditor::merging_cost(const Partition& partition, Index a, Index b) {
+double PartitionEditor::merging_cost(const Partition& partition, Index a, Index b, std::size_t& evaluations) const {
   const RegionProxy &x = partition.regions[a], &y = partition.regions[b];
-  const auto [at, fresh] = merging_.try_emplace(std::minmax(x.version, y.version));
-  if (!fresh) return at->second;
   std::vector<Index> both(partition.triangles.begin(a), partition.triangles.end(a));
   both.insert(both.end(), partition.triangles.begin(b), partition.triangles.end(b));
   std::sort(both.begin(), both.end());
   std::vector<double> distances(partition.labels.size());
   const SurfaceMoments moments = merged(x.moments, y.moments);
-  const RegionProxy fit = lloyd_.refit(both.data(), both.data() + both.size(), moments, nullptr, distances);
-  at->second = fit.energy - x.energy - y.energy;
-  return at->second;
+  const RegionProxy fit =
+      lloyd_.refit(both.data(), both.data() + both.size(), moments, nullptr, distances, evaluations);
+  return fit.energy - x.energy - y.energy;
 }
 
-double PartitionEditor::deletion_cost(const Partition& partition, Index region) {
+double PartitionEditor::deletion_cost(const Partition& partition, Index region, std::size_t& evaluations) const {
   const SegmentDomain& domain = lloyd_.domain();
   const auto& neighbours = domain.graph.neighbours;
   std::set<Index> around;
@@ -219,22 +245,44 @@ double PartitionEditor::deletion_cost(const Partition& partition, Index region) 
   for (const Index* t = partition.triangles.begin(region); t != partition.triangles.end(region); ++t) {
     double least = std::numeric_limits<double>::infinity();
     for (const Index r : around) least = std::min(least, distance_to(domain, *t, partition.regions[r].proxy));
-    lloyd_.counts.evaluations += around.size();
+    evaluations += around.size();
     sum += least;
   }
   return sum;
 }
 
 std::vector<PartitionEditor::Removal> PartitionEditor::removals(const Partition& partition) {
+  const auto versions = [&](Index a, Index b) {
+    return std::minmax(partition.regions[a].version, partition.regions[b].version);
+  };
+  const auto pairs = neighbouring(lloyd_.domain(), partition.labels);
+  std::vector<std::pair<Index, Index>> unknown;
+  for (const auto& [a, b] : pairs)
+    if (!merging_.count(versions(a, b))) unknown.emplace_back(a, b);
+  std::vector<double> merging(unknown.size()), deletion(partition.regions.size());
+  std::vector<std::size_t> evaluations(unknown.size() + deletion.size(), 0);
+  parallel_each(
+      evaluations.size(),
+      [&](std::size_t k) {
+        if (k < unknown.size())
+          merging[k] = merging_cost(partition, unknown[k].first, unknown[k].second, evaluations[k]);
+        else
+          deletion[k - unknown.size()] =
+              deletion_cost(partition, static_cast<Index>(k - unknown.size()), evaluations[k]);
+      },
+      1);
+  for (std::size_t k = 0; k < unknown.size(); ++k)
+    merging_.emplace(versions(unknown[k].first, unknown[k].second), merging[k]);
+  lloyd_.counts.evaluations += std::accumulate(evaluations.begin(), evaluations.end(), std::size_t{0});
+
   std::vector<Removal> all;
-  for (const auto& [a, b] : neighbouring(lloyd_.domain(), partition.labels)) {
+  for (const auto& [a, b] : pairs) {
     // The smaller one is what goes.
     const bool first = partition.triangles.size(a) < partition.triangles.size(b);
-    all.push_back({merging_cost(partition, a, b), first ? a : b, first ? b : a});
+    all.push_back({merging_.at(versions(a, b)), first ? a : b, first ? b : a});
   }
   for (Index r = 0; r < partition.regions.size(); ++r)
-    if (const double cost = deletion_cost(partition, r); cost < std::numeric_limits<double>::infinity())
-      all.push_back({cost, r, kNone});
+    if (deletion[r] < std::numeric_limits<double>::infinity()) all.push_back({deletion[r], r, kNone});
   std::sort(all.begin(), all.end(), [](const Removal& x, const Removal& y) {
     return std::tuple(x.cost, x.region, x.into) < std::tuple(y.cost, y.region, y.into);
   });
@@ -305,6 +353,7 @@ bool PartitionEditor::merge_redundant(Partition& partition) {
 }
 
 bool PartitionEditor::divide_best(Partition& partition) {
+  find_divisions(partition);
   Index best = kNone;
   double most = 0;
   for (Index r = 0; r < partition.regions.size(); ++r)
@@ -340,6 +389,7 @@ void PartitionEditor::teleport(Partition& partition) {
     // The removal and the division that gain most together, unless they were tried. Divisions in descending order of
     // gain: the first that goes with a removal is the best for it.
     const std::vector<Removal> all = removals(partition);
+    find_divisions(partition);
     const double energy = partition.energy();
     std::vector<std::pair<double, Index>> gains;
     for (Index d = 0; d < partition.regions.size(); ++d)

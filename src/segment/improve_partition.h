@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <map>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -44,18 +45,28 @@ class PartitionEditor {
     Index region = kNone, into = kNone;  // kNone: shared out among the neighbours
   };
 
-  const Division& division(const Partition& partition, Index region);
+  // Labels and distances of all triangles for trials in one region.
+  struct Trial {
+    std::vector<Index> labels;
+    std::vector<double> distances;
+    std::size_t evaluations = 0;
+  };
+
+  const Division& division(const Partition& partition, Index region) const;
+  // Finds the divisions of all regions that are not known yet.
+  void find_divisions(const Partition& partition);
+  Division find_division(const Partition& partition, Index region, Trial& trial) const;
   // Lloyd's iteration in one region from the division's proxies and seeds, as long as it gains.
-  void divide(const Partition& partition, Index region, int steps, Division& division);
-  double merging_cost(const Partition& partition, Index a, Index b);
-  double deletion_cost(const Partition& partition, Index region);
+  void divide(const Partition& partition, Index region, int steps, Division& division, Trial& trial) const;
+  double merging_cost(const Partition& partition, Index a, Index b, std::size_t& evaluations) const;
+  double deletion_cost(const Partition& partition, Index region, std::size_t& evaluations) const;
   std::vector<Removal> removals(const Partition& partition);  // the cheapest first
   Partition without(const Partition& partition, const Removal& removal);
   Partition divided(const Partition& partition, Index region);
 
   Lloyd& lloyd_;
   int iterations_;
-  std::map<std::uint64_t, Division> divisions_;                        // by version
+  std::unordered_map<std::uint64_t, Division> divisions_;              // by version
   std::map<std::pair<std::uint64_t, std::uint64_t>, double> merging_;  // by versions, the lower first
 };
 

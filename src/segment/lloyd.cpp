@@ -63,7 +63,7 @@ double Partition::energy() const {
 }
 
 RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMoments& moments, const RegionProxy* old,
-                         std::vector<double>& distances, bool tori) {
+                         std::vector<double>& distances, std::size_t& evaluations, bool tori) const {
   const auto count = static_cast<std::size_t>(end - begin);
   RegionProxy best;
   best.energy = std::numeric_limits<double>::infinity();
@@ -76,7 +76,7 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
   const auto consider = [&](const Proxy& proxy) {
     double energy = 0;
     for (std::size_t k = 0; k < count; ++k) energy += trial[k] = distance_to(domain_, begin[k], proxy);
-    counts.evaluations += count;
+    evaluations += count;
     if (!(energy < best.energy)) return;
     best.proxy = proxy;
     best.energy = energy;
@@ -111,8 +111,19 @@ RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMome
     }
   }
   best.moments = moments;
-  best.version = ++counts.versions;
   return best;
+}
+
+template <class Refit>
+void Lloyd::refit_all(const std::vector<Index>& regions, Partition& partition, const Refit& refit_one) {
+  std::vector<std::size_t> evaluations(regions.size(), 0);
+  parallel_each(
+      regions.size(),
+      [&](std::size_t k) { partition.regions[regions[k]] = refit_one(regions[k], evaluations[k]); }, 1);
+  for (std::size_t k = 0; k < regions.size(); ++k) {
+    counts.evaluations += evaluations[k];
+    partition.regions[regions[k]].version = ++counts.versions;
+  }
 }
 
 Partition Lloyd::fit(std::vector<Index> labels, std::size_t count, const Partition* known) {
@@ -122,6 +133,7 @@ Partition Lloyd::fit(std::vector<Index> labels, std::size_t count, const Partiti
   partition.distances = known ? known->distances : std::vector<double>(partition.labels.size());
   partition.regions.resize(count);
   partition.changed.assign(count, 1);
+  std::vector<Index> fresh;
   for (std::size_t r = 0; r < count; ++r) {
     const Index *begin = partition.triangles.begin(r), *end = partition.triangles.end(r);
     const Index like = known ? known->labels[*begin] : kNone;
@@ -129,9 +141,13 @@ Partition Lloyd::fit(std::vector<Index> labels, std::size_t count, const Partiti
       partition.regions[r] = known->regions[like];
       partition.changed[r] = known->changed[like];
     } else {
-      partition.regions[r] = refit(begin, end, sum_of_moments(domain_, begin, end), nullptr, partition.distances);
+      fresh.push_back(static_cast<Index>(r));
     }
   }
+  refit_all(fresh, partition, [&](Index r, std::size_t& evaluations) {
+    const Index *begin = partition.triangles.begin(r), *end = partition.triangles.end(r);
+    return refit(begin, end, sum_of_moments(domain_, begin, end), nullptr, partition.distances, evaluations);
+  });
   return partition;
 }
 
@@ -194,15 +210,19 @@ bool Lloyd::step(Partition& partition, bool flooding) {
   }
   next.triangles = items_of_labels<Index>(next.labels, count);
   const bool tori = counts.iterations % kToriEvery == 0;
-  for (std::size_t r = 0; r < count; ++r) {
-    const Index *begin = next.triangles.begin(r), *end = next.triangles.end(r);
-    next.changed[r] = !std::equal(begin, end, partition.triangles.begin(r), partition.triangles.end(r));
-    if (!next.changed[r]) continue;
-    const SurfaceMoments moments = changed_moments(domain_, partition.regions[r].moments, partition.triangles.begin(r),
-                                                   partition.triangles.end(r), begin, end);
-    const RegionProxy& old = partition.regions[r];
-    next.regions[r] = refit(begin, end, moments, &old, next.distances, tori || old.proxy.torus.has_value());
+  std::vector<Index> changed;
+  for (Index r = 0; r < count; ++r) {
+    next.changed[r] = !std::equal(next.triangles.begin(r), next.triangles.end(r), partition.triangles.begin(r),
+                                  partition.triangles.end(r));
+    if (next.changed[r]) changed.push_back(r);
   }
+  refit_all(changed, next, [&](Index r, std::size_t& evaluations) {
+    const Index *begin = next.triangles.begin(r), *end = next.triangles.end(r);
+    const RegionProxy& old = partition.regions[r];
+    const SurfaceMoments moments = changed_moments(domain_, old.moments, partition.triangles.begin(r),
+                                                   partition.triangles.end(r), begin, end);
+    return refit(begin, end, moments, &old, next.distances, evaluations, tori || old.proxy.torus.has_value());
+  });
   const double after = next.energy();
   if (!(after < before)) return false;
   partition = std::move(next);

@@ -49,9 +49,10 @@ class Lloyd {
   Partition fit(std::vector<Index> labels, std::size_t count, const Partition* known = nullptr);
   // The best proxy for some triangles, of which these are the moments; `old`, where there is one, if none has less
   // energy. `distances`, of all triangles, are read for `old` and written. `tori`: whether to try those, which are
-  // dear.
+  // dear. Adds the distances that were taken to `evaluations`; the version is the caller's to give. May be called for
+  // several regions at once.
   RegionProxy refit(const Index* begin, const Index* end, const SurfaceMoments& moments, const RegionProxy* old,
-                    std::vector<double>& distances, bool tori = true);
+                    std::vector<double>& distances, std::size_t& evaluations, bool tori = true) const;
   // Flooding and fitting, at most so many times, as long as the energy falls. It falls at each step: a flooding that
   // would raise it is replaced by moves of single triangles at borders, and a proxy is exchanged only for a better one.
   // Regions that neither changed nor border on such are left out.
@@ -70,6 +71,9 @@ class Lloyd {
 
  private:
   bool step(Partition& partition, bool flooding);
+  // Fits some regions at once; `refit_one` gives a region's proxy and adds to its evaluations.
+  template <class Refit>
+  void refit_all(const std::vector<Index>& regions, Partition& partition, const Refit& refit_one);
 
   const SegmentDomain& domain_;
   SegmentSurfaces surfaces_;
