@@ -38,14 +38,21 @@ BISECTOR_API WeldResult weld(const TriangleMesh& mesh, double tolerance);
 // must be below `vertex_count`.
 BISECTOR_API void orient(std::vector<Triangle>& triangles, std::size_t vertex_count);
 
+struct WrapResult {
+  TriangleMesh mesh;
+  double offset = 0;  // of the wrap from the triangles
+};
+
 // A closed manifold that does not intersect itself, around whatever triangles there are: their alpha wrap (Portaneri,
 // Rouxel-Labbe, Hemmer, Cohen-Steiner and Alliez 2022, "Alpha wrapping with an offset", ACM TOG 41(4)). Seen from
 // outside, openings and gaps that a ball of the radius `alpha` does not pass through are closed, and what is behind
 // them is filled; cavities without an opening are, too. The result lies a thirtieth of alpha outside of the triangles
 // where the ball reaches them; its own edges are up to about alpha long and do not follow sharp edges, which are
 // chamfered by as much. Its vertices are new, so labels and feature edges are not kept.
-// `alpha` is a length in the mesh's unit, at least a 2000th of the bounding box's diagonal, for time and memory grow
-// with its inverse square. Throws Error if it is less, or if no triangle has an area; Cancelled.
-BISECTOR_API TriangleMesh wrap(const TriangleMesh& mesh, double alpha, const Context& context = {});
+// A sheet that the ball reaches from both sides becomes a shell, two offsets thick. Where there are such, and they
+// would be thinner than `thickness`, the whole wrap lies half of that outside. Both are lengths in the mesh's unit;
+// alpha is at least a 2000th of the bounding box's diagonal, for time and memory grow with its inverse square. Throws
+// Error if it is less, if the thickness is negative or not finite, or if no triangle has an area; Cancelled.
+BISECTOR_API WrapResult wrap(const TriangleMesh& mesh, double alpha, double thickness = 0, const Context& context = {});
 
 }  // namespace bisector

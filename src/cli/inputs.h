@@ -18,10 +18,10 @@ std::vector<Vec3> read_seeds(const std::string& path, std::size_t count);
 // Folds of a wrap are those of its own triangles: creases are not looked for by themselves there.
 void leave_out_folds(const WrapOption& wrap, FeatureOptions& features);
 
-// Wraps a mesh if that is asked for; without a radius it is about the edge length of a mesh of so many vertices, or
-// `edge_length` if that is positive. Warns if labels are lost. Returns what the report says about it, null if there is
-// no wrap.
+// Wraps a mesh if that is asked for, so that tetrahedra fit into it if they are wanted; without a radius it is about
+// the edge length of a mesh of so many vertices, or `edge_length` if that is positive. Warns if labels are lost.
+// Returns what the report says about it, null if there is no wrap.
 Json wrap_if_asked(const WrapOption& option, const TriangleMesh& mesh, std::size_t vertices, double edge_length,
-                   Console& console, TriangleMesh& wrapped);
+                   bool tetrahedra, Console& console, TriangleMesh& wrapped);
 
 }  // namespace bisector::cli

@@ -304,7 +304,7 @@ void run(const RemeshCommand& command) {
   double io = reading.seconds();
   const RemeshOptions options = remesh_options(command, input);
   TriangleMesh wrap;
-  const Json wrapped = wrap_if_asked(command.wrap, input, options.vertices, options.edge_length, console, wrap);
+  const Json wrapped = wrap_if_asked(command.wrap, input, options.vertices, options.edge_length, false, console, wrap);
   const TriangleMesh& surface = wrapped.is_null() ? input : wrap;
   warn_of_labels(console, surface, command.output);
 

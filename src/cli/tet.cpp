@@ -337,7 +337,8 @@ void run(const TetCommand& command) {
   const TetOptions options = tet_options(command, input);
   double io = reading.seconds();
   TriangleMesh wrap;
-  const Json wrapped = wrap_if_asked(command.wrap, input.surface, options.vertices, options.edge_length, console, wrap);
+  const Json wrapped =
+      wrap_if_asked(command.wrap, input.surface, options.vertices, options.edge_length, true, console, wrap);
 
   const TetResult result = !wrapped.is_null() ? tetrahedralise(wrap, options, context)
                            : input.solid      ? tetrahedralise(input.tets, options, context)

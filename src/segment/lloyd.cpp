@@ -118,8 +118,7 @@ template <class Refit>
 void Lloyd::refit_all(const std::vector<Index>& regions, Partition& partition, const Refit& refit_one) {
   std::vector<std::size_t> evaluations(regions.size(), 0);
   parallel_each(
-      regions.size(),
-      [&](std::size_t k) { partition.regions[regions[k]] = refit_one(regions[k], evaluations[k]); }, 1);
+      regions.size(), [&](std::size_t k) { partition.regions[regions[k]] = refit_one(regions[k], evaluations[k]); }, 1);
   for (std::size_t k = 0; k < regions.size(); ++k) {
     counts.evaluations += evaluations[k];
     partition.regions[regions[k]].version = ++counts.versions;
@@ -219,8 +218,8 @@ bool Lloyd::step(Partition& partition, bool flooding) {
   refit_all(changed, next, [&](Index r, std::size_t& evaluations) {
     const Index *begin = next.triangles.begin(r), *end = next.triangles.end(r);
     const RegionProxy& old = partition.regions[r];
-    const SurfaceMoments moments = changed_moments(domain_, old.moments, partition.triangles.begin(r),
-                                                   partition.triangles.end(r), begin, end);
+    const SurfaceMoments moments =
+        changed_moments(domain_, old.moments, partition.triangles.begin(r), partition.triangles.end(r), begin, end);
     return refit(begin, end, moments, &old, next.distances, evaluations, tori || old.proxy.torus.has_value());
   });
   const double after = next.energy();
