@@ -18,7 +18,7 @@ struct TetImproveOptions {
   // Degrees, in (0, 60]: tetrahedra with a dihedral angle below this, or above 180 less this, are worked on.
   double goal = 35;
   double insert_below = 30;  // likewise: where nothing else helps, such tetrahedra get new vertices
-  double insertions = 0.02;  // new vertices, at most, over those of the mesh given
+  double insertions = 0.01;  // new vertices, at most, over those of the mesh given
   int rounds = 30;           // at most
   TetSlide slide = {};       // how boundary vertices may move; as it is, they don't
 };
