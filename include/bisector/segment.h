@@ -159,7 +159,8 @@ struct SegmentResult {
 };
 
 // Any mesh: open, non-manifold, of several components (each needs a region of its own), with triangles of no area.
-// Throws Error for a mesh without area, fewer proxies than components, more than triangles, and options out of range.
+// Throws Error for a mesh without area and options out of range. Fewer proxies than components or more than triangles
+// are a warning: there are as many regions as components, or as triangles.
 BISECTOR_API SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options,
                                    const Context& context = {});
 

@@ -8,6 +8,7 @@
 #include <set>
 #include <tuple>
 
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "segment/flood.h"
 
@@ -26,6 +27,10 @@ constexpr std::size_t kMostEvaluations = 100;  // of distances for each triangle
 constexpr int kMostRefusals = 10;              // in a row that do not lower the energy: others would hardly do better
 constexpr double kLeastShare = 0.1;   // of what the removal costs before iterating, that the division must gain
 constexpr double kWorthwhile = 1e-3;  // part of the energy that a teleportation must gain
+
+// Regions that are far from each other are divided, or removed, in one round where they gain so much of what the best
+// does, or cost so many times what the cheapest does.
+constexpr double kNearlyBest = 0.5, kNearlyCheapest = 2;
 
 constexpr double kRedundant = 0.5;  // of the largest energy of a region: a merging that costs less is one to make
 
@@ -125,6 +130,17 @@ std::set<std::pair<Index, Index>> neighbouring(const SegmentDomain& domain, cons
   return pairs;
 }
 
+// Of each region those that share an edge with it.
+Csr<Index> neighbours_of_regions(const SegmentDomain& domain, const Partition& partition) {
+  const auto pairs = neighbouring(domain, partition.labels);
+  return group_into_rows<Index>(partition.regions.size(), [&](const auto& add) {
+    for (const auto& [a, b] : pairs) {
+      add(a, b);
+      add(b, a);
+    }
+  });
+}
+
 }  // namespace
 
 void PartitionEditor::divide(const Partition& partition, Index region, int steps, Division& division,
@@ -214,19 +230,22 @@ const PartitionEditor::Division& PartitionEditor::division(const Partition& part
   return divisions_.at(partition.regions[region].version);
 }
 
-Partition PartitionEditor::divided(const Partition& partition, Index region) {
+Partition PartitionEditor::divided(const Partition& partition, const std::vector<Index>& regions) {
   std::vector<Index> labels = partition.labels;
-  const auto count = static_cast<Index>(partition.regions.size());
-  for (const Index t : division(partition, region).part) labels[t] = count;
-  return lloyd_.fit(std::move(labels), count + 1, &partition);
+  auto count = static_cast<Index>(partition.regions.size());
+  for (const Index region : regions) {
+    for (const Index t : division(partition, region).part) labels[t] = count;
+    ++count;
+  }
+  return lloyd_.fit(std::move(labels), count, &partition);
 }
 
-double PartitionEditor::merging_cost(const Partition& partition, Index a, Index b, std::size_t& evaluations) const {
+double PartitionEditor::merging_cost(const Partition& partition, Index a, Index b, std::vector<double>& distances,
+                                     std::size_t& evaluations) const {
   const RegionProxy &x = partition.regions[a], &y = partition.regions[b];
   std::vector<Index> both(partition.triangles.begin(a), partition.triangles.end(a));
   both.insert(both.end(), partition.triangles.begin(b), partition.triangles.end(b));
   std::sort(both.begin(), both.end());
-  std::vector<double> distances(partition.labels.size());
   const SurfaceMoments moments = merged(x.moments, y.moments);
   const RegionProxy fit =
       lloyd_.refit(both.data(), both.data() + both.size(), moments, nullptr, distances, evaluations);
@@ -261,16 +280,16 @@ std::vector<PartitionEditor::Removal> PartitionEditor::removals(const Partition&
     if (!merging_.count(versions(a, b))) unknown.emplace_back(a, b);
   std::vector<double> merging(unknown.size()), deletion(partition.regions.size());
   std::vector<std::size_t> evaluations(unknown.size() + deletion.size(), 0);
-  parallel_each(
-      evaluations.size(),
-      [&](std::size_t k) {
-        if (k < unknown.size())
-          merging[k] = merging_cost(partition, unknown[k].first, unknown[k].second, evaluations[k]);
-        else
-          deletion[k - unknown.size()] =
-              deletion_cost(partition, static_cast<Index>(k - unknown.size()), evaluations[k]);
-      },
-      1);
+  constexpr std::size_t kAtOnce = 8;  // pairs that share an array
+  parallel_chunks(evaluations.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t last) {
+    std::vector<double> distances(first < unknown.size() ? partition.labels.size() : 0);
+    for (std::size_t k = first; k < last; ++k)
+      if (k < unknown.size())
+        merging[k] = merging_cost(partition, unknown[k].first, unknown[k].second, distances, evaluations[k]);
+      else
+        deletion[k - unknown.size()] =
+            deletion_cost(partition, static_cast<Index>(k - unknown.size()), evaluations[k]);
+  });
   for (std::size_t k = 0; k < unknown.size(); ++k)
     merging_.emplace(versions(unknown[k].first, unknown[k].second), merging[k]);
   lloyd_.counts.evaluations += std::accumulate(evaluations.begin(), evaluations.end(), std::size_t{0});
@@ -289,27 +308,35 @@ std::vector<PartitionEditor::Removal> PartitionEditor::removals(const Partition&
   return all;
 }
 
-Partition PartitionEditor::without(const Partition& partition, const Removal& removal) {
-  const auto last = static_cast<Index>(partition.regions.size() - 1);
+Partition PartitionEditor::without(const Partition& partition, const std::vector<Removal>& removals) {
+  const std::size_t count = partition.regions.size();
+  std::vector<Index> into(count), number(count, kNone);
+  std::iota(into.begin(), into.end(), 0u);
+  std::set<Index> deleted, around;
+  for (const Removal& removal : removals)
+    if (removal.into != kNone)
+      into[removal.region] = removal.into;
+    else
+      deleted.insert(removal.region);
+  if (!deleted.empty())
+    for (const auto& [a, b] : neighbouring(lloyd_.domain(), partition.labels)) {
+      if (deleted.count(a)) around.insert(b);
+      if (deleted.count(b)) around.insert(a);
+    }
   std::vector<Index> labels = partition.labels;
-  if (removal.into != kNone) {
-    for (Index& l : labels)
-      if (l == removal.region) l = removal.into;
-  } else {
-    // Flooded by its neighbours from their seeds.
-    std::set<Index> around;
-    for (const auto& [a, b] : neighbouring(lloyd_.domain(), partition.labels))
-      if (a == removal.region || b == removal.region) around.insert(a == removal.region ? b : a);
+  for (Index& l : labels) l = deleted.count(l) || around.count(l) ? kNone : into[l];
+  // What is deleted is flooded by its neighbours from their seeds.
+  if (!around.empty()) {
     std::vector<FloodSeed> seeds;
     for (const Index r : around) seeds.push_back({lloyd_.seed(partition, r), r});
-    for (Index& l : labels)
-      if (l == removal.region || around.count(l)) l = kNone;
     std::vector<double> distances(labels.size());
     flood(lloyd_.domain(), lloyd_.proxies(partition), seeds, labels, distances, lloyd_.counts.evaluations);
   }
-  for (Index& l : labels)
-    if (l == last) l = removal.region;
-  return lloyd_.fit(std::move(labels), last, &partition);
+  Index left = 0;
+  for (Index r = 0; r < count; ++r)
+    if (into[r] == r && !deleted.count(r)) number[r] = left++;
+  for (Index& l : labels) l = number[l];
+  return lloyd_.fit(std::move(labels), left, &partition);
 }
 
 bool PartitionEditor::insert_farthest(Partition& partition) {
@@ -344,7 +371,7 @@ bool PartitionEditor::merge_redundant(Partition& partition) {
   for (const Removal& removal : removals(partition)) {
     if (removal.into == kNone) continue;
     if (!(removal.cost < kRedundant * largest)) return false;
-    partition = without(partition, removal);
+    partition = without(partition, {removal});
     lloyd_.iterate(partition, iterations_);
     ++merges;
     return true;
@@ -352,31 +379,63 @@ bool PartitionEditor::merge_redundant(Partition& partition) {
   return false;
 }
 
-bool PartitionEditor::divide_best(Partition& partition) {
+bool PartitionEditor::divide_best(Partition& partition, std::size_t most, double enough) {
   find_divisions(partition);
-  Index best = kNone;
-  double most = 0;
+  std::vector<std::pair<double, Index>> gains;
   for (Index r = 0; r < partition.regions.size(); ++r)
-    if (const double gain = division(partition, r).gain; gain > most) {
-      most = gain;
-      best = r;
-    }
-  if (best == kNone) return false;
-  partition = divided(partition, best);
+    if (const double gain = division(partition, r).gain; gain > 0) gains.emplace_back(gain, r);
+  if (gains.empty()) return false;
+  std::stable_sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  const Csr<Index> around = neighbours_of_regions(lloyd_.domain(), partition);
+  std::vector<char> taken(partition.regions.size(), 0);
+  std::vector<Index> chosen;
+  double energy = partition.energy();
+  for (const auto& [gain, r] : gains) {
+    if (!chosen.empty() && (gain < kNearlyBest * gains[0].first || chosen.size() == most || energy <= enough)) break;
+    if (taken[r]) continue;
+    for (const Index* n = around.begin(r); n != around.end(r); ++n) taken[*n] = 1;
+    chosen.push_back(r);
+    energy -= gain;
+  }
+  partition = divided(partition, chosen);
   lloyd_.iterate(partition, iterations_);
-  ++insertions;
+  insertions += chosen.size();
   return true;
 }
 
-bool PartitionEditor::remove_cheapest(Partition& partition, double most_energy) {
+bool PartitionEditor::remove_cheapest(Partition& partition, std::size_t most, double most_energy) {
   const std::vector<Removal> all = removals(partition);
-  if (all.empty() || partition.energy() + all[0].cost > most_energy) return false;
-  Partition next = without(partition, all[0]);
-  lloyd_.try_out(next, std::min(kTrialSteps, iterations_), most_energy);
-  if (next.energy() > most_energy) return false;
-  partition = std::move(next);
-  ++(all[0].into == kNone ? deletions : merges);
-  return true;
+  double energy = partition.energy();
+  if (all.empty() || energy + all[0].cost > most_energy) return false;
+  // Neither these nor, where one is shared out among its neighbours, those may be changed twice.
+  const Csr<Index> around = neighbours_of_regions(lloyd_.domain(), partition);
+  std::vector<char> taken(partition.regions.size(), 0);
+  std::vector<Removal> chosen;
+  for (const Removal& r : all) {
+    if (!chosen.empty() &&
+        (chosen.size() == most || r.cost > kNearlyCheapest * all[0].cost || energy + r.cost > most_energy))
+      break;
+    std::vector<Index> touched{r.region};
+    if (r.into != kNone)
+      touched.push_back(r.into);
+    else
+      touched.insert(touched.end(), around.begin(r.region), around.end(r.region));
+    if (std::any_of(touched.begin(), touched.end(), [&](Index q) { return taken[q]; })) continue;
+    for (const Index q : touched) taken[q] = 1;
+    chosen.push_back(r);
+    energy += r.cost;
+  }
+  for (;;) {
+    Partition next = without(partition, chosen);
+    lloyd_.try_out(next, std::min(kTrialSteps, iterations_), most_energy);
+    if (next.energy() <= most_energy) {
+      partition = std::move(next);
+      for (const Removal& r : chosen) ++(r.into == kNone ? deletions : merges);
+      return true;
+    }
+    if (chosen.size() == 1) return false;
+    chosen.resize(1);
+  }
 }
 
 void PartitionEditor::teleport(Partition& partition) {
@@ -411,8 +470,8 @@ void PartitionEditor::teleport(Partition& partition) {
       }
     if (!removal) break;
     refused.insert({version(removal->region), version(removal->into), version(region)});
-    Partition next = divided(partition, region);
-    next = without(next, *removal);
+    Partition next = divided(partition, {region});
+    next = without(next, {*removal});
     const double goal = (1 - kWorthwhile) * energy;
     lloyd_.try_out(next, std::min(kTrialSteps, iterations_), goal);
     if (next.energy() < goal) {

@@ -23,11 +23,12 @@ class PartitionEditor {
   // Merges the pair of neighbours that costs least if that is below half the largest energy of a region and the union
   // has a valid proxy (thesis, "Proxy merging"), and iterates.
   bool merge_redundant(Partition& partition);
-  // Divides the region that gains most by it, and iterates. False: none gains.
-  bool divide_best(Partition& partition);
-  // Removes the region that costs least while the energy stays at most so large, and iterates a little. False: none can
-  // go.
-  bool remove_cheapest(Partition& partition, double most_energy);
+  // Divides the region that gains most by it, and others that gain nearly as much and are no neighbours of one that is
+  // divided: at most `most`, and only until the energy is likely to be `enough`. Then iterates. False: none gains.
+  bool divide_best(Partition& partition, std::size_t most, double enough);
+  // Removes the region that costs least, and others elsewhere that cost hardly more: at most `most`, while the energy
+  // stays at most so large. Iterates a little. False: none can go.
+  bool remove_cheapest(Partition& partition, std::size_t most, double most_energy);
   // Moves regions from where they are hardly missed to where they gain most, as long as the energy falls.
   void teleport(Partition& partition);
 
@@ -58,11 +59,14 @@ class PartitionEditor {
   Division find_division(const Partition& partition, Index region, Trial& trial) const;
   // Lloyd's iteration in one region from the division's proxies and seeds, as long as it gains.
   void divide(const Partition& partition, Index region, int steps, Division& division, Trial& trial) const;
-  double merging_cost(const Partition& partition, Index a, Index b, std::size_t& evaluations) const;
+  // `distances`: room for one of each triangle.
+  double merging_cost(const Partition& partition, Index a, Index b, std::vector<double>& distances,
+                      std::size_t& evaluations) const;
   double deletion_cost(const Partition& partition, Index region, std::size_t& evaluations) const;
   std::vector<Removal> removals(const Partition& partition);  // the cheapest first
-  Partition without(const Partition& partition, const Removal& removal);
-  Partition divided(const Partition& partition, Index region);
+  // Removals must not touch each other's regions, nor the neighbours of one that is shared out.
+  Partition without(const Partition& partition, const std::vector<Removal>& removals);
+  Partition divided(const Partition& partition, const std::vector<Index>& regions);
 
   Lloyd& lloyd_;
   int iterations_;

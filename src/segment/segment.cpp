@@ -56,15 +56,18 @@ void check_options(const SegmentOptions& options) {
     throw Error(fmt::format("{} fuzzy rings are asked for; ask for 1 or more", options.fuzzy_rings));
 }
 
-void check_count(const SegmentDomain& domain, std::size_t proxies) {
-  if (proxies == 0) return;
-  if (proxies > domain.triangles.size())
-    throw Error(fmt::format("{} proxies are asked for, but the mesh has {} triangles only; ask for fewer", proxies,
-                            domain.triangles.size()));
-  if (proxies < domain.component_count)
-    throw Error(fmt::format(
-        "{} proxies are asked for, but the mesh has {} components, of which each needs one; ask for as many", proxies,
-        domain.component_count));
+// How many regions there can be nearest to the number asked for: each component needs one, and each a triangle.
+std::size_t possible_count(const SegmentDomain& domain, std::size_t proxies, const Context& context) {
+  const std::size_t least = domain.component_count, most = domain.triangles.size();
+  if (proxies == 0) return 0;
+  if (proxies > most)
+    context.warn(fmt::format("{} proxies are asked for, but the mesh has {} triangles only; each is a region of its own",
+                             proxies, most));
+  if (proxies < least)
+    context.warn(fmt::format(
+        "{} proxies are asked for, but the mesh has {} components, of which each needs one; there are as many regions",
+        proxies, least));
+  return std::clamp(proxies, least, most);
 }
 
 // The root mean square distance that SegmentOptions::error allows, in the unit-sized model.
@@ -127,42 +130,54 @@ void report(const Context& context, const char* phase, double fraction, double e
   context.check();
 }
 
-Partition partition_of(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& options, SegmentSeconds& seconds) {
+// The mean square distance that the options allow, integrated; 0 where they ask for a number of regions.
+double allowed_energy(const SegmentDomain& domain, const SegmentOptions& options) {
+  const double rms = options.proxies > 0 ? 0 : allowed_rms(domain, options.error);
+  return rms * rms * domain.area;
+}
+
+Partition start_partition(Lloyd& lloyd, const SegmentOptions& options) {
+  report(lloyd.context(), "start", 0);
+  const std::size_t at_random = options.start == SegmentStart::random ? options.proxies : 1;
+  return options.start == SegmentStart::merging
+             ? start_by_merging(lloyd, options, allowed_energy(lloyd.domain(), options))
+             : start_at_random(lloyd, at_random, options.random_seed);
+}
+
+// Inserts regions until there are enough and takes away those that are not needed. `fresh`: of a partition that was
+// not improved yet, regions are also moved from where they are hardly missed.
+void improve(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& options, bool fresh, Partition& partition,
+             SegmentSeconds& seconds) {
   const Context& context = lloyd.context();
+  const bool merging = options.start == SegmentStart::merging;
   const std::size_t wanted = options.proxies;
-  const double most_rms = wanted > 0 ? 0 : allowed_rms(lloyd.domain(), options.error);
-  const double allowed = most_rms * most_rms * lloyd.domain().area;
+  const double allowed = allowed_energy(lloyd.domain(), options);
   const auto enough = [&](const Partition& p) {
     return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed;
   };
   Stopwatch clock;
-  report(context, "start", 0);
-  const bool merging = options.start == SegmentStart::merging;
-  const std::size_t at_random = options.start == SegmentStart::random ? wanted : 1;
-  Partition partition =
-      merging ? start_by_merging(lloyd, options, allowed) : start_at_random(lloyd, at_random, options.random_seed);
-  seconds.start = clock.lap();
-
   report(context, "Lloyd", 0.2, partition.energy());
   lloyd.iterate(partition, options.iterations);
   while (!enough(partition)) {
     report(context, "inserting regions", 0.3, partition.energy());
-    if (!(merging ? editor.divide_best(partition) : editor.insert_farthest(partition))) break;
+    const std::size_t most = wanted > 0 ? wanted - partition.regions.size() : partition.labels.size();
+    if (!(merging ? editor.divide_best(partition, most, allowed) : editor.insert_farthest(partition))) break;
     // What was inserted first may be redundant by now; its region is of more use where the error is largest.
     if (!merging && enough(partition) && editor.merge_redundant(partition)) editor.insert_farthest(partition);
   }
-  seconds.lloyd = clock.lap();
+  seconds.lloyd += clock.lap();
 
   report(context, "moving regions", 0.6, partition.energy());
   constexpr double kAnyEnergy = std::numeric_limits<double>::infinity();
-  while (wanted > 0 && partition.regions.size() > wanted && editor.remove_cheapest(partition, kAnyEnergy))
+  while (wanted > 0 && partition.regions.size() > wanted &&
+         editor.remove_cheapest(partition, partition.regions.size() - wanted, kAnyEnergy))
     context.check();
-  editor.teleport(partition);
+  if (fresh) editor.teleport(partition);
   if (wanted == 0)
-    while (editor.remove_cheapest(partition, allowed)) report(context, "removing regions", 0.7, partition.energy());
+    while (editor.remove_cheapest(partition, partition.regions.size(), allowed))
+      report(context, "removing regions", 0.7, partition.energy());
   lloyd.iterate(partition, options.iterations);
-  seconds.improve = clock.lap();
-  return partition;
+  seconds.improve += clock.lap();
 }
 
 // Numbers the regions in descending order of area.
@@ -276,44 +291,83 @@ std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDoma
   return result;
 }
 
-// With the error that the options ask for as an aim; the result's may be larger.
-SegmentResult segment_once(const TriangleMesh& mesh, const SegmentDomain& domain, const SegmentOptions& options,
-                           const Context& context) {
+// The regions' primitives and borders, and how far they are.
+struct Classified {
+  std::vector<Index> labels;
+  std::vector<Primitive> primitives;
+  double rms_before = 0, rms = 0;  // before and after smoothing, in the unit-sized model
+  double border_before = 0, border_after = 0, smooth = 0;
+};
+
+Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition& partition, SegmentSeconds& seconds) {
+  const SegmentDomain& domain = lloyd.domain();
+  const Context& context = lloyd.context();
+  report(context, "classifying", 0.9, partition.energy());
   Stopwatch clock;
+  Classified result;
+  result.primitives = region_primitives(domain, partition.labels, partition.regions.size(), lloyd.proxies(partition),
+                                        options.surfaces);
+  result.labels = partition.labels;
+  polish_borders(domain, proxies_of(result.primitives), result.labels, lloyd.counts.evaluations);
+  simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
+  refine_primitives(domain, result.labels, result.primitives);
+  const std::vector<Proxy> proxies = proxies_of(result.primitives);
+  seconds.classify += clock.lap();
+  result.border_before = result.border_after = border_length(domain.graph, result.labels);
+  result.rms_before = std::sqrt(mean_square(domain, result.labels, proxies));
+  if (options.smooth > 0) {
+    report(context, "smoothing borders", 0.95);
+    result.smooth = smooth_within(domain, options, proxies, result.rms_before, result.labels, result.primitives);
+    result.border_after = border_length(domain.graph, result.labels);
+  }
+  sort_regions(domain, result.labels, result.primitives);
+  result.rms = std::sqrt(mean_square(domain, result.labels, proxies_of(result.primitives)));
+  seconds.smooth += clock.lap();
+  return result;
+}
+
+}  // namespace
+
+SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
+  Stopwatch total;
+  check_options(options);
+  const SegmentDomain domain = make_segment_domain(mesh);
+  SegmentOptions aimed = options;
+  aimed.proxies = possible_count(domain, options.proxies, context);
   SegmentResult result;
   Lloyd lloyd(domain, options.surfaces, context);
   PartitionEditor editor(lloyd, options.iterations);
-  Partition partition = partition_of(lloyd, editor, options, result.seconds);
-  const std::size_t count = partition.regions.size();
-
-  report(context, "classifying", 0.9, partition.energy());
-  clock.lap();
-  std::vector<Primitive> primitives =
-      region_primitives(domain, partition.labels, count, lloyd.proxies(partition), options.surfaces);
-  std::vector<Proxy> proxies = proxies_of(primitives);
-  std::vector<Index> labels = std::move(partition.labels);
-  polish_borders(domain, proxies, labels, lloyd.counts.evaluations);
-  simplify_primitives(domain, options.surfaces, labels, primitives, lloyd.counts.evaluations);
-  refine_primitives(domain, labels, primitives);
-  proxies = proxies_of(primitives);
-  result.seconds.classify = clock.lap();
-  result.border_before = result.border_after = border_length(domain.graph, labels);
-  result.rms_before = domain.scale * std::sqrt(mean_square(domain, labels, proxies));
-  if (options.smooth > 0) {
-    report(context, "smoothing borders", 0.95);
-    result.smooth = smooth_within(domain, options, proxies, result.rms_before / domain.scale, labels, primitives);
-    result.border_after = border_length(domain.graph, labels);
+  Stopwatch clock;
+  Partition partition = start_partition(lloyd, aimed);
+  result.seconds.start = clock.lap();
+  const double most = allowed_rms(domain, options.error);
+  Classified classified;
+  for (int k = 0; k < kAttempts; ++k) {
+    improve(lloyd, editor, aimed, k == 0, partition, result.seconds);
+    classified = classify(lloyd, aimed, partition, result.seconds);
+    if (options.proxies > 0 || classified.rms <= most) break;
+    aimed.error *= kAim * most / classified.rms;
   }
-  sort_regions(domain, labels, primitives);
-  result.seconds.smooth = clock.lap();
-  result.rms = domain.scale * std::sqrt(mean_square(domain, labels, proxies_of(primitives)));
+  if (options.proxies == 0 && classified.rms > most)
+    context.warn(
+        fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
+                    "a number of proxies",
+                    domain.scale * classified.rms, domain.scale * most));
 
+  clock.lap();
+  const std::vector<Index>& labels = classified.labels;
+  const std::size_t count = partition.regions.size();
   const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   for (std::size_t r = 0; r < count; ++r)
-    result.regions.push_back(measure_region(domain, primitives[r], triangles.begin(r), triangles.end(r)));
-  if (options.project) result.projected = projected_vertices(mesh, domain, labels, primitives, result.regions);
+    result.regions.push_back(measure_region(domain, classified.primitives[r], triangles.begin(r), triangles.end(r)));
+  if (options.project) result.projected = projected_vertices(mesh, domain, labels, classified.primitives, result.regions);
   result.seconds.project = clock.lap();
-  result.labels = std::move(labels);
+  result.rms = domain.scale * classified.rms;
+  result.rms_before = domain.scale * classified.rms_before;
+  result.smooth = classified.smooth;
+  result.border_before = classified.border_before;
+  result.border_after = classified.border_after;
+  result.labels = std::move(classified.labels);
   result.iterations = lloyd.counts.iterations;
   result.evaluations = lloyd.counts.evaluations;
   result.energies = std::move(lloyd.counts.energies);
@@ -321,30 +375,7 @@ SegmentResult segment_once(const TriangleMesh& mesh, const SegmentDomain& domain
   result.merges = editor.merges;
   result.deletions = editor.deletions;
   result.teleportations = editor.teleportations;
-  return result;
-}
-
-}  // namespace
-
-SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
-  Stopwatch clock;
-  check_options(options);
-  const SegmentDomain domain = make_segment_domain(mesh);
-  check_count(domain, options.proxies);
-  const double most = domain.scale * allowed_rms(domain, options.error);
-  SegmentOptions aimed = options;
-  SegmentResult result;
-  for (int k = 0; k < kAttempts; ++k) {
-    result = segment_once(mesh, domain, aimed, context);
-    if (options.proxies > 0 || result.rms <= most) break;
-    aimed.error *= kAim * most / result.rms;
-  }
-  if (options.proxies == 0 && result.rms > most)
-    context.warn(
-        fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
-                    "a number of proxies",
-                    result.rms, most));
-  result.seconds.total = clock.seconds();
+  result.seconds.total = total.seconds();
   return result;
 }
 
