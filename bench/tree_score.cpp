@@ -37,7 +37,8 @@ const char* const kHead =
     "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
     "---|\n";
 
-void print_row(const std::string& path, std::size_t points, double leaves, const std::string& seed, const Row& r) {
+void print_row(const std::string& path, const std::string& points, double leaves, const std::string& seed,
+               const Row& r) {
   fmt::print(
       "| {} | {} | {:.0f} % | {} | {:.3g} | {:.1f} % | {:.1f} % | {:.3g} | {:.1f} % | {:.1f} % | {:+.1f} % | "
       "{:.1f} % | {:.1f} % | {:.2f} | {:.3g} | {:.2f} |\n",
@@ -99,7 +100,7 @@ test::TreeScanOptions options_of(test::ScanPath path, std::size_t points, double
 void score_generated(const std::vector<std::string>& paths, const std::vector<std::size_t>& counts,
                      const std::vector<double>& leaves, const std::array<std::uint64_t, 2>& seeds) {
   fmt::print("{}", kHead);
-  std::vector<Row> all;
+  std::map<double, std::vector<Row>> all;  // by leaves
   for (const std::string& path : paths)
     for (const std::size_t points : counts)
       for (const double share : leaves) {
@@ -112,13 +113,13 @@ void score_generated(const std::vector<std::string>& paths, const std::vector<st
             fmt::print(stderr, "bench_tree_score: {} of {} points, seed {}: {}\n", path, points, seed, error.what());
             continue;
           }
-          print_row(path, scan.points.size(), share, std::to_string(seed), rows.back());
+          print_row(path, std::to_string(scan.points.size()), share, std::to_string(seed), rows.back());
         }
         if (rows.empty()) continue;
-        all.insert(all.end(), rows.begin(), rows.end());
-        print_row(path, points, share, "mean", mean(rows));
+        all[share].insert(all[share].end(), rows.begin(), rows.end());
+        print_row(path, std::to_string(points), share, "mean", mean(rows));
       }
-  if (!all.empty()) print_row("all", 0, 0, "mean", mean(all));
+  for (const auto& [share, rows] : all) print_row("all", "all", share, "mean", mean(rows));
 }
 
 void score_files(const std::vector<std::string>& files, double metre) {

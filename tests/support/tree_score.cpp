@@ -83,6 +83,17 @@ bool has_loops(const std::vector<AxisBranch>& branches) {
   return false;
 }
 
+// How many samples of an axis are near another, and how near: of two that are near as many the nearer one counts.
+struct Nearness {
+  std::size_t samples = 0;
+  double distance = 0;  // of all of them together
+
+  void add(double d) { ++samples, distance += d; }
+  bool operator<(const Nearness& other) const {
+    return samples != other.samples ? samples < other.samples : distance > other.distance;
+  }
+};
+
 // The true branch whose axis most of a found branch's free axis is near; kNone if less than half is near any.
 std::vector<Index> followed(const std::vector<AxisBranch>& truth, const std::vector<AxisBranch>& found, double noise,
                             double reach, std::vector<double>& distances) {
@@ -90,7 +101,7 @@ std::vector<Index> followed(const std::vector<AxisBranch>& truth, const std::vec
   const std::vector<Box> boxes = boxes_of(truth);
   for (std::size_t f = 0; f < found.size(); ++f) {
     const std::vector<AxisSample> samples = free_axis(found, f);
-    std::vector<std::size_t> near(truth.size());
+    std::vector<Nearness> near(truth.size());
     std::size_t any = 0;
     for (const AxisSample& s : samples) {
       double least = std::numeric_limits<double>::infinity(), ratio = 0;
@@ -100,7 +111,7 @@ std::vector<Index> followed(const std::vector<AxisBranch>& truth, const std::vec
         if (away > least && away > std::max(reach * truth[t].radii[0], noise)) continue;
         const NearOnAxis at = nearest_on_axis(truth[t], s.position);
         const bool near_this = at.distance <= std::max(reach * at.radius, noise);
-        near[t] += near_this;
+        if (near_this) near[t].add(at.distance);
         is_near = is_near || near_this;
         if (at.distance < least) least = at.distance, ratio = at.distance / at.radius;
       }
@@ -115,7 +126,7 @@ std::vector<Index> followed(const std::vector<AxisBranch>& truth, const std::vec
 
 // What is to be found of a true branch.
 struct Target {
-  Index branch, parent;
+  Index branch, parent;  // the parent, or the farthest ancestor that may stand for it
   std::vector<AxisSample> samples;
 };
 
@@ -178,35 +189,41 @@ TreeScore score_targets(const std::vector<Target>& targets, const std::vector<Ax
     const std::vector<AxisSample>& samples = target.samples;
     ++score.branches;
     std::vector<char> seen(samples.size());
-    std::size_t best = found.size(), most = 0;
+    std::size_t best = found.size();
+    Nearness most;
     std::vector<std::pair<double, double>> best_errors;  // true radius and relative error
     for (std::size_t f = 0; f < found.size(); ++f) {
       std::vector<std::pair<double, double>> relative;
+      Nearness nearness;
       for (std::size_t s = 0; s < samples.size(); ++s) {
         const double near = std::max(reach * samples[s].radius, noise);
         if (from_box(boxes[f], samples[s].position) > near) continue;
         const NearOnAxis at = nearest_on_axis(found[f], samples[s].position);
         if (!(at.distance <= near)) continue;
         seen[s] = 1;
+        nearness.add(at.distance);
         relative.push_back({samples[s].radius, std::abs(at.radius - samples[s].radius) / samples[s].radius});
       }
-      if (relative.size() > most) {
-        most = relative.size();
+      if (most < nearness) {
+        most = nearness;
         best = f;
         best_errors = relative;
       }
     }
     total += samples.size();
     covered += static_cast<std::size_t>(std::count(seen.begin(), seen.end(), 1));
-    if (static_cast<double>(most) < 0.7 * static_cast<double>(samples.size())) continue;
+    if (static_cast<double>(most.samples) < 0.7 * static_cast<double>(samples.size())) continue;
     ++score.found;
     for (const auto& [radius, error] : best_errors) {
       errors.push_back(error);
       if (radius > noise) thick_errors.push_back(error);
     }
     const Index parent = found[best].parent;
-    const bool right =
-        target.parent == kNone ? parent == kNone : parent < found.size() && owner[parent] == target.parent;
+    bool right = false;
+    for (Index p = truth[target.branch].parent;; p = truth[p].parent) {
+      right = right || (p == kNone ? parent == kNone : parent < found.size() && owner[parent] == p);
+      if (p == target.parent) break;
+    }
     score.right_parent += right;
   }
   score.covered = total ? static_cast<double>(covered) / static_cast<double>(total) : 0;

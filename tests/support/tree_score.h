@@ -32,7 +32,8 @@ TreeScore score_tree(const std::vector<AxisBranch>& truth, const std::vector<Axi
 // The same for a sparse scan. Branches count that have five points and a free axis longer than 3 times the median
 // distance of these points from the nearest other one; of it counts what has points of the branch within 3 times that
 // distance, or 3 deviations of points (noise and the beam's radius) if that is more, off the surface. Axes are near
-// within one radius or 2 deviations. The right parent is the next ancestor that counts.
+// within one radius or 2 deviations. Where the parent does not count, ancestors up to the next one that does are as
+// right.
 struct ScanScore : TreeScore {
   double thick_radius_error = 0;  // radius_error where the true radius is over 2 deviations
   double volume_error = 0;        // of the wood, relative, with its sign
