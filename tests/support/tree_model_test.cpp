@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "support/models.h"
+#include "support/tree_score.h"
 
 namespace bisector {
 namespace {

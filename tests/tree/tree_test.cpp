@@ -21,26 +21,13 @@
 #include "mesh/topology.h"
 #include "support/models.h"
 #include "support/tree_model.h"
+#include "support/tree_score.h"
 #include "tree/coverage.h"
 
 namespace bisector {
 namespace {
 
-using test::AxisBranch;
-
-std::vector<AxisBranch> axes(const TreeResult& tree) {
-  std::vector<AxisBranch> branches;
-  for (const TreeBranch& b : tree.branches) {
-    AxisBranch axis;
-    axis.parent = b.parent;
-    for (const Index n : b.nodes) {
-      axis.axis.push_back(tree.skeleton[n].position);
-      axis.radii.push_back(tree.skeleton[n].radius);
-    }
-    branches.push_back(std::move(axis));
-  }
-  return branches;
-}
+using test::axes_of;
 
 // What holds for any scan.
 void expect_sound(const std::vector<Vec3>& points, const TreeResult& tree, std::size_t trunks = 1) {
@@ -110,7 +97,7 @@ TEST(Tree, FindsTheBranchesOfAKnownTree) {
   const test::TreeModel model = test::make_tree({.random_seed = 1});
   const TreeResult tree = reconstruct_tree(model.points);
   expect_sound(model.points, tree);
-  const test::TreeScore score = test::score_tree(model.branches, axes(tree), model.noise, 1);
+  const test::TreeScore score = test::score_tree(model.branches, axes_of(tree), model.noise, 1);
   ASSERT_GE(score.branches, 60u);
   EXPECT_GE(static_cast<double>(score.right_parent), 0.9 * static_cast<double>(score.branches));
   EXPECT_LT(score.radius_error, 0.15);
@@ -124,7 +111,7 @@ TEST(Tree, FindsThemWithoutNoiseAndOcclusion) {
   const test::TreeModel model = test::make_tree({.points = 40'000, .noise = 0, .occlusion = 0, .random_seed = 2});
   const TreeResult tree = reconstruct_tree(model.points);
   expect_sound(model.points, tree);
-  const test::TreeScore score = test::score_tree(model.branches, axes(tree), 0.002 * model.height);
+  const test::TreeScore score = test::score_tree(model.branches, axes_of(tree), 0.002 * model.height);
   EXPECT_GE(static_cast<double>(score.right_parent), 0.9 * static_cast<double>(score.branches));
   EXPECT_LT(score.radius_error, 0.1);
 }
