@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <tuple>
 
 #include "core/parallel.h"
 #include "tree/polyline.h"
 #include "tree/reattach.h"
+#include "tree/support.h"
 #include "tree/tube_fit.h"
 
 namespace bisector {
@@ -38,7 +40,8 @@ constexpr double kRootReach = 3;     // up to so many times the base's distance 
 
 // Radii.
 constexpr double kOwnNoise = 1.2;  // noise taken out of a radius, in the deviation of the branch's own points, at most
-constexpr double kLeastRadius = 0.3;  // of the noisy surface's: noise feigns no more than the rest
+constexpr double kWider = 1.3;        // of a radius over those nearer to the base, at most
+constexpr double kUnfitted = 1e-3;    // weight of a radius that does not rest on points
 
 class Refinement {
  public:
@@ -115,9 +118,11 @@ class Refinement {
     for (std::size_t b = 0; b < limbs_.size(); ++b) {
       Limb& limb = limbs_[b];
       const double noise = std::min(options_.noise, kOwnNoise * deviation_[b]);  // rough bark tells nothing of twigs
-      for (double& r : limb.radii) r = std::sqrt(std::max(r * r - noise * noise, kLeastRadius * kLeastRadius * r * r));
+      limb.fitted = supported_radii(points_, limb, 0);
+      reject_wider(limb);
+      remove_noise(noise, limb.radii);
       std::vector<double> weights = support_[b];
-      for (double& w : weights) w += 0.01;
+      for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = (weights[k] + 0.01) * (limb.fitted[k] ? 1 : kUnfitted);
       limb.radii = non_increasing(limb.radii, weights);
       if (limb.parent == kNone) continue;
       const Limb& parent = limbs_[limb.parent];
@@ -279,6 +284,20 @@ class Refinement {
     for (; limb != kNone; limb = limbs_[limb].parent)
       if (limb == from) return true;
     return false;
+  }
+
+  // Branches do not get wider on the way out: a wider tube is a cloud of twigs.
+  void reject_wider(Limb& limb) const {
+    double least = std::numeric_limits<double>::infinity();
+    if (limb.parent != kNone) {
+      const Limb& parent = limbs_[limb.parent];
+      least = value_at(parent.radii, nearest_on_polyline(parent.axis, limb.axis.front()));
+    }
+    for (std::size_t k = 0; k < limb.axis.size(); ++k) {
+      if (!limb.fitted[k]) continue;
+      if (limb.radii[k] > kWider * least) limb.fitted[k] = 0;
+      else least = std::min(least, limb.radii[k]);
+    }
   }
 
   // The limb that holds most of the points of this one in its surface.

@@ -7,15 +7,9 @@
 
 #include "bisector/context.h"
 #include "core/geometry.h"
+#include "tree/limb.h"
 
 namespace bisector {
-
-struct Limb {
-  std::vector<Vec3> axis;     // at least 2 points; the first lies on the parent's axis
-  std::vector<double> radii;  // of each, not increasing
-  Index parent = kNone;       // limb, of a lower number; kNone: a trunk
-  std::vector<Index> points;  // that belong to it, ascending
-};
 
 struct RefineOptions {
   double noise = 0;  // standard deviation of points off the surface, in the points' unit

@@ -10,14 +10,18 @@
 #include "bisector/error.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "tree/allometry.h"
 #include "tree/branches.h"
 #include "tree/clusters.h"
+#include "tree/growth.h"
 #include "tree/level_sections.h"
 #include "tree/loft.h"
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
 #include "tree/refine.h"
+#include "tree/refit.h"
 #include "tree/skeleton.h"
+#include "tree/trim.h"
 
 namespace bisector {
 namespace {
@@ -30,6 +34,7 @@ constexpr double kSlender = 4;          // radius of a cluster over its rms from
 constexpr double kAxisTolerance = 0.3;  // distance of fitted axes from the nodes, in the branch's median radius
 constexpr double kLeastTip = 0.3;  // of the base radius: what tolerances of a pointed branch's mesh go by, at least
 
+constexpr double kSkin = 2.2, kTip=0.0003, kSlenderness=80;
 // A plate of points at the bottom that is taken for ground: how low, how many of the points, how wide beside the tree.
 constexpr double kPlateHeight = 0.02, kPlateWidth = 0.5;
 constexpr std::size_t kPlateShare = 10;  // one point in so many
@@ -294,6 +299,27 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
 
   phase("fitting branches", 0.55);
   limbs = refine_limbs(scan.points, network.neighbours, std::move(limbs), {.noise = noise}, context);
+
+  const double skin = kSkin * noise;
+  const double height = bounding_box(scan.points).hi.z;
+  const double tolerance = getenv("TOL") ? atof(getenv("TOL"))*height : std::min(0.006*height, 0.5*network.graph.spacing);
+  std::vector<Index> limb_of;
+  const int rounds = getenv("ROUNDS") ? atoi(getenv("ROUNDS")) : 3;
+  for (int round = 0; round < rounds; ++round) {
+    trim_limbs(limbs);
+    fmt::print(stderr, "limbs kept {} spacing/H {} noise/H {} tol/H {}\n", limbs.size(), network.graph.spacing/height, noise/height, tolerance/height);
+    limb_of = limbs_of_points(scan.points, limbs, std::max(skin, tolerance));
+    fmt::print(stderr, "explained {}\n", std::count_if(limb_of.begin(), limb_of.end(), [](Index i){return i!=kNone;}));
+    grow_limbs(scan.points, tolerance, limbs, limb_of, context);
+    fill_radii(limbs, kTip * height, kSlenderness);
+    straighten_limbs(limbs);
+    if (round + 1 < rounds) refit_limbs(scan.points, tolerance, noise, limbs);
+  }
+  for (Limb& limb : limbs) limb.points.clear();
+  for (std::size_t i = 0; i < limb_of.size(); ++i)
+    if (limb_of[i] != kNone) limbs[limb_of[i]].points.push_back(static_cast<Index>(i));
+  const PipeModel pipe = fill_radii(limbs, kTip * height, kSlenderness);
+  fmt::print(stderr, "p {} {}\n", pipe.exponent, pipe.from_points);
   result.seconds.refine = watch.lap();
 
   phase("surfaces", 0.85);

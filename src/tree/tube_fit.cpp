@@ -38,6 +38,8 @@ constexpr double kLargestRing = 1.9, kLargestCloud = 1.15;
 constexpr double kRing = 0.2,
                  kCloud = 0.35;  // rms distance from the surface, in the spread, up to and from which they are so
 
+constexpr double kLeastRadius = 0.3;  // of the noisy surface's
+
 // Sums of squares of linear forms of few unknowns, as the normal equations of least squares.
 class NormalEquations {
  public:
@@ -290,6 +292,10 @@ Tube fit_tube(const std::vector<Vec3>& points, const std::vector<Vec3>& line, do
     }
   }
   return fit.take();
+}
+
+void remove_noise(double noise, std::vector<double>& radii) {
+  for (double& r : radii) r = std::sqrt(std::max(r * r - noise * noise, kLeastRadius * kLeastRadius * r * r));
 }
 
 std::vector<double> non_increasing(const std::vector<double>& values, const std::vector<double>& weights) {

@@ -1,0 +1,142 @@
+#include "tree/allometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tree/polyline.h"
+#include "tree/tube_fit.h"
+
+namespace bisector {
+namespace {
+
+constexpr double kLeastExponent = 2, kMostExponent = 3;
+constexpr std::size_t kLeastPlaces = 20;  // that an exponent is fitted to
+constexpr std::size_t kMostPlaces = 200;  // that are looked at, evenly
+constexpr double kLeastRatio = 1.5;       // of lengths beyond, of two places that tell a slope
+
+// Length of all that grows beyond each point of each axis, and where a limb leaves its parent.
+struct Lengths {
+  std::vector<std::vector<double>> beyond;
+  std::vector<PolylineFoot> root;
+};
+
+Lengths measure_lengths(const std::vector<Limb>& limbs) {
+  Lengths lengths;
+  lengths.beyond.resize(limbs.size());
+  lengths.root.resize(limbs.size());
+  std::vector<std::vector<double>> grown(limbs.size());  // on each segment
+  for (std::size_t b = 0; b < limbs.size(); ++b) grown[b].assign(limbs[b].axis.size(), 0);
+  for (std::size_t b = limbs.size(); b-- > 0;) {
+    const Limb& limb = limbs[b];
+    std::vector<double>& beyond = lengths.beyond[b];
+    beyond.assign(limb.axis.size(), 0);
+    for (std::size_t k = limb.axis.size() - 1; k-- > 0;)
+      beyond[k] = beyond[k + 1] + norm(limb.axis[k + 1] - limb.axis[k]) + grown[b][k];
+    if (limb.parent == kNone) continue;
+    lengths.root[b] = nearest_on_polyline(limbs[limb.parent].axis, limb.axis.front());
+    grown[limb.parent][lengths.root[b].segment] += beyond.front();
+  }
+  return lengths;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+// The median of the slopes of log r over log length (Theil and Sen), as an exponent.
+void fit_exponent(const std::vector<Limb>& limbs, const Lengths& lengths, PipeModel& model) {
+  std::vector<std::pair<double, double>> places;
+  for (std::size_t b = 0; b < limbs.size(); ++b)
+    for (std::size_t k = 0; k < limbs[b].axis.size(); ++k)
+      if (limbs[b].fitted[k] && lengths.beyond[b][k] > 0 && limbs[b].radii[k] > 0)
+        places.emplace_back(std::log(lengths.beyond[b][k]), std::log(limbs[b].radii[k]));
+  if (places.size() < kLeastPlaces) return;
+  std::vector<double> slopes;
+  const std::size_t stride = places.size() / kMostPlaces + 1;
+  for (std::size_t i = 0; i < places.size(); i += stride)
+    for (std::size_t j = i + stride; j < places.size(); j += stride)
+      if (const double run = places[j].first - places[i].first; std::abs(run) > std::log(kLeastRatio))
+        slopes.push_back((places[j].second - places[i].second) / run);
+  if (slopes.size() < kLeastPlaces) return;
+  model.exponent = 1 / std::clamp(median(std::move(slopes)), 1 / kMostExponent, 1 / kLeastExponent);
+  model.from_points = true;
+}
+
+class Filling {
+ public:
+  Filling(const Lengths& lengths, const PipeModel& model) : lengths_(lengths), model_(model) {}
+
+  // `most`: the radius at the base, at most; `base`: the radius there of a limb that has none of its own.
+  void fill(std::size_t b, double most, double base, Limb& limb) const {
+    const std::vector<double>& length = lengths_.beyond[b];
+    const std::size_t m = limb.axis.size();
+    std::vector<std::size_t> known;
+    std::vector<double> fitted;
+    for (std::size_t k = 0; k < m; ++k)
+      if (limb.fitted[k]) {
+        known.push_back(k);
+        fitted.push_back(limb.radii[k]);
+      }
+    fitted = non_increasing(fitted, std::vector<double>(fitted.size(), 1));
+    for (std::size_t i = 0; i < known.size(); ++i) limb.radii[known[i]] = std::min(fitted[i], most);
+    if (known.empty()) {
+      limb.radii[0] = std::min(base, most);
+      for (std::size_t k = 1; k < m; ++k) limb.radii[k] = scaled(limb.radii[0], length[0], length[k]);
+    } else {
+      for (std::size_t k = 0; k < known.front(); ++k)
+        limb.radii[k] = std::min(most, scaled(limb.radii[known.front()], length[known.front()], length[k]));
+      for (std::size_t i = 0; i + 1 < known.size(); ++i)
+        for (std::size_t k = known[i] + 1; k < known[i + 1]; ++k) {
+          const double s = (length[known[i]] - length[k]) /
+                           std::max(length[known[i]] - length[known[i + 1]], std::numeric_limits<double>::min());
+          limb.radii[k] = (1 - s) * limb.radii[known[i]] + s * limb.radii[known[i + 1]];
+        }
+      for (std::size_t k = known.back() + 1; k < m; ++k)
+        limb.radii[k] = scaled(limb.radii[known.back()], length[known.back()], length[k]);
+    }
+    for (std::size_t k = 1; k < m; ++k) limb.radii[k] = std::min(limb.radii[k], limb.radii[k - 1]);
+  }
+
+  // The radius where `length` grows beyond, of a branch that has `radius` where `full` does; the tip's at the end.
+  double scaled(double radius, double full, double length) const {
+    const double p = model_.exponent, tip = std::pow(std::min(model_.tip_radius, radius), p);
+    return std::pow(tip + (std::pow(radius, p) - tip) * length / std::max(full, 1e-300), 1 / p);
+  }
+
+ private:
+  const Lengths& lengths_;
+  const PipeModel& model_;
+};
+
+}  // namespace
+
+PipeModel fill_radii(std::vector<Limb>& limbs, double tip_radius, double slenderness) {
+  PipeModel model;
+  model.tip_radius = tip_radius;
+  const Lengths lengths = measure_lengths(limbs);
+  fit_exponent(limbs, lengths, model);
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Limb& limb : limbs)
+    for (const Vec3& p : limb.axis) {
+      low = std::min(low, p.z);
+      high = std::max(high, p.z);
+    }
+  const Filling filling(lengths, model);
+  for (std::size_t b = 0; b < limbs.size(); ++b) {
+    Limb& limb = limbs[b];
+    if (limb.parent == kNone) {
+      filling.fill(b, std::numeric_limits<double>::infinity(), (high - low) / slenderness, limb);
+      continue;
+    }
+    const Limb& parent = limbs[limb.parent];
+    const PolylineFoot& foot = lengths.root[b];
+    const double most = value_at(parent.radii, foot);
+    filling.fill(b, most, filling.scaled(most, lengths.beyond[limb.parent][foot.segment], lengths.beyond[b].front()),
+                 limb);
+  }
+  return model;
+}
+
+}  // namespace bisector

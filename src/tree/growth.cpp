@@ -1,0 +1,276 @@
+#include "tree/growth.h"
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "spatial/kd_tree.h"
+#include "tree/point_graph.h"
+#include "tree/polyline.h"
+#include "tree/shortest_paths.h"
+#include "voronoi/delaunay.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kLeastGain = 2;   // points that a branch explains
+constexpr double kGap = 3;              // steps longer than so many tolerances, or median steps, cross a gap
+constexpr double kMostGaps = 0.5;       // of a branch's length
+constexpr double kLeastLength = 2;      // of it, in tolerances
+constexpr double kSimilar = 0.8;        // of the longest way's length: among ways so long the straightest goes on
+constexpr double kStep = 1;             // between points of an axis, in tolerances
+constexpr double kStiffness = 2;        // of an axis' second differences, beside the pull of the points on the way
+
+Csr<Index> make_graph(const std::vector<Vec3>& points) {
+  if (auto graph = delaunay_neighbours(points)) return std::move(*graph);
+  const PointGraph near = build_point_graph(points);
+  std::vector<std::array<Index, 2>> edges;
+  for (const Bridge& b : shortest_bridges(points, near)) edges.push_back({b.from, b.to});
+  return add_edges(near.neighbours, edges);
+}
+
+// The tree of shortest ways.
+struct Ways {
+  std::vector<Index> previous;  // of each point; a source's is itself
+  std::vector<Index> order;     // points, sources first
+  std::vector<double> beyond;   // length of the longest way on from each point
+  std::vector<Index> next;      // point on it; kNone at ends
+};
+
+class Growth {
+ public:
+  Growth(const std::vector<Vec3>& points, double tolerance, std::vector<Limb>& limbs, std::vector<Index>& limb_of)
+      : points_(points), tolerance_(tolerance), limbs_(limbs), limb_of_(limb_of), set_{points}, tree_(3, set_) {}
+
+  void find_ways() {
+    const Csr<Index> graph = make_graph(points_);
+    std::vector<double> cost;
+    cost.reserve(graph.values.size());
+    for (std::size_t i = 0; i < graph.rows(); ++i)
+      for (const Index* j = graph.begin(i); j != graph.end(i); ++j) cost.push_back(norm2(points_[*j] - points_[i]));
+    std::vector<Index> sources;
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      if (limb_of_[i] != kNone) sources.push_back(static_cast<Index>(i));
+    if (sources.empty())
+      sources.push_back(static_cast<Index>(
+          std::min_element(points_.begin(), points_.end(), [](const Vec3& a, const Vec3& b) { return a.z < b.z; }) -
+          points_.begin()));
+    const ShortestPaths paths = shortest_paths(graph, cost, sources);
+    ways_.previous = paths.previous;
+    for (const Index s : sources) ways_.previous[s] = s;
+    ways_.order.resize(points_.size());
+    std::iota(ways_.order.begin(), ways_.order.end(), 0u);
+    std::sort(ways_.order.begin(), ways_.order.end(), [&](Index a, Index b) {
+      return std::pair{paths.distance[a], a} < std::pair{paths.distance[b], b};
+    });
+    std::vector<double> steps;
+    for (const Index i : ways_.order)
+      if (ways_.previous[i] != i) steps.push_back(norm(points_[i] - points_[ways_.previous[i]]));
+    gap_ = kGap * std::max(tolerance_, quantile(std::move(steps), 0.5));
+    choose_next();
+  }
+
+  // The branches, longest first.
+  void grow(const Context& context) {
+    std::vector<std::pair<double, Index>> starts;  // length, first point beyond the fork
+    for (const Index i : ways_.order) {
+      const Index from = ways_.previous[i];
+      if (from == i || ways_.next[from] == i) continue;
+      starts.emplace_back(ways_.beyond[i] + norm(points_[i] - points_[from]), i);
+    }
+    for (const Index i : ways_.order)  // the first of the ways that leave a source
+      if (ways_.previous[i] == i && ways_.next[i] != kNone) starts.emplace_back(ways_.beyond[i], ways_.next[i]);
+    std::sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) {
+      return a.first != b.first ? a.first > b.first : a.second < b.second;
+    });
+    on_limb_ = limb_of_;
+    for (std::size_t k = 0; k < starts.size(); ++k) {
+      if (k % 1024 == 0) context.check();
+      if (starts[k].first < kLeastLength * tolerance_) break;
+      try_branch(starts[k].second);
+    }
+  }
+
+ private:
+  void choose_next() {
+    const std::size_t n = points_.size();
+    ways_.beyond.assign(n, 0);
+    ways_.next.assign(n, kNone);
+    for (std::size_t k = n; k-- > 0;) {
+      const Index i = ways_.order[k], from = ways_.previous[i];
+      if (from == i) continue;
+      const double length = ways_.beyond[i] + norm(points_[i] - points_[from]);
+      if (ways_.next[from] == kNone || length > ways_.beyond[from]) {
+        ways_.beyond[from] = length;
+        ways_.next[from] = i;
+      }
+    }
+    // Straight on where another way is nearly as long.
+    std::vector<Index> straight = ways_.next;
+    std::vector<double> best(n, -2);
+    for (const Index i : ways_.order) {
+      const Index from = ways_.previous[i];
+      if (from == i) continue;
+      const double length = ways_.beyond[i] + norm(points_[i] - points_[from]);
+      if (length < kSimilar * ways_.beyond[from]) continue;
+      const Vec3 ahead = points_[far_along(i, from)] - points_[from], back = points_[from] - points_[far_back(from)];
+      const double score = norm2(back) > 0 && norm2(ahead) > 0
+                               ? dot(ahead, back) / (norm(ahead) * norm(back)) + length / ways_.beyond[from]
+                               : length / ways_.beyond[from];
+      if (score > best[from]) {
+        best[from] = score;
+        straight[from] = i;
+      }
+    }
+    ways_.next = std::move(straight);
+    for (std::size_t k = n; k-- > 0;) {  // lengths along the ways that were chosen
+      const Index i = ways_.order[k], on = ways_.next[i];
+      ways_.beyond[i] = on == kNone ? 0 : ways_.beyond[on] + norm(points_[on] - points_[i]);
+    }
+  }
+
+  Index far_along(Index i, Index from) const {
+    while (ways_.next[i] != kNone && norm2(points_[i] - points_[from]) < 16 * tolerance_ * tolerance_)
+      i = ways_.next[i];
+    return i;
+  }
+
+  Index far_back(Index from) const {
+    Index i = from;
+    while (ways_.previous[i] != i && norm2(points_[i] - points_[from]) < 16 * tolerance_ * tolerance_)
+      i = ways_.previous[i];
+    return i;
+  }
+
+  void try_branch(Index start) {
+    Index tip = start;
+    while (ways_.next[tip] != kNone) tip = ways_.next[tip];
+    if (on_limb_[tip] != kNone) return;
+    std::vector<Index> way{tip};
+    while (on_limb_[way.back()] == kNone && ways_.previous[way.back()] != way.back())
+      way.push_back(ways_.previous[way.back()]);
+    std::reverse(way.begin(), way.end());
+    if (way.size() < 2) return;
+    const Index parent = on_limb_[way.front()];
+    std::vector<Vec3> axis;
+    if (parent != kNone) axis.push_back(nearest_on_polyline(limbs_[parent].axis, points_[way.front()]).point);
+    for (const Index i : way)
+      if (parent == kNone || i != way.front()) axis.push_back(points_[i]);
+    if (axis.size() < 2) return;
+    axis = smooth(axis);
+
+    const std::vector<Index> near = around(axis);
+    std::size_t gain = 0;
+    for (const Index i : near) gain += limb_of_[i] == kNone;
+    if ((gain < kLeastGain || gaps(way) > kMostGaps) && parent != kNone) return;
+    if (parent != kNone && ends_at(limbs_[parent], axis.front())) {
+      go_on(axis, limbs_[parent]);
+      claim(way, near, parent);
+      return;
+    }
+    const auto name = static_cast<Index>(limbs_.size());
+    Limb limb;
+    limb.parent = parent;
+    limb.radii.assign(axis.size(), 0);
+    limb.fitted.assign(axis.size(), 0);
+    limb.axis = std::move(axis);
+    limbs_.push_back(std::move(limb));
+    claim(way, near, name);
+  }
+
+  void claim(const std::vector<Index>& way, const std::vector<Index>& near, Index limb) {
+    for (const Index i : way)
+      if (on_limb_[i] == kNone) on_limb_[i] = limb;
+    for (const Index i : near)
+      if (limb_of_[i] == kNone) limb_of_[i] = limb;
+  }
+
+  // Whether a limb, not yet led on from, ends where another begins.
+  static bool ends_at(const Limb& limb, const Vec3& p) {
+    return limb.fitted.back() && norm(limb.axis.back() - p) <= limb.radii.back();
+  }
+
+  static void go_on(const std::vector<Vec3>& axis, Limb& limb) {
+    limb.axis.insert(limb.axis.end(), axis.begin() + 1, axis.end());
+    limb.radii.resize(limb.axis.size(), 0);
+    limb.fitted.resize(limb.axis.size(), 0);
+  }
+
+  // The share of a way that no points show.
+  double gaps(const std::vector<Index>& way) const {
+    double length = 0, crossed = 0;
+    for (std::size_t k = 1; k < way.size(); ++k) {
+      const double step = norm(points_[way[k]] - points_[way[k - 1]]);
+      length += step;
+      if (step > gap_) crossed += step - gap_;
+    }
+    return crossed / length;
+  }
+
+  // Points within the tolerance of a line.
+  std::vector<Index> around(const std::vector<Vec3>& line) const {
+    std::vector<Index> result;
+    std::vector<std::pair<Index, double>> found;
+    for (std::size_t k = 0; k + 1 < line.size(); ++k) {
+      const Vec3 middle = 0.5 * (line[k] + line[k + 1]);
+      const double half = 0.5 * norm(line[k + 1] - line[k]);
+      const double at[3] = {middle.x, middle.y, middle.z};
+      found.clear();
+      tree_.radiusSearch(at, (tolerance_ + half) * (tolerance_ + half), found, nanoflann::SearchParams(32, 0, false));
+      for (const auto& [i, squared] : found)
+        if (nearest_on_polyline(line, points_[i], k, k).distance <= tolerance_) result.push_back(i);
+    }
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+  }
+
+  // Even steps along a way, whose points lie off the branch's middle by its thickness and the noise: a line that bends
+  // little and stays near them. The ends are kept.
+  std::vector<Vec3> smooth(const std::vector<Vec3>& way) const {
+    const double length = polyline_length(way);
+    const auto count = std::max<std::size_t>(2, static_cast<std::size_t>(length / (kStep * tolerance_)) + 1);
+    std::vector<Vec3> line = resample_polyline(way, count);
+    const auto m = static_cast<Eigen::Index>(line.size());
+    if (m < 3) return line;
+    std::vector<Eigen::Triplet<double>> entries;
+    for (Eigen::Index k = 0; k < m; ++k) entries.emplace_back(k, k, k == 0 || k + 1 == m ? 1e6 : 1.0);
+    for (Eigen::Index k = 1; k + 1 < m; ++k)
+      for (int i = -1; i <= 1; ++i)
+        for (int j = -1; j <= 1; ++j)
+          entries.emplace_back(k + i, k + j, kStiffness * (i == 0 ? -2 : 1) * (j == 0 ? -2 : 1));
+    Eigen::SparseMatrix<double> matrix(m, m);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    Eigen::MatrixXd right(m, 3);
+    for (Eigen::Index k = 0; k < m; ++k)
+      for (int c = 0; c < 3; ++c)
+        right(k, c) = (k == 0 || k + 1 == m ? 1e6 : 1.0) * line[static_cast<std::size_t>(k)][c];
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
+    const Eigen::MatrixXd x = solver.solve(right);
+    for (Eigen::Index k = 0; k < m; ++k)
+      for (int c = 0; c < 3; ++c) line[static_cast<std::size_t>(k)][c] = x(k, c);
+    return line;
+  }
+
+  const std::vector<Vec3>& points_;
+  double tolerance_, gap_ = 0;
+  std::vector<Limb>& limbs_;
+  std::vector<Index>& limb_of_;   // that explains each point
+  std::vector<Index> on_limb_;    // whose way each point is on
+  PointSet set_;
+  KdTree tree_;
+  Ways ways_;
+};
+
+}  // namespace
+
+void grow_limbs(const std::vector<Vec3>& points, double tolerance, std::vector<Limb>& limbs,
+                std::vector<Index>& limb_of, const Context& context) {
+  Growth growth(points, tolerance, limbs, limb_of);
+  growth.find_ways();
+  growth.grow(context);
+}
+
+}  // namespace bisector

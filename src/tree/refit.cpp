@@ -1,0 +1,152 @@
+#include "tree/refit.h"
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+#include "spatial/kd_tree.h"
+#include "tree/polyline.h"
+#include "tree/support.h"
+#include "tree/tube_fit.h"
+
+namespace bisector {
+namespace {
+
+constexpr std::size_t kLeastPoints = 20;  // for a tube
+constexpr double kReach = 2;              // of a limb's points from its axis, in radii and with the tolerance added
+constexpr double kOwnNoise = 1.2;         // noise taken out of a radius, in the deviation of the branch's own points
+constexpr double kMostRatio = 2;          // of a fitted radius and that of the pipe model, either way
+constexpr double kBend = 3;               // length over which an axis is straight, in radii
+
+// Each point's nearest limb by the distance from its surface, inside counting half.
+std::vector<std::vector<Index>> share_out(const std::vector<Vec3>& points, double tolerance,
+                                          const std::vector<Limb>& limbs) {
+  std::vector<Index> limb_of(points.size(), kNone);
+  std::vector<double> least(points.size(), std::numeric_limits<double>::infinity());
+  const PointSet set{points};
+  const KdTree tree(3, set);
+  std::vector<std::pair<Index, double>> found;
+  for (std::size_t b = 0; b < limbs.size(); ++b) {
+    const Limb& limb = limbs[b];
+    for (std::size_t k = 0; k + 1 < limb.axis.size(); ++k) {
+      const Vec3 middle = 0.5 * (limb.axis[k] + limb.axis[k + 1]);
+      const double reach = kReach * std::max(limb.radii[k], limb.radii[k + 1]) + tolerance;
+      const double half = 0.5 * norm(limb.axis[k + 1] - limb.axis[k]);
+      const double at[3] = {middle.x, middle.y, middle.z};
+      found.clear();
+      tree.radiusSearch(at, (reach + half) * (reach + half), found, nanoflann::SearchParams(32, 0, false));
+      for (const auto& [i, squared] : found) {
+        const PolylineFoot foot = nearest_on_polyline(limb.axis, points[i], k, k);
+        if (foot.distance > reach) continue;
+        const double off = foot.distance - value_at(limb.radii, foot);
+        const double cost = off > 0 ? off : -0.5 * off;
+        if (!(cost < least[i])) continue;
+        least[i] = cost;
+        limb_of[i] = static_cast<Index>(b);
+      }
+    }
+  }
+  std::vector<std::vector<Index>> members(limbs.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (limb_of[i] != kNone) members[limb_of[i]].push_back(static_cast<Index>(i));
+  return members;
+}
+
+// One past the last point of the axis whose radius rests on points.
+std::size_t fitted_end(const Limb& limb) {
+  const auto last = std::find(limb.fitted.rbegin(), limb.fitted.rend(), 1);
+  return static_cast<std::size_t>(limb.fitted.rend() - last);
+}
+
+double fitted_length(const Limb& limb) {
+  double length = 0;
+  for (std::size_t k = 1; k < limb.axis.size(); ++k)
+    if (limb.fitted[k]) length += norm(limb.axis[k] - limb.axis[k - 1]);
+  return length;
+}
+
+void refit(const std::vector<Vec3>& points, double noise, Limb& limb) {
+  if (limb.points.size() < kLeastPoints) return;
+  std::vector<Vec3> own;
+  for (const Index i : limb.points) own.push_back(points[i]);
+  Tube tube = fit_tube(own, limb.axis, noise);
+  Limb fitted;
+  fitted.axis = std::move(tube.axis);
+  fitted.radii = std::move(tube.radii);
+  fitted.points = limb.points;
+  fitted.fitted = supported_radii(points, fitted, noise);
+  for (std::size_t k = 0; k < fitted.axis.size(); ++k) {
+    const double expected = value_at(limb.radii, nearest_on_polyline(limb.axis, fitted.axis[k]));
+    if (fitted.radii[k] > kMostRatio * expected || fitted.radii[k] < expected / kMostRatio) fitted.fitted[k] = 0;
+  }
+  remove_noise(std::min(noise, kOwnNoise * tube.deviation), fitted.radii);
+  const std::size_t last = fitted_end(fitted);
+  if (last < 2 || fitted_length(fitted) <= fitted_length(limb)) return;
+  const PolylineFoot foot = nearest_on_polyline(limb.axis, fitted.axis[last - 1]);
+  fitted.axis.resize(last);
+  fitted.radii.resize(last);
+  fitted.fitted.resize(last);
+  for (std::size_t k = foot.segment + 1; k < limb.axis.size(); ++k) {
+    if (norm(limb.axis[k] - fitted.axis.back()) < fitted.radii[last - 1]) continue;
+    fitted.axis.push_back(limb.axis[k]);
+    fitted.radii.push_back(0);
+    fitted.fitted.push_back(0);
+  }
+  fitted.parent = limb.parent;
+  limb = std::move(fitted);
+}
+
+void straighten(Limb& limb) {
+  const auto m = static_cast<Eigen::Index>(limb.axis.size());
+  if (m < 3) return;
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::MatrixXd right(m, 3);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const double weight = k == 0 || k + 1 == m ? 1e3 : limb.fitted[at] ? 10.0 : 1.0;
+    entries.emplace_back(k, k, weight);
+    for (int c = 0; c < 3; ++c) right(k, c) = weight * limb.axis[at][c];
+  }
+  for (Eigen::Index k = 1; k + 1 < m; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    if (limb.fitted[at]) continue;
+    const double before = norm(limb.axis[at] - limb.axis[at - 1]), after = norm(limb.axis[at + 1] - limb.axis[at]);
+    if (!(before > 0 && after > 0)) continue;
+    const double step = 0.5 * (before + after), stiffness = std::pow(kBend * limb.radii[at] / step, 4);
+    const double row[3] = {after / step, -2, before / step};
+    for (int i = -1; i <= 1; ++i)
+      for (int j = -1; j <= 1; ++j) entries.emplace_back(k + i, k + j, stiffness * row[i + 1] * row[j + 1]);
+  }
+  Eigen::SparseMatrix<double> matrix(m, m);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
+  const Eigen::MatrixXd x = solver.solve(right);
+  if (solver.info() != Eigen::Success || !x.allFinite()) return;
+  for (Eigen::Index k = 0; k < m; ++k)
+    for (int c = 0; c < 3; ++c) limb.axis[static_cast<std::size_t>(k)][c] = x(k, c);
+}
+
+}  // namespace
+
+void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs) {
+  std::vector<std::vector<Index>> members = share_out(points, tolerance, limbs);
+  parallel_each(
+      limbs.size(),
+      [&](std::size_t b) {
+        limbs[b].points = std::move(members[b]);
+        refit(points, noise, limbs[b]);
+      },
+      1);
+}
+
+void straighten_limbs(std::vector<Limb>& limbs) {
+  for (Limb& limb : limbs) {
+    if (limb.parent != kNone) limb.axis.front() = nearest_on_polyline(limbs[limb.parent].axis, limb.axis.front()).point;
+    straighten(limb);
+  }
+}
+
+}  // namespace bisector

@@ -1,0 +1,19 @@
+// Axes and radii of grown limbs, by what their points and their radii say.
+#pragma once
+
+#include <vector>
+
+#include "core/geometry.h"
+#include "tree/limb.h"
+
+namespace bisector {
+
+// Fits a tube to the points near each limb, and takes it from the base up to the last place where its radius rests on
+// points. Radii must be there, as a measure of how far points of a limb may be.
+void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs);
+
+// Where no points carry the radius axes bend no more sharply than their radius, for ways along single points wind within
+// the branch. Children start on their parent's axis again.
+void straighten_limbs(std::vector<Limb>& limbs);
+
+}  // namespace bisector
