@@ -99,6 +99,7 @@ SystemUnits units_of_wkt(std::string_view text) {
     const char c = text[i];
     if (c == '"') {
       i = std::min(text.find('"', i + 1), text.size() - 1);
+      word = {};
     } else if (c == '[' || c == '(') {
       if (open.size() == kDeepest) return {};
       horizontal = horizontal || is_horizontal(word);

@@ -18,6 +18,7 @@
 
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "core/geometry.h"
 #include "core/random.h"
 #include "io/bytes.h"
 #include "io/point_formats.h"
@@ -339,7 +340,8 @@ TEST_F(PointIo, LasTellsItsUnit) {
     LasFile file = some_las();
     file.minor = 4;
     file.wkt = true;
-    (extended ? file.extended : file.records) = {{2112, text + std::string(1, '\0')}};
+    std::vector<LasRecord>& records = extended ? file.extended : file.records;
+    records.push_back({2112, text + std::string(1, '\0')});
     file.records.push_back({34735, geo_keys({{3076, 0, 1, 9036}})});  // the flag says that WKT counts
     return read("a.las", file.bytes()).unit;
   };
@@ -418,17 +420,17 @@ TEST_F(PointIo, ReadsPts) {
 
 TEST_F(PointIo, RefusesMalformedPts) {
   expect_refused("a.pts", "1 2 3\n", ":1: ", "begins with a line with its number of points");
-  expect_refused("a.pts", "3\n1 2 3\n4 5 6\n", ":3: ", "the file ends after 2 of the 3 points of line 1");
+  expect_refused("a.pts", "3\n1 2 3\n4 5 6\n", ":4: ", "the file ends after 2 of the 3 points of line 1");
   expect_refused("a.pts", "1\n1 2 3\n4 5 6\n", ":3: ", "more points than the 1 of line 1");
   expect_refused("a.pts", "2\n1 2 3\n2\n4 5 6\n7 8 9\n", ":3: ", "after 1 of the 2 points of line 1");
-  expect_refused("a.pts", "1\n1 2 3\n2\n4 5 6\n", ":4: ", "the file ends after 1 of the 2 points of line 3");
-  expect_refused("a.pts", "4294967290\n1 2 3\n", ":2: ", "the file ends");
+  expect_refused("a.pts", "1\n1 2 3\n2\n4 5 6\n", ":5: ", "the file ends after 1 of the 2 points of line 3");
+  expect_refused("a.pts", "4294967290\n1 2 3\n", ":3: ", "the file ends");
   expect_refused("a.pts", "99999999999999999999\n1 2 3\n", ":1: ", "out of range");
   expect_refused("a.pts", "-1\n1 2 3\n", ":1: ", "negative");
   expect_refused("a.pts", "1.5\n1 2 3\n", ":1: ", "not an integer");
   expect_refused("a.pts", "1\n1 2\n", ":2: ", "a number is missing");
   expect_refused("a.pts", "1\n1 nan 2\n", ":2: ", "not finite");
-  expect_refused("a.pts", "0\n", ":1: ", "no point at all");
+  expect_refused("a.pts", "0\n", ":2: ", "no point at all");
   expect_refused("a.pts", "", ": ", "empty");
   expect_sturdy("a.pts", "2\n1 2 3 -7 255 0 1\n0.25 -1e3 4\n1\n5 6 7\n");
 }
@@ -620,7 +622,7 @@ TEST_F(PointIo, RefusesMalformedPcd) {
   expect_refused("a.pcd", head + "WIDTH 4294967294\nHEIGHT 4294967294\nDATA binary\n1234", ":4: ", "too many");
   expect_refused("a.pcd", head + "POINTS 0\nDATA ascii\n", ":3: ", "no point at all");
   expect_refused("a.pcd", head + "POINTS 1\nDATA text\n1 2 3\n", ":3: ", "DATA 'text'");
-  expect_refused("a.pcd", head + "POINTS 2\nDATA ascii\n1 2 3\n", ":4: ", "1 of 2 points");
+  expect_refused("a.pcd", head + "POINTS 2\nDATA ascii\n1 2 3\n", ":5: ", "1 of 2 points");
   expect_refused("a.pcd", head + "POINTS 1\nDATA ascii\n1 2\n", ":4: ", "a number is missing");
   expect_refused("a.pcd", head + "POINTS 1\nDATA ascii\n1 2 1e101\n", ": point 0", "1e100");
   expect_refused("a.pcd", "FIELDS x _ y z\nCOUNT 1 4000000000 1 1\nPOINTS 1\nDATA ascii\n1 2 3 4\n",
@@ -628,7 +630,7 @@ TEST_F(PointIo, RefusesMalformedPcd) {
   expect_refused("a.pcd",
                  "FIELDS x _ y z\nSIZE 4 8 4 4\nCOUNT 1 4000000000 1 1\nPOINTS 1\nDATA binary\n1234567890123456", ": ",
                  "room for 0");
-  expect_refused("a.pcd", head + "POINTS 4000000000\nDATA ascii\n1 2 3\n", ":4: ", "the file ends");
+  expect_refused("a.pcd", head + "POINTS 4000000000\nDATA ascii\n1 2 3\n", ":5: ", "the file ends");
   expect_refused("a.pcd", head + "POINTS 4000000000\nDATA binary\n123456789012", ": ", "room for 1");
 }
 
