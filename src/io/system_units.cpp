@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -52,16 +53,25 @@ bool is_horizontal(std::string_view word) {
 bool is_vertical(std::string_view word) { return is_one_of(word, {"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"}); }
 bool is_geographic(std::string_view word) { return is_one_of(word, {"GEOGCS", "GEOGCRS", "GEOGRAPHICCRS"}); }
 
-// Of what follows the bracket of UNIT["metre",1]; 0 if that is no length.
+bool is_named_foot(std::string_view name) {
+  std::string lower(name);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return lower.find("foot") != std::string::npos || lower.find("feet") != std::string::npos;
+}
+
+// Of what follows the bracket of UNIT["metre",1]; 0 if that is no length. Some files have feet of 1 m, which tells
+// nothing.
 double metres_of_unit(std::string_view text) {
-  const std::size_t name = text.find('"');
-  const std::size_t end = name == std::string_view::npos ? name : text.find('"', name + 1);
+  const std::size_t begin = text.find('"');
+  const std::size_t end = begin == std::string_view::npos ? begin : text.find('"', begin + 1);
   if (end == std::string_view::npos) return 0;
   const std::size_t number = text.find_first_not_of(", \t\r\n", end + 1);
   if (number == std::string_view::npos) return 0;
   double metres = 0;
   const auto [stop, error] = std::from_chars(text.data() + number, text.data() + text.size(), metres);
-  return error == std::errc{} && is_length(metres) ? metres : 0;
+  if (error != std::errc{} || !is_length(metres)) return 0;
+  return metres == 1 && is_named_foot(text.substr(begin, std::min<std::size_t>(end - begin, 80))) ? 0 : metres;
 }
 
 }  // namespace

@@ -70,32 +70,6 @@ class PointIo : public ::testing::Test {
     }
     EXPECT_LE(largest_allocation, std::size_t{1} << 18) << what;
   }
-  // Every prefix and 3000 files with a few other bytes are read or refused, and nothing worse.
-  void expect_sturdy(const std::string& name, const std::string& bytes) {
-    std::size_t refused = 0;
-    const auto check = [&](const std::string& damaged) {
-      const std::string path = store(name, damaged);
-      largest_allocation = 0;
-      try {
-        for (const Vec3& p : read_point_cloud(path).points)
-          for (int k = 0; k < 3; ++k) ASSERT_LE(std::abs(p[k]), 1e100);
-      } catch (const Error&) {
-        ++refused;
-      }
-      EXPECT_LE(largest_allocation, std::size_t{1} << 18);
-    };
-    for (std::size_t n = 0; n < bytes.size(); ++n) check(bytes.substr(0, n));
-    EXPECT_GT(refused, bytes.size() / 2);
-    for (std::uint64_t seed = 0; seed < 3000; ++seed) {
-      Random random(7, seed);
-      std::string damaged = bytes;
-      for (int k = 0; k < 3; ++k)
-        damaged[static_cast<std::size_t>(random.uniform() * static_cast<double>(bytes.size()))] =
-            random.uniform() < 0.3 ? '\xff' : static_cast<char>(256 * random.uniform());
-      check(damaged);
-    }
-  }
-
   fs::path folder_;
   std::vector<std::string> warnings_;
 };
@@ -105,6 +79,33 @@ void put(std::string& bytes, std::size_t at, T value) {
   std::string word;
   append_bytes(word, value);
   bytes.replace(at, word.size(), word);
+}
+
+using Reader = std::function<PointCloud(std::string_view)>;
+
+// Every prefix and 3000 files with a few other bytes are read or refused, and nothing worse.
+void expect_sturdy(const Reader& read, const std::string& bytes) {
+  std::size_t refused = 0;
+  const auto check = [&](const std::string& damaged) {
+    largest_allocation = 0;
+    try {
+      for (const Vec3& p : read(damaged).points)
+        for (int k = 0; k < 3; ++k) ASSERT_LE(std::abs(p[k]), 1e100);
+    } catch (const Error&) {
+      ++refused;
+    }
+    EXPECT_LE(largest_allocation, std::size_t{1} << 18);
+  };
+  for (std::size_t n = 0; n < bytes.size(); ++n) check(bytes.substr(0, n));
+  EXPECT_GT(refused, bytes.size() / 2);
+  for (std::uint64_t seed = 0; seed < 3000; ++seed) {
+    Random random(7, seed);
+    std::string damaged = bytes;
+    for (int k = 0; k < 3; ++k)
+      damaged[static_cast<std::size_t>(random.uniform() * static_cast<double>(bytes.size()))] =
+          random.uniform() < 0.3 ? '\xff' : static_cast<char>(256 * random.uniform());
+    check(damaged);
+  }
 }
 
 // ---- LAS
@@ -352,6 +353,9 @@ TEST_F(PointIo, LasTellsItsUnit) {
     EXPECT_EQ(by_wkt("LOCAL_CS[\"l\",UNIT[\"millimetre\",0.001]]", extended), 0.001);
     EXPECT_EQ(by_wkt("COMPD_CS[\"c\"," + utm + ",VERT_CS[\"v\",UNIT[\"metre\",1]]]", extended), 1);
     EXPECT_EQ(by_wkt("PROJCS[\"p\",UNIT[\"nothing\"]]", extended), 0);
+    EXPECT_EQ(by_wkt("PROJCS[\"p\",UNIT[\"US survey foot\",1.0]]", extended), 0);  // neither a foot nor a metre
+    EXPECT_EQ(by_wkt("PROJCS[\"p\",UNIT[\"metre\",1],VERTCS[\"v\",UNIT[\"Foot_US\",1]]]", extended), 1);
+    EXPECT_TRUE(warnings_.empty());
     EXPECT_EQ(by_wkt("]]PROJCS[UNIT[\"metre\",-1]]", extended), 0);
     EXPECT_EQ(by_wkt(std::string(500, '['), extended), 0);
   }
@@ -402,7 +406,7 @@ TEST_F(PointIo, DamagedLasIsReadOrRefused) {
   file.format = 7;
   file.records = {{34735, geo_keys({{3076, 0, 1, 9002}})}};
   file.extended = {{2112, "PROJCS[\"p\",UNIT[\"metre\",1]]"}};
-  expect_sturdy("a.las", file.bytes());
+  expect_sturdy([](std::string_view bytes) { return io::read_las("a.las", bytes, {}); }, file.bytes());
 }
 
 // ---- PTS
@@ -432,7 +436,8 @@ TEST_F(PointIo, RefusesMalformedPts) {
   expect_refused("a.pts", "1\n1 nan 2\n", ":2: ", "not finite");
   expect_refused("a.pts", "0\n", ":2: ", "no point at all");
   expect_refused("a.pts", "", ": ", "empty");
-  expect_sturdy("a.pts", "2\n1 2 3 -7 255 0 1\n0.25 -1e3 4\n1\n5 6 7\n");
+  expect_sturdy([](std::string_view bytes) { return io::read_pts("a.pts", bytes); },
+                "2\n1 2 3 -7 255 0 1\n0.25 -1e3 4\n1\n5 6 7\n");
 }
 
 // ---- PCD
@@ -679,7 +684,8 @@ TEST_F(PointIo, RefusesDamagedCompression) {
 
 TEST_F(PointIo, DamagedPcdIsReadOrRefused) {
   for (const char* data : {"ascii", "binary", "binary_compressed"})
-    expect_sturdy("a.pcd", pcd(kLayouts[3], whole_points(12), data));
+    expect_sturdy([](std::string_view bytes) { return io::read_pcd("a.pcd", bytes, {}); },
+                  pcd(kLayouts[3], whole_points(12), data));
 }
 
 // ---- all
