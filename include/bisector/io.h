@@ -1,8 +1,9 @@
-// Mesh files. Surfaces: OFF, OBJ, PLY (ASCII and binary) and STL (ASCII and binary). Tetrahedra: Medit .mesh, Gmsh
-// .msh, VTK .vtk and .vtu.
+// Mesh files and scans. Surfaces: OFF, OBJ, PLY (ASCII and binary) and STL (ASCII and binary). Tetrahedra: Medit .mesh,
+// Gmsh .msh, VTK .vtk and .vtu. Scans: LAS, PTS, PCD, PLY and XYZ.
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -52,10 +53,6 @@ struct PolygonMesh {
 };
 BISECTOR_API void write_polygons(const std::string& path, const PolygonMesh& mesh);
 
-// Reads the vertices of a .ply file, with or without faces, and of any other file "x y z" lines; '#' starts a comment,
-// further columns are ignored. Throws Error as read_mesh does.
-BISECTOR_API std::vector<Vec3> read_points(const std::string& path);
-
 // Reads a number for each vertex from a scalar property of a PLY file's element `vertex`. Throws Error, listing the
 // properties that are there, if `name` is not among them, and for other formats and values that are not finite.
 BISECTOR_API std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name);
@@ -67,6 +64,32 @@ BISECTOR_API std::vector<std::array<Index, 2>> read_feature_edges(const std::str
 
 // Writes what read_feature_edges reads. Throws Error.
 BISECTOR_API void write_feature_edges(const std::string& path, const std::vector<std::array<Index, 2>>& edges);
+
+// --- scans ---
+
+struct PointCloud {
+  std::vector<Vec3> points;
+  std::vector<std::uint8_t> classification;  // LAS: the class of each point (2: ground); empty: the file has none
+  double unit = 0;                           // of the coordinates, in metres; 0: the file does not say
+};
+
+// Reads a scan by its file name's extension.
+//   .las  LAS 1.0 to 1.4 with point formats 0 to 10, not compressed. Points classified as noise (7 and 18) or flagged
+//         as withheld are left out, each kind with a warning; the classes of LAS 1.0, which defines none, are not read.
+//         The unit is that of the coordinate system (GeoTIFF keys or WKT); where z has another one, z is converted,
+//         with a warning.
+//   .pts  lines "x y z", further columns ignored, after a line with their number; several scans may follow each other.
+//   .pcd  PCD 0.5 to 0.7, ASCII, binary or binary_compressed. Points with NaN or infinite coordinates, which had no
+//         return, are left out with a warning.
+//   .ply  the vertices, with or without faces.
+// Others are read as lines "x y z"; '#' starts a comment, further columns are ignored.
+// Throws Error, naming the file and the line, byte or point (counted from 0), for: a missing, empty, damaged or
+// truncated file, counts that do not match, compressed LAS (.laz), coordinates in degrees, NaN and infinite coordinates
+// (but for PCD), coordinates beyond 1e100, no point at all. Memory is bounded by the file's size, not by its counts.
+BISECTOR_API PointCloud read_point_cloud(const std::string& path, const Context& context = {});
+
+// The points alone, without warnings.
+BISECTOR_API std::vector<Vec3> read_points(const std::string& path);
 
 // --- tetrahedral meshes ---
 

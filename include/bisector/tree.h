@@ -102,7 +102,7 @@ BISECTOR_API TreeResult reconstruct_tree(const std::vector<Vec3>& points, const 
 // parents. `tolerance` is the largest chord error in radii of the branch.
 BISECTOR_API TriangleMesh tree_mesh(const TreeResult& tree, double tolerance = 0.05);
 
-enum class IgesUnit { millimetre, centimetre, metre, inch };  // of the coordinates
+enum class IgesUnit { millimetre, centimetre, metre, inch, foot };  // of the coordinates
 
 // The surfaces as .obj (a group branch_K for each branch K), .ply (face property `label`), .off, .stl or, as B-spline
 // surfaces named branch_K, .igs and .iges, where `unit` is that of the coordinates. Throws Error.
@@ -111,6 +111,15 @@ BISECTOR_API void write_tree(const std::string& path, const TreeResult& tree, co
 
 // The skeleton as binary PLY: vertices with `radius`, `branch` and `order`, and the element `edge`. Throws Error.
 BISECTOR_API void write_skeleton(const std::string& path, const TreeResult& tree);
+
+// The branches as cylinders, one for each segment of the skeleton outside the parent branch, as comma-separated lines
+// under a head of TreeQSM's names: radius, length, start_x, start_y, start_z, axis_x, axis_y, axis_z (a unit vector),
+// parent (the cylinder that this one grows from), extension (the next one of its branch), branch, branch_order (0: of a
+// trunk), position_in_branch and added (always 0: there are no cylinders but those of the axes). Lines, branches and
+// positions count from 1, and 0 stands for none; parents come before children, and branch K + 1 is branches[K]. A
+// cylinder has the length and volume of the cone frustum between its ends, so volumes sum to those of the branches.
+// TreeQSM's mad, SurfCov and UnmodRadius are left out. Numbers read back bit for bit. Throws Error.
+BISECTOR_API void write_cylinders(const std::string& path, const TreeResult& tree);
 
 // The points as binary PLY with `label`, their branch (-1: none), and its colour. Throws Error.
 BISECTOR_API void write_tree_labels(const std::string& path, const std::vector<Vec3>& points, const TreeResult& tree);

@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bisector/io.h"
@@ -24,8 +27,9 @@ namespace bisector::cli {
 namespace {
 
 struct TreeCommand {
-  std::string input, output, skeleton, labels, preview;
+  std::string input, output, skeleton, cylinders, labels, preview;
   IgesUnit unit = IgesUnit::metre;
+  bool has_unit = false;  // asked for
   TreeOptions options;
   CommonOptions common;
 };
@@ -37,10 +41,14 @@ void add_options(CLI::App* app, TreeCommand& command) {
       ->group("Output");
   add_file(app, "--skeleton", command.skeleton, "FILE.ply", "also write the branches' axes with radii")
       ->group("Output");
+  add_file(app, "--cylinders", command.cylinders, "FILE.csv",
+           "also write the branches as cylinders, in the columns of\nTreeQSM")
+      ->group("Output");
   add_file(app, "--labels", command.labels, "FILE.ply", "also write the points with the branch that each is of")
       ->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw points and surfaces side by side")->group("Output");
-  add_words(app, "--unit", command.unit, kUnitWords, "of the points, for .igs: mm, cm, m (default) or in")
+  add_words(app, "--unit", command.unit, kUnitWords,
+            "of the points, for .igs: mm, cm, m, in or ft; default: what\na LAS file says, else m")
       ->group("Output");
   app->add_option("--ground", command.options.ground, "leave out points with z below this")
       ->type_name("Z")
@@ -68,10 +76,31 @@ void add_options(CLI::App* app, TreeCommand& command) {
                      "the points and timings; - for stdout");
 }
 
-void check_usage(const TreeCommand& command, const Usage& usage) {
+bool is_iges(const TreeCommand& command) {
   const std::string extension = extension_of(command.output);
-  if (usage.given("--unit") && extension != ".igs" && extension != ".iges")
+  return extension == ".igs" || extension == ".iges";
+}
+
+void check_usage(const TreeCommand& command, const Usage& usage) {
+  if (usage.given("--unit") && !is_iges(command))
     throw CLI::ValidationError("--unit: only .igs files tell a unit; leave it out");
+}
+
+// Of the coordinates: as asked for, or as the file says, which is `metres` (0: nothing).
+IgesUnit unit_of_output(const TreeCommand& command, double metres, Console& console) {
+  constexpr std::array<std::pair<double, IgesUnit>, 5> kUnits{{{1, IgesUnit::metre},
+                                                               {0.3048, IgesUnit::foot},
+                                                               {0.0254, IgesUnit::inch},
+                                                               {0.01, IgesUnit::centimetre},
+                                                               {0.001, IgesUnit::millimetre}}};
+  constexpr double kEqual = 1e-5;  // survey feet are 2e-6 longer than feet
+  if (command.has_unit || metres == 0) return command.unit;
+  for (const auto& [size, unit] : kUnits)
+    if (std::abs(metres / size - 1) < kEqual) return unit;
+  if (is_iges(command))
+    console.warn(fmt::format("{}: IGES has no unit of {:.6g} m, so the file says metres; scale it where it is read",
+                             command.output, metres));
+  return command.unit;
 }
 
 // Of all branches together, and of the points.
@@ -119,9 +148,10 @@ Json branch_json(const TreeBranch& branch) {
           {"points", branch.points}};
 }
 
-Json tree_report(const std::vector<Vec3>& points, const TreeResult& tree, const Measures& measures) {
+Json tree_report(const PointCloud& cloud, const TreeResult& tree, const Measures& measures) {
   Json report = start_report("tree");
-  report["input"] = {{"points", points.size()},
+  report["input"] = {{"points", cloud.points.size()},
+                     {"unit", cloud.unit > 0 ? Json(cloud.unit) : Json(nullptr)},
                      {"ground_points", tree.ground_points},
                      {"duplicate_points", tree.duplicate_points},
                      {"small_component_points", tree.small_component_points},
@@ -175,7 +205,8 @@ void print_summary(Console& console, const TreeCommand& command, const std::vect
                   100 * share_within_radii(measures.coverage, 2)));
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose) print_seconds(console, seconds);
-  console.print_written({command.output, command.skeleton, command.labels, command.preview, command.common.report});
+  console.print_written(
+      {command.output, command.skeleton, command.cylinders, command.labels, command.preview, command.common.report});
 }
 
 void run(const TreeCommand& command) {
@@ -183,6 +214,7 @@ void run(const TreeCommand& command) {
   const std::string& report_path = command.common.report;
   check_outputs({{command.output, kTreeFormats},
                  {command.skeleton, {".ply"}},
+                 {command.cylinders, {".csv"}},
                  {command.labels, {".ply"}},
                  {command.preview, {".png"}},
                  report_output(report_path)},
@@ -192,7 +224,8 @@ void run(const TreeCommand& command) {
 
   console.phase("reading " + command.input);
   const Stopwatch reading;
-  const std::vector<Vec3> points = read_points(command.input);
+  const PointCloud cloud = read_point_cloud(command.input, console.context());
+  const std::vector<Vec3>& points = cloud.points;
   double io = reading.seconds();
 
   const TreeResult tree = reconstruct_tree(points, command.options, console.context());
@@ -210,8 +243,9 @@ void run(const TreeCommand& command) {
   console.phase("writing " + command.output);
   stop_watching_interrupts();
   const Stopwatch writing;
-  write_tree(command.output, tree, mesh, command.unit);
+  write_tree(command.output, tree, mesh, unit_of_output(command, cloud.unit, console));
   if (!command.skeleton.empty()) write_skeleton(command.skeleton, tree);
+  if (!command.cylinders.empty()) write_cylinders(command.cylinders, tree);
   if (!command.labels.empty()) write_tree_labels(command.labels, points, tree);
   io += writing.seconds();
   const Stopwatch drawing;
@@ -220,7 +254,7 @@ void run(const TreeCommand& command) {
   seconds["io"] = io;
   seconds["total"] = total.seconds();
   if (!report_path.empty()) {
-    Json report = tree_report(points, tree, measures);
+    Json report = tree_report(cloud, tree, measures);
     report["seconds"] = seconds;
     write_report(report_path, report, console.warnings());
   }
@@ -231,15 +265,21 @@ void run(const TreeCommand& command) {
 
 Command add_tree(CLI::App& program) {
   const auto command = std::make_shared<TreeCommand>();
-  CLI::App* app = add_command(
-      program, "tree", "Reconstruct the branches of a leafless tree from a laser scan.",
-      "bisector tree POINTS -o OUT [options]",
-      "Examples:\n"
-      "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
-      "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
-      "POINTS is a .ply file or \"x y z\" lines, z up, without leaves. Ctrl-C stops the run; nothing is written.");
+  CLI::App* app =
+      add_command(program, "tree", "Reconstruct the branches of a leafless tree from a laser scan.",
+                  "bisector tree POINTS -o OUT [options]",
+                  "Examples:\n"
+                  "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
+                  "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
+                  "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
+                  "\"x y z\"; z is up and the tree has no leaves. Ctrl-C stops the run; nothing is written.");
   add_options(app, *command);
-  return {app, [=] { check_usage(*command, Usage(*app)); }, [=] { run(*command); }};
+  return {app,
+          [=] {
+            check_usage(*command, Usage(*app));
+            command->has_unit = Usage(*app).given("--unit");
+          },
+          [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -35,7 +35,10 @@ inline constexpr auto kStartWords = word_table<SegmentStart>(
 inline constexpr auto kComponentWords =
     word_table<TreeComponents>({{TreeComponents::bridge, "bridge"}, {TreeComponents::separate, "separate"}});
 
-inline constexpr auto kUnitWords = word_table<IgesUnit>(
-    {{IgesUnit::millimetre, "mm"}, {IgesUnit::centimetre, "cm"}, {IgesUnit::metre, "m"}, {IgesUnit::inch, "in"}});
+inline constexpr auto kUnitWords = word_table<IgesUnit>({{IgesUnit::millimetre, "mm"},
+                                                         {IgesUnit::centimetre, "cm"},
+                                                         {IgesUnit::metre, "m"},
+                                                         {IgesUnit::inch, "in"},
+                                                         {IgesUnit::foot, "ft"}});
 
 }  // namespace bisector::cli

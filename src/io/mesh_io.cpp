@@ -300,16 +300,6 @@ void write_polygons(const std::string& path, const PolygonMesh& mesh) {
   write_file(path, format_ply(mesh));
 }
 
-std::vector<Vec3> read_points(const std::string& path) {
-  const std::string bytes = read_bytes(path);
-  if (lower_extension(path) == ".ply") return read_ply_points(path, bytes);
-  TextReader in(path, bytes, '#');
-  std::vector<Vec3> points;
-  while (in.next_line()) points.push_back(in.point());
-  if (points.empty()) in.fail("there is no point at all; give one \"x y z\" a line");
-  return points;
-}
-
 std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name) {
   const std::string extension = lower_extension(path);
   if (extension != ".ply")

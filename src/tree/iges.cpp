@@ -150,8 +150,8 @@ std::vector<std::string> global_lines(const std::string& path, const std::vector
   std::string file = path.substr(path.find_last_of('/') + 1);
   for (char& c : file)
     if (!printable(c)) c = '?';
-  static constexpr std::array<std::pair<int, std::string_view>, 4> kUnits{
-      {{2, "MM"}, {10, "CM"}, {6, "M"}, {1, "INCH"}}};
+  static constexpr std::array<std::pair<int, std::string_view>, 5> kUnits{
+      {{2, "MM"}, {10, "CM"}, {6, "M"}, {1, "INCH"}, {4, "FT"}}};
   const auto& [flag, unit_name] = kUnits[static_cast<std::size_t>(unit)];
 
   const std::vector<std::string> values{hollerith(","),

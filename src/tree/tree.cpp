@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "bisector/error.h"
@@ -13,6 +12,7 @@
 #include "tree/allometry.h"
 #include "tree/branches.h"
 #include "tree/clusters.h"
+#include "tree/frusta.h"
 #include "tree/growth.h"
 #include "tree/level_sections.h"
 #include "tree/loft.h"
@@ -216,25 +216,13 @@ void measure(const std::vector<Limb>& limbs, std::size_t b, TreeBranch& branch) 
   branch.length = polyline_length(limb.axis);
   branch.tip_radius = limb.radii.back();
   branch.base_radius = limb.radii.front();
-  bool free = limb.parent == kNone;
-  for (std::size_t k = 0; k + 1 < limb.axis.size(); ++k) {
-    double share = 1;
-    if (!free) {
-      const Limb& parent = limbs[limb.parent];
-      const auto depth = [&](const Vec3& p) {
-        const PolylineFoot foot = nearest_on_polyline(parent.axis, p);
-        return value_at(parent.radii, foot) - foot.distance;
-      };
-      const double here = depth(limb.axis[k]), next = depth(limb.axis[k + 1]);
-      if (next > 0) continue;
-      free = true;
-      share = here > 0 ? -next / (here - next) : 1;
-      branch.base_radius = share * limb.radii[k] + (1 - share) * limb.radii[k + 1];
-    }
-    const double r = share * limb.radii[k] + (1 - share) * limb.radii[k + 1], q = limb.radii[k + 1];
-    const double height = share * norm(limb.axis[k + 1] - limb.axis[k]);
-    branch.volume += std::numbers::pi / 3 * height * (r * r + r * q + q * q);
-    branch.area += std::numbers::pi * (r + q) * std::hypot(height, r - q);
+  const std::vector<Frustum> frusta =
+      limb.parent == kNone ? frusta_outside(limb.axis, limb.radii)
+                           : frusta_outside(limb.axis, limb.radii, limbs[limb.parent].axis, limbs[limb.parent].radii);
+  if (!frusta.empty()) branch.base_radius = frusta.front().start_radius;
+  for (const Frustum& f : frusta) {
+    branch.volume += f.volume();
+    branch.area += f.lateral_area();
   }
 }
 

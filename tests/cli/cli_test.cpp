@@ -10,13 +10,17 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -1736,6 +1740,79 @@ TEST_F(CliTree, ReadsPlyAndWritesIges) {
   EXPECT_EQ(read_text(in("a.ply")), read_text(in("b.ply")));
   ASSERT_EQ(run({"tree", in("l.ply"), "-o", in("t.igs"), "--unit", "mm", "--quiet"}).code, 0);
   EXPECT_NE(read_text(in("t.igs")).find("branch_0"), std::string::npos);
+}
+
+// As LAS 1.2 whose unit is a GeoTIFF code.
+std::string las_of(const std::vector<Vec3>& points, std::uint16_t unit) {
+  std::string out(227, '\0');
+  const auto put = [&](std::size_t at, const auto& value) { std::memcpy(out.data() + at, &value, sizeof(value)); };
+  out.replace(0, 4, "LASF");
+  out[24] = 1;
+  out[25] = 2;
+  put(94, std::uint16_t{227});
+  put(100, std::uint32_t{1});
+  put(105, std::uint16_t{20});
+  put(107, static_cast<std::uint32_t>(points.size()));
+  for (std::size_t k = 0; k < 3; ++k) put(131 + 8 * k, 1e-6);
+  std::string record(54, '\0');
+  record.replace(2, 15, "LASF_Projection");
+  const std::array<std::uint16_t, 8> keys{1, 1, 0, 1, 3076, 0, 1, unit};
+  const std::uint16_t id = 34735, length = sizeof(keys);
+  std::memcpy(record.data() + 18, &id, 2);
+  std::memcpy(record.data() + 20, &length, 2);
+  out += record;
+  out.append(reinterpret_cast<const char*>(keys.data()), sizeof(keys));
+  put(96, static_cast<std::uint32_t>(out.size()));
+  for (const Vec3& p : points) {
+    std::array<std::int32_t, 5> point{};
+    for (int k = 0; k < 3; ++k) point[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::lround(1e6 * p[k]));
+    out.append(reinterpret_cast<const char*>(point.data()), sizeof(point));
+  }
+  return out;
+}
+
+TEST_F(CliTree, ReadsLasInItsUnit) {
+  write_text("feet.las", las_of(points_, 9002));
+  ASSERT_EQ(run({"tree", in("feet.las"), "-o", in("t.igs"), "--report", in("r.json"), "--quiet"}).code, 0);
+  EXPECT_EQ(Json::parse(read_text(in("r.json")))["input"]["unit"], 0.3048);
+  EXPECT_EQ(Json::parse(read_text(in("r.json")))["input"]["points"], points_.size());
+  EXPECT_NE(read_text(in("t.igs")).find(",4,2HFT,"), std::string::npos);
+  ASSERT_EQ(run({"tree", in("feet.las"), "-o", in("t.igs"), "--unit", "mm", "--quiet"}).code, 0);
+  EXPECT_NE(read_text(in("t.igs")).find(",2,2HMM,"), std::string::npos);
+  ASSERT_EQ(run({"tree", in("tree.xyz"), "-o", in("t.igs"), "--report", in("r.json"), "--quiet"}).code, 0);
+  EXPECT_TRUE(Json::parse(read_text(in("r.json")))["input"]["unit"].is_null());
+  EXPECT_NE(read_text(in("t.igs")).find(",6,1HM,"), std::string::npos);
+
+  write_text("km.las", las_of(points_, 9036));
+  ASSERT_EQ(run({"tree", in("km.las"), "-o", in("t.igs"), "--report", in("r.json"), "--quiet"}).code, 0);
+  const Json report = Json::parse(read_text(in("r.json")));
+  EXPECT_EQ(report["input"]["unit"], 1000);
+  ASSERT_FALSE(report["warnings"].empty());
+  EXPECT_NE(report["warnings"].back().get<std::string>().find("IGES has no unit"), std::string::npos);
+
+  std::string packed = las_of(points_, 9001);
+  packed[104] = '\x80';
+  write_text("tree.laz", packed);
+  expect_failure(1, {"tree", in("tree.laz"), "-o", in("t.obj")}, "laszip");
+}
+
+TEST_F(CliTree, WritesCylinders) {
+  ASSERT_EQ(
+      run({"tree", in("tree.xyz"), "-o", in("t.obj"), "--cylinders", in("c.csv"), "--report", in("r.json"), "--quiet"})
+          .code,
+      0);
+  std::istringstream table(read_text(in("c.csv")));
+  std::string line;
+  std::getline(table, line);
+  EXPECT_TRUE(line.starts_with("radius,length,start_x,")) << line;
+  double volume = 0;
+  while (std::getline(table, line)) {
+    double radius = 0, length = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lf,%lf,", &radius, &length), 2) << line;
+    volume += std::numbers::pi * radius * radius * length;
+  }
+  EXPECT_NEAR(volume, Json::parse(read_text(in("r.json")))["tree"]["volume"], 1e-9 * volume);
+  expect_failure(1, {"tree", in("tree.xyz"), "-o", in("t.obj"), "--cylinders", in("c.txt")}, "c.txt");
 }
 
 TEST_F(CliTree, LeavesOutTheGround) {

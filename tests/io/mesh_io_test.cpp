@@ -12,7 +12,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <new>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -26,24 +25,8 @@
 #include "core/geometry.h"
 #include "io/files.h"
 #include "mesh/topology.h"
+#include "support/allocations.h"
 #include "support/models.h"
-
-namespace {
-thread_local std::size_t largest_allocation = 0;
-}
-
-// Hostile counts must not be believed: the largest request is watched. Inlined, gcc takes them for a mismatch.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  largest_allocation = std::max(largest_allocation, size);
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  largest_allocation = std::max(largest_allocation, size);
-  return std::malloc(size);
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace bisector::test {
 namespace {

@@ -201,7 +201,8 @@ TEST_F(Iges, FileIsAsTheStandardSays) {
   const std::vector<std::pair<IgesUnit, std::array<std::string, 2>>> units{{IgesUnit::millimetre, {"2", "MM"}},
                                                                            {IgesUnit::centimetre, {"10", "CM"}},
                                                                            {IgesUnit::metre, {"6", "M"}},
-                                                                           {IgesUnit::inch, {"1", "INCH"}}};
+                                                                           {IgesUnit::inch, {"1", "INCH"}},
+                                                                           {IgesUnit::foot, {"4", "FT"}}};
   for (const auto& [unit, written] : units) {
     write_iges(path_.string(), branches, {"a", "b", "c"}, unit);
     const IgesFile file = parse(path_);
