@@ -41,8 +41,9 @@ struct Ways {
 
 class Growth {
  public:
-  Growth(const std::vector<Vec3>& points, double tolerance, std::vector<Limb>& limbs, std::vector<Index>& limb_of)
-      : points_(points), tolerance_(tolerance), limbs_(limbs), limb_of_(limb_of), set_{points}, tree_(3, set_) {}
+  Growth(const std::vector<Vec3>& points, const std::vector<double>& radius, double tolerance, std::vector<Limb>& limbs,
+         std::vector<Index>& limb_of)
+      : points_(points), radius_(radius), tolerance_(tolerance), limbs_(limbs), limb_of_(limb_of), set_{points}, tree_(3, set_) {}
 
   void find_ways() {
     const Csr<Index> graph = make_graph(points_);
@@ -161,7 +162,7 @@ class Growth {
     if (axis.size() < 2) return;
     axis = smooth(axis);
 
-    const std::vector<Index> near = around(axis);
+    const std::vector<Index> near = around(way);
     std::size_t gain = 0;
     for (const Index i : near) gain += limb_of_[i] == kNone;
     if ((gain < kLeastGain || gaps(way) > kMostGaps) && parent != kNone) return;
@@ -209,23 +210,28 @@ class Growth {
     return crossed / length;
   }
 
-  // Points within the tolerance of a line.
-  std::vector<Index> around(const std::vector<Vec3>& line) const {
+  // Points that a branch along a way explains.
+  std::vector<Index> around(const std::vector<Index>& way) const {
+    std::vector<Vec3> line;
+    for (const Index i : way) line.push_back(points_[i]);
     std::vector<Index> result;
     std::vector<std::pair<Index, double>> found;
     for (std::size_t k = 0; k + 1 < line.size(); ++k) {
       const Vec3 middle = 0.5 * (line[k] + line[k + 1]);
       const double half = 0.5 * norm(line[k + 1] - line[k]);
+      const double reach = tolerance_ + 2 * std::max(radius_of(way[k]), radius_of(way[k + 1]));
       const double at[3] = {middle.x, middle.y, middle.z};
       found.clear();
-      tree_.radiusSearch(at, (tolerance_ + half) * (tolerance_ + half), found, nanoflann::SearchParams(32, 0, false));
+      tree_.radiusSearch(at, (reach + half) * (reach + half), found, nanoflann::SearchParams(32, 0, false));
       for (const auto& [i, squared] : found)
-        if (nearest_on_polyline(line, points_[i], k, k).distance <= tolerance_) result.push_back(i);
+        if (nearest_on_polyline(line, points_[i], k, k).distance <= reach) result.push_back(i);
     }
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
     return result;
   }
+
+  double radius_of(Index i) const { return radius_.empty() ? 0 : radius_[i]; }
 
   // Even steps along a way, whose points lie off the branch's middle by its thickness and the noise: a line that bends
   // little and stays near them. The ends are kept.
@@ -255,6 +261,7 @@ class Growth {
   }
 
   const std::vector<Vec3>& points_;
+  const std::vector<double>& radius_;
   double tolerance_, gap_ = 0;
   std::vector<Limb>& limbs_;
   std::vector<Index>& limb_of_;   // that explains each point
@@ -266,9 +273,9 @@ class Growth {
 
 }  // namespace
 
-void grow_limbs(const std::vector<Vec3>& points, double tolerance, std::vector<Limb>& limbs,
-                std::vector<Index>& limb_of, const Context& context) {
-  Growth growth(points, tolerance, limbs, limb_of);
+void grow_limbs(const std::vector<Vec3>& points, const std::vector<double>& radius, double tolerance,
+                std::vector<Limb>& limbs, std::vector<Index>& limb_of, const Context& context) {
+  Growth growth(points, radius, tolerance, limbs, limb_of);
   growth.find_ways();
   growth.grow(context);
 }

@@ -10,6 +10,7 @@
 #include "spatial/kd_tree.h"
 #include "tree/polyline.h"
 #include "tree/support.h"
+#include "tree/trim.h"
 #include "tree/tube_fit.h"
 
 namespace bisector {
@@ -55,20 +56,13 @@ std::vector<std::vector<Index>> share_out(const std::vector<Vec3>& points, doubl
   return members;
 }
 
-// One past the last point of the axis whose radius rests on points.
-std::size_t fitted_end(const Limb& limb) {
-  const auto last = std::find(limb.fitted.rbegin(), limb.fitted.rend(), 1);
-  return static_cast<std::size_t>(limb.fitted.rend() - last);
-}
-
-double fitted_length(const Limb& limb) {
+double length_to(const Limb& limb, std::size_t end) {
   double length = 0;
-  for (std::size_t k = 1; k < limb.axis.size(); ++k)
-    if (limb.fitted[k]) length += norm(limb.axis[k] - limb.axis[k - 1]);
+  for (std::size_t k = 1; k < end; ++k) length += norm(limb.axis[k] - limb.axis[k - 1]);
   return length;
 }
 
-void refit(const std::vector<Vec3>& points, double noise, Limb& limb) {
+void refit(const std::vector<Vec3>& points, double noise, double hidden, Limb& limb) {
   if (limb.points.size() < kLeastPoints) return;
   std::vector<Vec3> own;
   for (const Index i : limb.points) own.push_back(points[i]);
@@ -83,8 +77,8 @@ void refit(const std::vector<Vec3>& points, double noise, Limb& limb) {
     if (fitted.radii[k] > kMostRatio * expected || fitted.radii[k] < expected / kMostRatio) fitted.fitted[k] = 0;
   }
   remove_noise(std::min(noise, kOwnNoise * tube.deviation), fitted.radii);
-  const std::size_t last = fitted_end(fitted);
-  if (last < 2 || fitted_length(fitted) <= fitted_length(limb)) return;
+  const std::size_t last = fitted_end(fitted, hidden);
+  if (last < 2 || length_to(fitted, last) <= length_to(limb, fitted_end(limb, hidden))) return;
   const PolylineFoot foot = nearest_on_polyline(limb.axis, fitted.axis[last - 1]);
   fitted.axis.resize(last);
   fitted.radii.resize(last);
@@ -133,11 +127,17 @@ void straighten(Limb& limb) {
 
 void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs) {
   std::vector<std::vector<Index>> members = share_out(points, tolerance, limbs);
+  std::vector<double> hidden(limbs.size(), 0);
+  for (std::size_t b = 0; b < limbs.size(); ++b)
+    if (limbs[b].parent != kNone) {
+      const Limb& parent = limbs[limbs[b].parent];
+      hidden[b] = value_at(parent.radii, nearest_on_polyline(parent.axis, limbs[b].axis.front()));
+    }
   parallel_each(
       limbs.size(),
       [&](std::size_t b) {
         limbs[b].points = std::move(members[b]);
-        refit(points, noise, limbs[b]);
+        refit(points, noise, hidden[b], limbs[b]);
       },
       1);
 }

@@ -292,16 +292,21 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   const double height = bounding_box(scan.points).hi.z;
   const double tolerance = getenv("TOL") ? atof(getenv("TOL"))*height : std::min(0.006*height, 0.5*network.graph.spacing);
   std::vector<Index> limb_of;
+  std::vector<double> radius;
   const int rounds = getenv("ROUNDS") ? atoi(getenv("ROUNDS")) : 3;
   for (int round = 0; round < rounds; ++round) {
     trim_limbs(limbs);
     fmt::print(stderr, "limbs kept {} spacing/H {} noise/H {} tol/H {}\n", limbs.size(), network.graph.spacing/height, noise/height, tolerance/height);
     limb_of = limbs_of_points(scan.points, limbs, std::max(skin, tolerance));
     fmt::print(stderr, "explained {}\n", std::count_if(limb_of.begin(), limb_of.end(), [](Index i){return i!=kNone;}));
-    grow_limbs(scan.points, tolerance, limbs, limb_of, context);
+    grow_limbs(scan.points, radius, tolerance, limbs, limb_of, context);
     fill_radii(limbs, kTip * height, kSlenderness);
     straighten_limbs(limbs);
-    if (round + 1 < rounds) refit_limbs(scan.points, tolerance, noise, limbs);
+    if (round + 1 == rounds) break;
+    radius.assign(scan.points.size(), 0);
+    for (std::size_t i = 0; i < limb_of.size(); ++i)
+      if (limb_of[i] != kNone) radius[i] = value_at(limbs[limb_of[i]].radii, nearest_on_polyline(limbs[limb_of[i]].axis, scan.points[i]));
+    refit_limbs(scan.points, tolerance, noise, limbs);
   }
   for (Limb& limb : limbs) limb.points.clear();
   for (std::size_t i = 0; i < limb_of.size(); ++i)

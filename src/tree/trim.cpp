@@ -14,8 +14,9 @@ constexpr double kGap = 12;          // between fitted places of an axis, in rad
 constexpr std::size_t kLeastFitted = 3;  // places of a limb
 constexpr double kWider = 1.3;       // radius over that before a gap, at most
 
-// One past the last point of the axis that is kept; 0: none.
-std::size_t kept_length(const Limb& limb, double hidden) {
+}  // namespace
+
+std::size_t fitted_end(const Limb& limb, double hidden) {
   const std::size_t m = limb.axis.size();
   std::size_t last = 0, count = 0;
   double since = -hidden;  // length since the last fitted place, or since the base came out of the parent
@@ -31,8 +32,6 @@ std::size_t kept_length(const Limb& limb, double hidden) {
   return count >= kLeastFitted ? last + 1 : 0;
 }
 
-}  // namespace
-
 void trim_limbs(std::vector<Limb>& limbs) {
   std::vector<Index> number(limbs.size(), kNone);
   std::vector<std::size_t> kept(limbs.size(), 0);
@@ -47,7 +46,7 @@ void trim_limbs(std::vector<Limb>& limbs) {
       if (foot.segment + 1 >= kept[limb.parent]) continue;
       hidden = value_at(parent.radii, foot);
     }
-    kept[b] = kept_length(limb, hidden);
+    kept[b] = fitted_end(limb, hidden);
     if (kept[b] < 2) {
       kept[b] = 0;
       continue;

@@ -1,6 +1,7 @@
 // Branches end where their points no longer carry a radius.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "core/geometry.h"
@@ -8,8 +9,11 @@
 
 namespace bisector {
 
-// Keeps of each limb what leads from its base to the last place where its radius rests on points; gaps of a few
-// diameters between such places stay, for branches hide each other. Limbs without such a place near their base go, and
+// One past the last point of the axis that a chain of places leads to whose radii rest on points, with gaps of a few
+// diameters at most, from the base on, which may be `hidden` in the parent for a length; 0 if there are too few.
+std::size_t fitted_end(const Limb& limb, double hidden);
+
+// Keeps of each limb what leads to its fitted end. Limbs without such a place near their base go, and
 // those whose parent went or ends before they begin. Parents come first before and after.
 void trim_limbs(std::vector<Limb>& limbs);
 
