@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -70,21 +71,23 @@ Row measure(const test::TreeScan& scan) {
   return row;
 }
 
-// Of the volume's errors their sizes.
+// Of the volume's errors their sizes; errors of radii of the scans in which a branch was found.
 Row mean(const std::vector<Row>& rows) {
-  Row sum;
-  const double share = 1 / static_cast<double>(rows.size());
-  for (const Row& r : rows) {
-    const auto add = [&](double Row::*value) { sum.*value += share * r.*value; };
-    for (const auto value : {&Row::branches, &Row::found, &Row::right, &Row::spurious, &Row::radius, &Row::thick,
-                             &Row::thicker, &Row::seconds})
-      add(value);
-    sum.volume += share * std::abs(r.volume);
-    sum.surface.near_points += share * r.surface.near_points;
-    sum.surface.bare_area += share * r.surface.bare_area;
-    sum.surface.allometric += share * r.surface.allometric;
-  }
-  return sum;
+  const auto over = [&](const auto& value) {
+    double sum = 0, count = 0;
+    for (const Row& r : rows)
+      if (const double v = value(r); std::isfinite(v)) sum += v, ++count;
+    return count > 0 ? sum / count : std::numeric_limits<double>::infinity();
+  };
+  Row result;
+  for (const auto value : {&Row::branches, &Row::found, &Row::right, &Row::spurious, &Row::radius, &Row::thick,
+                           &Row::thicker, &Row::seconds})
+    result.*value = over([&](const Row& r) { return r.*value; });
+  result.volume = over([](const Row& r) { return std::abs(r.volume); });
+  for (const auto value :
+       {&test::SurfaceScore::near_points, &test::SurfaceScore::bare_area, &test::SurfaceScore::allometric})
+    result.surface.*value = over([&](const Row& r) { return r.surface.*value; });
+  return result;
 }
 
 // Noise of 5 to 15 mm and beams of 5 to 20 mm at the tree.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include "tree/polyline.h"
@@ -13,6 +14,7 @@ namespace {
 constexpr double kLeastExponent = 2, kMostExponent = 3;
 constexpr std::size_t kLeastPlaces = 20;  // that an exponent is fitted to
 constexpr std::size_t kMostPlaces = 200;  // that are looked at, evenly
+const double kUnseen = getenv("UNSEEN") ? atof(getenv("UNSEEN")) : 1;
 constexpr double kLeastRatio = 1.5;       // of lengths beyond, of two places that tell a slope
 
 // Length of all that grows beyond each point of each axis, and where a limb leaves its parent.
@@ -21,16 +23,29 @@ struct Lengths {
   std::vector<PolylineFoot> root;
 };
 
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
 Lengths measure_lengths(const std::vector<Limb>& limbs) {
   Lengths lengths;
   lengths.beyond.resize(limbs.size());
   lengths.root.resize(limbs.size());
+  // What a scan no longer shows of a twig is taken to be as long as what it shows of the last ones.
+  std::vector<char> bears(limbs.size(), 0);
+  for (const Limb& limb : limbs)
+    if (limb.parent != kNone) bears[limb.parent] = 1;
+  std::vector<double> last;
+  for (std::size_t b = 0; b < limbs.size(); ++b)
+    if (!bears[b]) last.push_back(polyline_length(limbs[b].axis));
+  const double unseen = last.empty() ? 0 : kUnseen * median(std::move(last));
   std::vector<std::vector<double>> grown(limbs.size());  // on each segment
   for (std::size_t b = 0; b < limbs.size(); ++b) grown[b].assign(limbs[b].axis.size(), 0);
   for (std::size_t b = limbs.size(); b-- > 0;) {
     const Limb& limb = limbs[b];
     std::vector<double>& beyond = lengths.beyond[b];
-    beyond.assign(limb.axis.size(), 0);
+    beyond.assign(limb.axis.size(), unseen);
     for (std::size_t k = limb.axis.size() - 1; k-- > 0;)
       beyond[k] = beyond[k + 1] + norm(limb.axis[k + 1] - limb.axis[k]) + grown[b][k];
     if (limb.parent == kNone) continue;
@@ -38,11 +53,6 @@ Lengths measure_lengths(const std::vector<Limb>& limbs) {
     grown[limb.parent][lengths.root[b].segment] += beyond.front();
   }
   return lengths;
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
 }
 
 // The median of the slopes of log r over log length (Theil and Sen), as an exponent.
@@ -99,10 +109,10 @@ class Filling {
     for (std::size_t k = 1; k < m; ++k) limb.radii[k] = std::min(limb.radii[k], limb.radii[k - 1]);
   }
 
-  // The radius where `length` grows beyond, of a branch that has `radius` where `full` does; the tip's at the end.
+  // The radius where `length` grows beyond, of a branch that has `radius` where `full` does.
   double scaled(double radius, double full, double length) const {
-    const double p = model_.exponent, tip = std::pow(std::min(model_.tip_radius, radius), p);
-    return std::pow(tip + (std::pow(radius, p) - tip) * length / std::max(full, 1e-300), 1 / p);
+    const double scaled = radius * std::pow(length / std::max(full, 1e-300), 1 / model_.exponent);
+    return std::max(scaled, std::min(model_.tip_radius, radius));
   }
 
  private:

@@ -18,7 +18,7 @@ constexpr double kSwathDistance = 12;         // m
 constexpr double kGroundRadius = 3;           // m
 constexpr double kPulseLength = 0.4;          // surfaces so near behind each other, in m, give one return
 constexpr double kLeafTwig = 0.1;             // radius of the thickest twigs that have leaves, of the trunk's
-constexpr double kLeafReach = 0.23;           // of leaves from the twig's axis, m
+constexpr double kLeafReach = 0.43;           // of leaves from the twig's axis, m
 constexpr double kNeighbour = 0.8;            // distance of the trunks, in the lengths of both trees' longest boughs
 constexpr std::size_t kMostLeaves = 100'000;  // on a tree
 constexpr std::size_t kPilotPulses = 40'000;
@@ -125,7 +125,7 @@ std::vector<LeafDisc> grow_leaves(const std::vector<AxisBranch>& branches, std::
     const auto [b, i] = pieces[std::min(static_cast<std::size_t>(at - length.begin()), pieces.size() - 1)];
     const Vec3 from = branches[b].axis[i], along = branches[b].axis[i + 1] - from;
     leaf.radius = random.range(0.02, 0.05);
-    const double stalk = branches[b].radii[i] + leaf.radius + random.range(0, 0.1);
+    const double stalk = branches[b].radii[i] + leaf.radius + random.range(0, 0.3);
     leaf.centre = from + random.unit() * along + stalk * across(along, random.range(0, 2 * kPi));
     const double z = random.range(-1, 1), azimuth = random.range(0, 2 * kPi), r = std::sqrt(1 - z * z);
     leaf.normal = {r * std::cos(azimuth), r * std::sin(azimuth), z};

@@ -47,7 +47,8 @@ struct TreeScan {
 
 // A tree as varied_growth(random_seed) has it. A pulse's range is that from the scanner to the first surface along a
 // ray that is drawn within the beam, with noise, and its point lies so far along the middle of the beam. Leaves are
-// discs of 20 to 50 mm in radius around twigs thinner than a tenth of the trunk. The same seed gives the same scan.
+// discs of 20 to 50 mm in radius up to 0.3 m off twigs thinner than a tenth of the trunk. The same seed gives the same
+// scan.
 TreeScan scan_tree(const TreeScanOptions& options);
 
 }  // namespace bisector::test

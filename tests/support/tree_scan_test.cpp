@@ -137,6 +137,16 @@ TEST(TreeScene, RaysEndAtTheFirstSurface) {
   EXPECT_GE(hits, 200u);
 }
 
+TEST(TreeScene, APoleHasAConesWallAndRoundEnds) {
+  const test::TreeScene scene({{{{0, 0, 0}, {0, 0, 4}}, {0.2, 0.1}}}, {});
+  EXPECT_NEAR(scene.first_hit({0, 0, -5}, {0, 0, 1}).range, 4.8, 1e-12);
+  EXPECT_NEAR(scene.first_hit({0, 0, 9}, {0, 0, -1}).range, 4.9, 1e-12);
+  EXPECT_NEAR(scene.first_hit({-5, 0, 2}, {1, 0, 0}).range, 4.85, 1e-12);
+  EXPECT_NEAR(scene.first_hit({-5, 0, -0.16}, {1, 0, 0}).range, 4.88, 1e-12);
+  EXPECT_EQ(scene.first_hit({-5, 0, 4.11}, {1, 0, 0}).branch, kNone);
+  EXPECT_EQ(scene.first_hit({5, 0, 2}, {1, 0, 0}).branch, kNone);
+}
+
 TEST(TreeScene, LeavesAreMetOnTheirDiscs) {
   const LeafDisc near{{1, 0, 0}, {1, 0, 0}, 0.1}, far{{2, 0, 0}, unit({1, 1, 0}), 0.2};
   const test::TreeScene scene({}, {far, near});
