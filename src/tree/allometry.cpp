@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 
 #include "tree/polyline.h"
@@ -14,7 +13,7 @@ namespace {
 constexpr double kLeastExponent = 2, kMostExponent = 3;
 constexpr std::size_t kLeastPlaces = 20;  // that an exponent is fitted to
 constexpr std::size_t kMostPlaces = 200;  // that are looked at, evenly
-const double kUnseen = getenv("UNSEEN") ? atof(getenv("UNSEEN")) : 1;
+constexpr double kUnseen = 1;             // length of a twig beyond what is seen, in that of the last ones
 constexpr double kLeastRatio = 1.5;       // of lengths beyond, of two places that tell a slope
 
 // Length of all that grows beyond each point of each axis, and where a limb leaves its parent.

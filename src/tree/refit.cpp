@@ -20,6 +20,8 @@ constexpr std::size_t kLeastPoints = 20;  // for a tube
 constexpr double kReach = 2;              // of a limb's points from its axis, in radii and with the tolerance added
 constexpr double kOwnNoise = 1.2;         // noise taken out of a radius, in the deviation of the branch's own points
 constexpr double kMostRatio = 2;          // of a fitted radius and that of the pipe model, either way
+constexpr double kTangent = 2;            // length that tells a branch's direction at its base, in that to the parent's axis
+constexpr int kRootSteps = 16;            // places looked at straight on backwards, over as much
 constexpr double kBend = 3;               // length over which an axis is straight, in radii
 
 // Each point's nearest limb by the distance from its surface, inside counting half.
@@ -93,6 +95,35 @@ void refit(const std::vector<Vec3>& points, double noise, double hidden, Limb& l
   limb = std::move(fitted);
 }
 
+// Near a fork a way follows the surface of the parent: what is inside it goes, and the rest, straight on backwards,
+// begins where it comes nearest to the parent's axis.
+void root(const Limb& parent, double tolerance, Limb& limb) {
+  std::size_t inside = 1;
+  for (; inside + 2 < limb.axis.size() && !limb.fitted[inside]; ++inside) {
+    const PolylineFoot foot = nearest_on_polyline(parent.axis, limb.axis[inside]);
+    if (foot.distance > value_at(parent.radii, foot) + tolerance) break;
+  }
+  const auto gone = static_cast<std::ptrdiff_t>(inside - 1);
+  limb.axis.erase(limb.axis.begin(), limb.axis.begin() + gone);
+  limb.radii.erase(limb.radii.begin(), limb.radii.begin() + gone);
+  limb.fitted.erase(limb.fitted.begin(), limb.fitted.begin() + gone);
+  const Vec3 start = limb.axis[1];
+  PolylineFoot best = nearest_on_polyline(parent.axis, start);
+  const double reach = kTangent * best.distance;
+  std::size_t ahead = 1;
+  while (ahead + 1 < limb.axis.size() && norm(limb.axis[ahead] - start) < reach) ++ahead;
+  if (ahead > 1) {
+    const Vec3 back = unit(start - limb.axis[ahead]);
+    const double farthest = reach;
+    for (int k = 1; k <= kRootSteps; ++k) {
+      const PolylineFoot foot = nearest_on_polyline(parent.axis, start + (farthest * k / kRootSteps) * back);
+      if (foot.distance < best.distance) best = foot;
+    }
+  }
+  limb.axis.front() = best.point;
+  limb.fitted.front() = 0;
+}
+
 void straighten(Limb& limb) {
   const auto m = static_cast<Eigen::Index>(limb.axis.size());
   if (m < 3) return;
@@ -142,9 +173,9 @@ void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise
       1);
 }
 
-void straighten_limbs(std::vector<Limb>& limbs) {
+void straighten_limbs(double tolerance, std::vector<Limb>& limbs) {
   for (Limb& limb : limbs) {
-    if (limb.parent != kNone) limb.axis.front() = nearest_on_polyline(limbs[limb.parent].axis, limb.axis.front()).point;
+    if (limb.parent != kNone) root(limbs[limb.parent], tolerance, limb);
     straighten(limb);
   }
 }

@@ -301,7 +301,8 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
     fmt::print(stderr, "explained {}\n", std::count_if(limb_of.begin(), limb_of.end(), [](Index i){return i!=kNone;}));
     grow_limbs(scan.points, radius, tolerance, limbs, limb_of, context);
     fill_radii(limbs, kTip * height, kSlenderness);
-    straighten_limbs(limbs);
+    straighten_limbs(tolerance, limbs);
+    fill_radii(limbs, kTip * height, kSlenderness);
     if (round + 1 == rounds) break;
     radius.assign(scan.points.size(), 0);
     for (std::size_t i = 0; i < limb_of.size(); ++i)
