@@ -118,7 +118,7 @@ class Refinement {
     for (std::size_t b = 0; b < limbs_.size(); ++b) {
       Limb& limb = limbs_[b];
       const double noise = std::min(options_.noise, kOwnNoise * deviation_[b]);  // rough bark tells nothing of twigs
-      limb.fitted = supported_radii(points_, limb, 0);
+      limb.fitted = supported_radii(points_, limb, options_.noise);
       reject_wider(limb);
       remove_noise(noise, limb.radii);
       std::vector<double> weights = support_[b];

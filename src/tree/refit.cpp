@@ -58,6 +58,14 @@ std::vector<std::vector<Index>> share_out(const std::vector<Vec3>& points, doubl
   return members;
 }
 
+void confirm(const std::vector<Vec3>& points, double noise, const Limb& expected, Limb& limb) {
+  limb.fitted = supported_radii(points, limb, noise);
+  for (std::size_t k = 0; k < limb.axis.size(); ++k) {
+    const double radius = value_at(expected.radii, nearest_on_polyline(expected.axis, limb.axis[k]));
+    if (limb.radii[k] > kMostRatio * radius || limb.radii[k] < radius / kMostRatio) limb.fitted[k] = 0;
+  }
+}
+
 double length_to(const Limb& limb, std::size_t end) {
   double length = 0;
   for (std::size_t k = 1; k < end; ++k) length += norm(limb.axis[k] - limb.axis[k - 1]);
@@ -73,11 +81,7 @@ void refit(const std::vector<Vec3>& points, double noise, double hidden, Limb& l
   fitted.axis = std::move(tube.axis);
   fitted.radii = std::move(tube.radii);
   fitted.points = limb.points;
-  fitted.fitted = supported_radii(points, fitted, noise);
-  for (std::size_t k = 0; k < fitted.axis.size(); ++k) {
-    const double expected = value_at(limb.radii, nearest_on_polyline(limb.axis, fitted.axis[k]));
-    if (fitted.radii[k] > kMostRatio * expected || fitted.radii[k] < expected / kMostRatio) fitted.fitted[k] = 0;
-  }
+  confirm(points, noise, limb, fitted);
   remove_noise(std::min(noise, kOwnNoise * tube.deviation), fitted.radii);
   const std::size_t last = fitted_end(fitted, hidden);
   if (last < 2 || length_to(fitted, last) <= length_to(limb, fitted_end(limb, hidden))) return;
@@ -155,6 +159,12 @@ void straighten(Limb& limb) {
 }
 
 }  // namespace
+
+void confirm_radii(const std::vector<Vec3>& points, double noise, const std::vector<Limb>& expected,
+                   std::vector<Limb>& limbs) {
+  parallel_each(
+      limbs.size(), [&](std::size_t b) { confirm(points, noise, expected[b], limbs[b]); }, 1);
+}
 
 void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs) {
   std::vector<std::vector<Index>> members = share_out(points, tolerance, limbs);

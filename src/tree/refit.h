@@ -8,6 +8,12 @@
 
 namespace bisector {
 
+// Of radii that rest on points as the noise lets them, those stay `fitted` that the pipe model confirms within a factor:
+// of a cloud of twigs a tube can be fitted that looks right but is far too thick. `expected` are the same limbs with the
+// model's radii.
+void confirm_radii(const std::vector<Vec3>& points, double noise, const std::vector<Limb>& expected,
+                   std::vector<Limb>& limbs);
+
 // Fits a tube to the points near each limb, and takes it from the base up to the last place where its radius rests on
 // points. Radii must be there, as a measure of how far points of a limb may be.
 void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs);

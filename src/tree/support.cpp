@@ -83,4 +83,16 @@ std::vector<char> supported_radii(const std::vector<Vec3>& points, const Limb& l
   return result;
 }
 
+double surface_noise(const std::vector<Vec3>& points, const std::vector<Limb>& limbs) {
+  std::vector<double> off;
+  for (const Limb& limb : limbs)
+    for (const Index i : limb.points) {
+      const PolylineFoot foot = nearest_on_polyline(limb.axis, points[i]);
+      if (!limb.fitted[foot.segment] || !limb.fitted[foot.segment + 1]) continue;
+      const double radius = value_at(limb.radii, foot), distance = std::abs(foot.distance - radius);
+      if (distance < kOutlier * radius) off.push_back(distance);
+    }
+  return 1.4826 * quantile(std::move(off), 0.5);
+}
+
 }  // namespace bisector

@@ -21,6 +21,7 @@
 #include "tree/refine.h"
 #include "tree/refit.h"
 #include "tree/skeleton.h"
+#include "tree/support.h"
 #include "tree/trim.h"
 
 namespace bisector {
@@ -288,7 +289,16 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   phase("fitting branches", 0.55);
   limbs = refine_limbs(scan.points, network.neighbours, std::move(limbs), {.noise = noise}, context);
 
-  const double skin = kSkin * noise;
+  std::vector<Limb> expected = limbs;
+  for (Limb& limb : expected) {
+    const std::vector<char> strict = supported_radii(scan.points, limb, 0);
+    for (std::size_t k = 0; k < strict.size(); ++k) limb.fitted[k] = limb.fitted[k] && strict[k];
+  }
+  const double noise2 = surface_noise(scan.points, expected);
+  fmt::print(stderr, "noise {} {}\n", noise, noise2);
+  fill_radii(expected, 0, kSlenderness);
+  confirm_radii(scan.points, noise2, expected, limbs);
+  const double skin = kSkin * noise2;
   const double height = bounding_box(scan.points).hi.z;
   const double tolerance = getenv("TOL") ? atof(getenv("TOL"))*height : std::min(0.006*height, 0.5*network.graph.spacing);
   std::vector<Index> limb_of;
@@ -307,7 +317,7 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
     radius.assign(scan.points.size(), 0);
     for (std::size_t i = 0; i < limb_of.size(); ++i)
       if (limb_of[i] != kNone) radius[i] = value_at(limbs[limb_of[i]].radii, nearest_on_polyline(limbs[limb_of[i]].axis, scan.points[i]));
-    refit_limbs(scan.points, tolerance, noise, limbs);
+    refit_limbs(scan.points, tolerance, noise2, limbs);
   }
   for (Limb& limb : limbs) limb.points.clear();
   for (std::size_t i = 0; i < limb_of.size(); ++i)
