@@ -73,6 +73,18 @@ void fit_exponent(const std::vector<Limb>& limbs, const Lengths& lengths, PipeMo
   model.from_points = true;
 }
 
+// The radius of a limb where it comes out of its parent.
+double free_radius(const std::vector<Limb>& limbs, Index b) {
+  const Limb& limb = limbs[b];
+  if (limb.parent == kNone) return limb.radii.front();
+  const Limb& parent = limbs[limb.parent];
+  for (std::size_t k = 0; k < limb.axis.size(); ++k) {
+    const PolylineFoot foot = nearest_on_polyline(parent.axis, limb.axis[k]);
+    if (foot.distance > value_at(parent.radii, foot)) return limb.radii[k];
+  }
+  return limb.radii.back();
+}
+
 class Filling {
  public:
   Filling(const Lengths& lengths, const PipeModel& model) : lengths_(lengths), model_(model) {}
@@ -141,8 +153,8 @@ PipeModel fill_radii(std::vector<Limb>& limbs, double tip_radius, double slender
     }
     const Limb& parent = limbs[limb.parent];
     const PolylineFoot& foot = lengths.root[b];
-    const double most = value_at(parent.radii, foot);
-    filling.fill(b, most, filling.scaled(most, lengths.beyond[limb.parent][foot.segment], lengths.beyond[b].front()),
+    const double most = std::min(value_at(parent.radii, foot), free_radius(limbs, limb.parent));
+    filling.fill(b, most, filling.scaled(value_at(parent.radii, foot), lengths.beyond[limb.parent][foot.segment], lengths.beyond[b].front()),
                  limb);
   }
   return model;

@@ -4,6 +4,7 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numeric>
 
 #include "spatial/kd_tree.h"
@@ -17,7 +18,7 @@ namespace {
 
 constexpr std::size_t kLeastGain = 2;   // points that a branch explains
 constexpr double kGap = 3;              // steps longer than so many tolerances, or median steps, cross a gap
-constexpr double kMostGaps = 0.5;       // of a branch's length
+const double kMostGaps = getenv("GAPS")?atof(getenv("GAPS")):0.5;       // of a branch's length
 constexpr double kLeastLength = 2;      // of it, in tolerances
 constexpr double kSimilar = 0.8;        // of the longest way's length: among ways so long the straightest goes on
 constexpr double kStep = 1;             // between points of an axis, in tolerances

@@ -128,16 +128,32 @@ void root(const Limb& parent, double tolerance, Limb& limb) {
   limb.fitted.front() = 0;
 }
 
-void straighten(Limb& limb) {
+// Where the axis' points would lie in the middle of the limb's points beside them.
+std::vector<Vec3> centred(const std::vector<Vec3>& points, const Limb& limb) {
+  std::vector<Vec3> middle = limb.axis;
+  std::vector<double> count(limb.axis.size(), 1);
+  for (const Index i : limb.points) {
+    const PolylineFoot foot = nearest_on_polyline(limb.axis, points[i]);
+    const std::size_t k = foot.segment + (foot.t > 0.5);
+    middle[k] += limb.axis[k] + (points[i] - foot.point);
+    ++count[k];
+  }
+  for (std::size_t k = 0; k < middle.size(); ++k) middle[k] *= 1 / count[k];
+  return middle;
+}
+
+void straighten(const std::vector<Vec3>& points, Limb& limb) {
   const auto m = static_cast<Eigen::Index>(limb.axis.size());
   if (m < 3) return;
+  const std::vector<Vec3> middle = centred(points, limb);
   std::vector<Eigen::Triplet<double>> entries;
   Eigen::MatrixXd right(m, 3);
   for (Eigen::Index k = 0; k < m; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const double weight = k == 0 || k + 1 == m ? 1e3 : limb.fitted[at] ? 10.0 : 1.0;
     entries.emplace_back(k, k, weight);
-    for (int c = 0; c < 3; ++c) right(k, c) = weight * limb.axis[at][c];
+    const Vec3& target = k == 0 || limb.fitted[at] ? limb.axis[at] : middle[at];
+    for (int c = 0; c < 3; ++c) right(k, c) = weight * target[c];
   }
   for (Eigen::Index k = 1; k + 1 < m; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -183,10 +199,10 @@ void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise
       1);
 }
 
-void straighten_limbs(double tolerance, std::vector<Limb>& limbs) {
+void straighten_limbs(const std::vector<Vec3>& points, double tolerance, std::vector<Limb>& limbs) {
   for (Limb& limb : limbs) {
     if (limb.parent != kNone) root(limbs[limb.parent], tolerance, limb);
-    straighten(limb);
+    straighten(points, limb);
   }
 }
 

@@ -20,6 +20,6 @@ void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise
 
 // Where no points carry the radius axes bend no more sharply than their radius, for ways along single points wind within
 // the branch. Children start on their parent's axis again.
-void straighten_limbs(double tolerance, std::vector<Limb>& limbs);
+void straighten_limbs(const std::vector<Vec3>& points, double tolerance, std::vector<Limb>& limbs);
 
 }  // namespace bisector

@@ -35,7 +35,7 @@ constexpr double kSlender = 4;          // radius of a cluster over its rms from
 constexpr double kAxisTolerance = 0.3;  // distance of fitted axes from the nodes, in the branch's median radius
 constexpr double kLeastTip = 0.3;  // of the base radius: what tolerances of a pointed branch's mesh go by, at least
 
-constexpr double kSkin = 2.2, kTip=0.0003, kSlenderness=80;
+const double kSkin = getenv("SKIN")?atof(getenv("SKIN")):3.5, kTolN = getenv("TOLN")?atof(getenv("TOLN")):2.5; constexpr double  kTip=0.0003, kSlenderness=80;
 // A plate of points at the bottom that is taken for ground: how low, how many of the points, how wide beside the tree.
 constexpr double kPlateHeight = 0.02, kPlateWidth = 0.5;
 constexpr std::size_t kPlateShare = 10;  // one point in so many
@@ -300,7 +300,7 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   confirm_radii(scan.points, noise2, expected, limbs);
   const double skin = kSkin * noise2;
   const double height = bounding_box(scan.points).hi.z;
-  const double tolerance = getenv("TOL") ? atof(getenv("TOL"))*height : std::min(0.006*height, 0.5*network.graph.spacing);
+  const double tolerance = getenv("TOL") ? atof(getenv("TOL"))*height : std::min(0.006*height, std::max(kTolN*noise2, 0.5*network.graph.spacing));
   std::vector<Index> limb_of;
   std::vector<double> radius;
   const int rounds = getenv("ROUNDS") ? atoi(getenv("ROUNDS")) : 3;
@@ -310,8 +310,11 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
     limb_of = limbs_of_points(scan.points, limbs, std::max(skin, tolerance));
     fmt::print(stderr, "explained {}\n", std::count_if(limb_of.begin(), limb_of.end(), [](Index i){return i!=kNone;}));
     grow_limbs(scan.points, radius, tolerance, limbs, limb_of, context);
+    for (Limb& limb : limbs) limb.points.clear();
+    for (std::size_t i = 0; i < limb_of.size(); ++i)
+      if (limb_of[i] != kNone) limbs[limb_of[i]].points.push_back(static_cast<Index>(i));
     fill_radii(limbs, kTip * height, kSlenderness);
-    straighten_limbs(tolerance, limbs);
+    straighten_limbs(scan.points, tolerance, limbs);
     fill_radii(limbs, kTip * height, kSlenderness);
     if (round + 1 == rounds) break;
     radius.assign(scan.points.size(), 0);
