@@ -4,13 +4,15 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <functional>
+#include <limits>
 #include <numeric>
+#include <queue>
+#include <tuple>
 
 #include "spatial/kd_tree.h"
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
-#include "tree/shortest_paths.h"
 #include "voronoi/delaunay.h"
 
 namespace bisector {
@@ -18,7 +20,8 @@ namespace {
 
 constexpr std::size_t kLeastGain = 2;   // points that a branch explains
 constexpr double kGap = 3;              // steps longer than so many tolerances, or median steps, cross a gap
-const double kMostGaps = getenv("GAPS")?atof(getenv("GAPS")):0.5;       // of a branch's length
+constexpr double kTurn = 2;             // what a step across a gap costs more at a right angle, in its own cost
+constexpr double kMostGaps = 0.5;       // of a branch's length
 constexpr double kLeastLength = 2;      // of it, in tolerances
 constexpr double kSimilar = 0.8;        // of the longest way's length: among ways so long the straightest goes on
 constexpr double kStep = 1;             // between points of an axis, in tolerances
@@ -48,10 +51,11 @@ class Growth {
 
   void find_ways() {
     const Csr<Index> graph = make_graph(points_);
-    std::vector<double> cost;
-    cost.reserve(graph.values.size());
+    std::vector<double> shortest(points_.size(), std::numeric_limits<double>::infinity());
     for (std::size_t i = 0; i < graph.rows(); ++i)
-      for (const Index* j = graph.begin(i); j != graph.end(i); ++j) cost.push_back(norm2(points_[*j] - points_[i]));
+      for (const Index* j = graph.begin(i); j != graph.end(i); ++j)
+        shortest[i] = std::min(shortest[i], norm(points_[*j] - points_[i]));
+    gap_ = kGap * std::max(tolerance_, quantile(std::move(shortest), 0.5));
     std::vector<Index> sources;
     for (std::size_t i = 0; i < points_.size(); ++i)
       if (limb_of_[i] != kNone) sources.push_back(static_cast<Index>(i));
@@ -59,18 +63,7 @@ class Growth {
       sources.push_back(static_cast<Index>(
           std::min_element(points_.begin(), points_.end(), [](const Vec3& a, const Vec3& b) { return a.z < b.z; }) -
           points_.begin()));
-    const ShortestPaths paths = shortest_paths(graph, cost, sources);
-    ways_.previous = paths.previous;
-    for (const Index s : sources) ways_.previous[s] = s;
-    ways_.order.resize(points_.size());
-    std::iota(ways_.order.begin(), ways_.order.end(), 0u);
-    std::sort(ways_.order.begin(), ways_.order.end(), [&](Index a, Index b) {
-      return std::pair{paths.distance[a], a} < std::pair{paths.distance[b], b};
-    });
-    std::vector<double> steps;
-    for (const Index i : ways_.order)
-      if (ways_.previous[i] != i) steps.push_back(norm(points_[i] - points_[ways_.previous[i]]));
-    gap_ = kGap * std::max(tolerance_, quantile(std::move(steps), 0.5));
+    walk(graph, sources);
     choose_next();
   }
 
@@ -96,6 +89,40 @@ class Growth {
   }
 
  private:
+  // Dijkstra's algorithm, where a step across a gap costs more the more it turns off the way that leads to it.
+  void walk(const Csr<Index>& graph, const std::vector<Index>& sources) {
+    using Entry = std::tuple<double, Index, Index>;  // cost, point, the one before
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+    for (const Index s : sources) queue.emplace(0.0, s, s);
+    ways_.previous.assign(points_.size(), kNone);
+    while (!queue.empty()) {
+      const auto [cost, i, from] = queue.top();
+      queue.pop();
+      if (ways_.previous[i] != kNone) continue;
+      ways_.previous[i] = from;
+      ways_.order.push_back(i);
+      const Vec3 direction = direction_at(i);
+      for (const Index* j = graph.begin(i); j != graph.end(i); ++j) {
+        if (ways_.previous[*j] != kNone) continue;
+        const Vec3 step = points_[*j] - points_[i];
+        const double length = norm(step);
+        const double turn = length > gap_ ? kTurn * (1 - dot(direction, step) / length) : 0;
+        queue.emplace(cost + length * length * (1 + turn), *j, i);
+      }
+    }
+  }
+
+  // Of the limb that a point lies on, or of the way that leads to it.
+  Vec3 direction_at(Index i) const {
+    if (limb_of_[i] != kNone) {
+      const std::vector<Vec3>& axis = limbs_[limb_of_[i]].axis;
+      const std::size_t k = nearest_on_polyline(axis, points_[i]).segment;
+      return unit(axis[k + 1] - axis[k]);
+    }
+    const Vec3 way = points_[i] - points_[far_back(i)];
+    return norm2(way) > 0 ? unit(way) : Vec3{};
+  }
+
   void choose_next() {
     const std::size_t n = points_.size();
     ways_.beyond.assign(n, 0);
