@@ -1,5 +1,6 @@
-// Reconstruction of the branches of a leafless tree from a laser scan (Yan Dong-Ming, Variational Shape Segmentation
-// and Mesh Generation, 2010, chapter 3).
+// Reconstruction of the branches of a tree from a laser scan, dense or sparse (Yan Dong-Ming, Variational Shape
+// Segmentation and Mesh Generation, 2010, chapter 3; where points carry no radius, the pipe model of Shinozaki et al.,
+// 1964).
 #pragma once
 
 #include <cstddef>
@@ -24,6 +25,7 @@ struct TreeOptions {
   std::size_t max_cluster_points = 0;  // larger clusters are split; 0: only those that are no cylinders
   double ground = -std::numeric_limits<double>::infinity();  // points below this height (z) are left out
   TreeComponents components = TreeComponents::bridge;
+  double tip_radius = 0;  // of the thinnest twigs, in the points' unit; 0: 0.0003 of the largest extent
 };
 
 // Clamped, parameter in [0, 1] (others are clamped to it). Degree 3, less where there are fewer than four control
@@ -60,6 +62,7 @@ struct TreeNode {
   double radius = 0;
   Index parent = kNone;  // node; kNone: a root
   Index branch = 0;
+  bool fitted = false;  // the radius rests on points around it, else on the pipe model
 };
 
 struct TreeBranch {
@@ -67,6 +70,7 @@ struct TreeBranch {
   Index parent = kNone;                    // branch, of a lower number; kNone: a trunk
   int order = 0;                           // 0: trunk, 1: branches on it, ...
   double length = 0;                       // of the axis
+  double fitted_length = 0;                // of it, where the radius rests on points
   double base_radius = 0, tip_radius = 0;  // where the branch leaves its parent's surface, and at its end
   double volume = 0, area = 0;             // of what is outside the parent, as cone frusta along the axis
   std::size_t points = 0;                  // that belong to it
@@ -88,6 +92,11 @@ struct TreeResult {
   std::size_t ground_points = 0;           // below the ground, left out
   std::size_t duplicate_points = 0;        // at the place of another
   std::size_t small_component_points = 0;  // in components too small for a tree of their own, left out
+  std::size_t unexplained_points = 0;      // near no branch: leaves, for the most part, and strays
+  // p of the pipe model: at a fork r^p of what comes in is the sum over what goes out. `pipe_fitted`: from this tree's
+  // radii that rest on points; else there were too few, and it is 2.3.
+  double pipe_exponent = 0;
+  bool pipe_fitted = false;
   double noise = 0;                        // standard deviation of points off thick branches
   TreeSeconds seconds;
 };

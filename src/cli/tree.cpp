@@ -26,6 +26,9 @@
 namespace bisector::cli {
 namespace {
 
+constexpr std::size_t kFewUnexplained = 20;  // one point in so many may be near no branch without a warning
+constexpr double kTipMetres = 0.002;         // radius of the thinnest twigs where the file tells its unit
+
 struct TreeCommand {
   std::string input, output, skeleton, cylinders, labels, preview;
   IgesUnit unit = IgesUnit::metre;
@@ -57,6 +60,11 @@ void add_options(CLI::App* app, TreeCommand& command) {
             "parts of the scan that are apart: bridge (join them over\n"
             "their gaps; default) or separate (a tree each)")
       ->group("Scan");
+  app->add_option("--tip-radius", command.options.tip_radius,
+                  "of the thinnest twigs, in the points' unit;\ndefault: 0.0003 of the largest extent")
+      ->type_name("R")
+      ->check(number_above_zero())
+      ->group("Radii");
   app->add_option("--clusters", command.options.clusters, "at most so many; default: as many as it takes")
       ->type_name("N")
       ->check(whole_number(1, kMostSeeds))
@@ -105,10 +113,11 @@ IgesUnit unit_of_output(const TreeCommand& command, double metres, Console& cons
 
 // Of all branches together, and of the points.
 struct Measures {
-  double length = 0, volume = 0, area = 0, height = 0;
+  double length = 0, fitted_length = 0, volume = 0, area = 0, height = 0;
   int order = 0;
   std::size_t trunks = 0, unassigned = 0;
   std::vector<PointCoverage> coverage;  // of the points above the ground
+  double bare = 0;                      // share of the surface farther than 2 % of the height from them
 };
 
 Measures measure(const std::vector<Vec3>& points, const TreeOptions& options, const TreeResult& tree,
@@ -117,6 +126,7 @@ Measures measure(const std::vector<Vec3>& points, const TreeOptions& options, co
   std::vector<BranchSurface> surfaces;
   for (const TreeBranch& b : tree.branches) {
     measures.length += b.length;
+    measures.fitted_length += b.fitted_length;
     measures.volume += b.volume;
     measures.area += b.area;
     measures.order = std::max(measures.order, b.order);
@@ -132,6 +142,7 @@ Measures measure(const std::vector<Vec3>& points, const TreeOptions& options, co
   const Box box = bounding_box(above);
   measures.height = box.hi.z - box.lo.z;
   measures.coverage = cover_points(above, surfaces, mesh);
+  measures.bare = bare_area(mesh, above, 0.02 * measures.height);
   return measures;
 }
 
@@ -141,6 +152,7 @@ Json branch_json(const TreeBranch& branch) {
   return {{"parent", branch.parent == kNone ? Json(nullptr) : Json(branch.parent)},
           {"order", branch.order},
           {"length", branch.length},
+          {"fitted_length", branch.fitted_length},
           {"base_radius", branch.base_radius},
           {"tip_radius", branch.tip_radius},
           {"volume", branch.volume},
@@ -156,6 +168,7 @@ Json tree_report(const PointCloud& cloud, const TreeResult& tree, const Measures
                      {"duplicate_points", tree.duplicate_points},
                      {"small_component_points", tree.small_component_points},
                      {"unassigned_points", measures.unassigned},
+                     {"unexplained_points", tree.unexplained_points},
                      {"components", tree.components},
                      {"bridges", tree.bridges},
                      {"height", measures.height},
@@ -166,7 +179,11 @@ Json tree_report(const PointCloud& cloud, const TreeResult& tree, const Measures
                     {"area", measures.area}};
   report["coverage"] = {{"within_1_radius", share_within_radii(measures.coverage, 1)},
                         {"within_2_radii", share_within_radii(measures.coverage, 2)},
-                        {"within_1_percent_of_height", share_of_height(measures)}};
+                        {"within_1_percent_of_height", share_of_height(measures)},
+                        {"surface_beyond_2_percent_of_height", measures.bare}};
+  report["radii"] = {{"fitted_length", measures.fitted_length},
+                     {"exponent", tree.pipe_exponent},
+                     {"exponent_from", tree.pipe_fitted ? "points" : "default"}};
   report["branches"] = Json::array();
   for (const TreeBranch& branch : tree.branches) report["branches"].push_back(branch_json(branch));
   report["seconds"] = nullptr;
@@ -183,8 +200,9 @@ void warn_of_points(Console& console, const TreeResult& tree, const Measures& me
   if (tree.small_component_points > 0)
     console.warn(fmt::format("{} in components too small for a tree left out; --components bridge joins them",
                              counted(tree.small_component_points, "point", "points")));
-  const std::size_t others = measures.unassigned - std::min(measures.unassigned, tree.small_component_points);
-  if (others > 0) console.warn(fmt::format("{} belong to no branch", counted(others, "point", "points")));
+  if (tree.unexplained_points * kFewUnexplained > measures.coverage.size())
+    console.warn(fmt::format("{} are near no branch: leaves, or other things than the tree",
+                             counted(tree.unexplained_points, "point", "points")));
 }
 
 void print_summary(Console& console, const TreeCommand& command, const std::vector<Vec3>& points,
@@ -203,6 +221,10 @@ void print_summary(Console& console, const TreeCommand& command, const std::vect
                   "within two",
                   100 * share_of_height(measures), 100 * share_within_radii(measures.coverage, 1),
                   100 * share_within_radii(measures.coverage, 2)));
+  console.print(fmt::format("surface    {:.1f} % farther than 2 % of the height from all points; radii rest on points "
+                            "along {:.1f} % of the length, else on the pipe model with p = {:.2f}",
+                            100 * measures.bare, 100 * measures.fitted_length / std::max(measures.length, 1e-300),
+                            tree.pipe_exponent));
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose) print_seconds(console, seconds);
   console.print_written(
@@ -228,7 +250,9 @@ void run(const TreeCommand& command) {
   const std::vector<Vec3>& points = cloud.points;
   double io = reading.seconds();
 
-  const TreeResult tree = reconstruct_tree(points, command.options, console.context());
+  TreeOptions options = command.options;
+  if (options.tip_radius == 0 && cloud.unit > 0) options.tip_radius = kTipMetres / cloud.unit;
+  const TreeResult tree = reconstruct_tree(points, options, console.context());
   const Stopwatch meshing;
   const TriangleMesh mesh = tree_mesh(tree);
   Json seconds = tree_seconds(tree.seconds);
@@ -266,7 +290,7 @@ void run(const TreeCommand& command) {
 Command add_tree(CLI::App& program) {
   const auto command = std::make_shared<TreeCommand>();
   CLI::App* app =
-      add_command(program, "tree", "Reconstruct the branches of a leafless tree from a laser scan.",
+      add_command(program, "tree", "Reconstruct the branches of a tree from a laser scan.",
                   "bisector tree POINTS -o OUT [options]",
                   "Examples:\n"
                   "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"

@@ -138,17 +138,19 @@ PipeModel fill_radii(std::vector<Limb>& limbs, double tip_radius, double slender
   model.tip_radius = tip_radius;
   const Lengths lengths = measure_lengths(limbs);
   fit_exponent(limbs, lengths, model);
-  double low = std::numeric_limits<double>::infinity(), high = -low;
+  Box box{limbs.empty() ? Vec3{} : limbs[0].axis[0], limbs.empty() ? Vec3{} : limbs[0].axis[0]};
   for (const Limb& limb : limbs)
-    for (const Vec3& p : limb.axis) {
-      low = std::min(low, p.z);
-      high = std::max(high, p.z);
-    }
+    for (const Vec3& p : limb.axis)
+      for (int c = 0; c < 3; ++c) {
+        box.lo[c] = std::min(box.lo[c], p[c]);
+        box.hi[c] = std::max(box.hi[c], p[c]);
+      }
+  const double size = std::max({box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z});
   const Filling filling(lengths, model);
   for (std::size_t b = 0; b < limbs.size(); ++b) {
     Limb& limb = limbs[b];
     if (limb.parent == kNone) {
-      filling.fill(b, std::numeric_limits<double>::infinity(), (high - low) / slenderness, limb);
+      filling.fill(b, std::numeric_limits<double>::infinity(), size / slenderness, limb);
       continue;
     }
     const Limb& parent = limbs[limb.parent];

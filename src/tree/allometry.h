@@ -18,7 +18,7 @@ struct PipeModel {
 // spread evenly, p is fitted to the radii that rest on points, within [2, 3] (Shinozaki et al. 1964; Minamino and
 // Tateno 2014). Radii that rest on points stay, others follow from the nearest on the branch or, at its base, from its
 // parent's, continuous, falling towards the tip and never above the parent's. A tree of which no radius rests on points
-// is as thick as `slenderness`, the height over the radius at the base, says. Limbs come parents first.
+// is as thick as `slenderness`, its size over the radius at the base, says. Limbs come parents first.
 PipeModel fill_radii(std::vector<Limb>& limbs, double tip_radius, double slenderness);
 
 }  // namespace bisector

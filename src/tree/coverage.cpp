@@ -7,11 +7,14 @@
 
 #include "bisector/error.h"
 #include "core/parallel.h"
+#include "mesh/sampling.h"
+#include "spatial/kd_tree.h"
 #include "spatial/nearest.h"
 
 namespace bisector {
 namespace {
 
+constexpr std::size_t kAreaSamples = 20'000;
 constexpr std::size_t kAxisSamples = 100;  // intervals of the axis' parameter
 
 void check_labels(const TriangleMesh& mesh, std::size_t surfaces) {
@@ -77,6 +80,21 @@ double share_within(const std::vector<PointCoverage>& points, double distance) {
 
 double share_within_radii(const std::vector<PointCoverage>& points, double radii) {
   return share(points, [&](const PointCoverage& p) { return p.distance <= radii * p.radius; });
+}
+
+double bare_area(const TriangleMesh& mesh, const std::vector<Vec3>& points, double distance) {
+  const PointSet set{points};
+  const KdTree tree(3, set);
+  const std::vector<SurfaceSample> samples = sample_surface(mesh, kAreaSamples, 1);
+  std::vector<char> bare(samples.size(), 0);
+  parallel_each(samples.size(), [&](std::size_t k) {
+    const double at[3] = {samples[k].point.x, samples[k].point.y, samples[k].point.z};
+    Index nearest = 0;
+    double squared = 0;
+    tree.knnSearch(at, 1, &nearest, &squared);
+    bare[k] = squared > distance * distance;
+  });
+  return static_cast<double>(std::count(bare.begin(), bare.end(), 1)) / static_cast<double>(kAreaSamples);
 }
 
 }  // namespace bisector

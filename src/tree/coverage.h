@@ -25,4 +25,8 @@ std::vector<PointCoverage> cover_points(const std::vector<Vec3>& points, const s
 double share_within(const std::vector<PointCoverage>& points, double distance);
 double share_within_radii(const std::vector<PointCoverage>& points, double radii);
 
+// The share of the mesh's area, in [0, 1], that is farther than a distance from all points (at least one), by 20,000
+// samples: what no points show. Throws Error for a mesh without area.
+double bare_area(const TriangleMesh& mesh, const std::vector<Vec3>& points, double distance);
+
 }  // namespace bisector

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <queue>
 #include <tuple>
@@ -45,9 +46,9 @@ struct Ways {
 
 class Growth {
  public:
-  Growth(const std::vector<Vec3>& points, const std::vector<double>& radius, double tolerance, std::vector<Limb>& limbs,
+  Growth(const std::vector<Vec3>& points, const GrowthOptions& options, std::vector<Limb>& limbs,
          std::vector<Index>& limb_of)
-      : points_(points), radius_(radius), tolerance_(tolerance), limbs_(limbs), limb_of_(limb_of), set_{points}, tree_(3, set_) {}
+      : points_(points), options_(options), tolerance_(options.tolerance), limbs_(limbs), limb_of_(limb_of), set_{points}, tree_(3, set_) {}
 
   void find_ways() {
     const Csr<Index> graph = make_graph(points_);
@@ -56,14 +57,7 @@ class Growth {
       for (const Index* j = graph.begin(i); j != graph.end(i); ++j)
         shortest[i] = std::min(shortest[i], norm(points_[*j] - points_[i]));
     gap_ = kGap * std::max(tolerance_, quantile(std::move(shortest), 0.5));
-    std::vector<Index> sources;
-    for (std::size_t i = 0; i < points_.size(); ++i)
-      if (limb_of_[i] != kNone) sources.push_back(static_cast<Index>(i));
-    if (sources.empty())
-      sources.push_back(static_cast<Index>(
-          std::min_element(points_.begin(), points_.end(), [](const Vec3& a, const Vec3& b) { return a.z < b.z; }) -
-          points_.begin()));
-    walk(graph, sources);
+    walk(graph, find_sources());
     choose_next();
   }
 
@@ -89,6 +83,26 @@ class Growth {
   }
 
  private:
+  std::vector<Index> find_sources() const {
+    std::vector<Index> sources;
+    std::map<Index, Index> lowest;  // point of each group without a limb; kNone: it has one
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const auto i = static_cast<Index>(k);
+      const Index group = group_of(i);
+      if (group == kNone) continue;
+      Index& low = lowest.try_emplace(group, i).first->second;
+      if (limb_of_[i] != kNone) {
+        sources.push_back(i);
+        low = kNone;
+      } else if (low != kNone && points_[i].z < points_[low].z) {
+        low = i;
+      }
+    }
+    for (const auto& [group, low] : lowest)
+      if (low != kNone) sources.push_back(low);
+    return sources;
+  }
+
   // Dijkstra's algorithm, where a step across a gap costs more the more it turns off the way that leads to it.
   void walk(const Csr<Index>& graph, const std::vector<Index>& sources) {
     using Entry = std::tuple<double, Index, Index>;  // cost, point, the one before
@@ -103,7 +117,7 @@ class Growth {
       ways_.order.push_back(i);
       const Vec3 direction = direction_at(i);
       for (const Index* j = graph.begin(i); j != graph.end(i); ++j) {
-        if (ways_.previous[*j] != kNone) continue;
+        if (ways_.previous[*j] != kNone || group_of(*j) != group_of(i)) continue;
         const Vec3 step = points_[*j] - points_[i];
         const double length = norm(step);
         const double turn = length > gap_ ? kTurn * (1 - dot(direction, step) / length) : 0;
@@ -259,7 +273,8 @@ class Growth {
     return result;
   }
 
-  double radius_of(Index i) const { return radius_.empty() ? 0 : radius_[i]; }
+  double radius_of(Index i) const { return options_.radius.empty() ? 0 : options_.radius[i]; }
+  Index group_of(Index i) const { return options_.group.empty() ? 0 : options_.group[i]; }
 
   // Even steps along a way, whose points lie off the branch's middle by its thickness and the noise: a line that bends
   // little and stays near them. The ends are kept.
@@ -289,7 +304,7 @@ class Growth {
   }
 
   const std::vector<Vec3>& points_;
-  const std::vector<double>& radius_;
+  const GrowthOptions& options_;
   double tolerance_, gap_ = 0;
   std::vector<Limb>& limbs_;
   std::vector<Index>& limb_of_;   // that explains each point
@@ -301,9 +316,9 @@ class Growth {
 
 }  // namespace
 
-void grow_limbs(const std::vector<Vec3>& points, const std::vector<double>& radius, double tolerance,
-                std::vector<Limb>& limbs, std::vector<Index>& limb_of, const Context& context) {
-  Growth growth(points, radius, tolerance, limbs, limb_of);
+void grow_limbs(const std::vector<Vec3>& points, const GrowthOptions& options, std::vector<Limb>& limbs,
+                std::vector<Index>& limb_of, const Context& context) {
+  Growth growth(points, options, limbs, limb_of);
   growth.find_ways();
   growth.grow(context);
 }

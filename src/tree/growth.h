@@ -14,13 +14,18 @@ namespace bisector {
 // they are narrow. All such ways run along edges of the Gabriel graph, so the Delaunay triangulation holds them, with
 // no number of neighbours to choose and no parts to join.
 //
-// `limb_of` is the limb that explains each point (kNone: none), from which ways start; where no point has one they
-// start at the lowest of all, on a new trunk. The longest way is a branch, then the longest of the rest, and so on, as
-// long as a branch explains at least a few points farther than `tolerance` from all others. Ways run along one side of a
-// branch, so where `radius`, what the branch at each point is thought to be thick, is given, it explains what is within
-// twice that besides. New limbs have no radii and
-// are appended; `limb_of` has them where they are within the tolerance.
-void grow_limbs(const std::vector<Vec3>& points, const std::vector<double>& radius, double tolerance,
-                std::vector<Limb>& limbs, std::vector<Index>& limb_of, const Context& context = {});
+struct GrowthOptions {
+  double tolerance = 0;        // distance from an axis within which it explains points
+  std::vector<double> radius;  // of the branch at each point, as far as it is known: it is explained up to twice that,
+                               // for ways run along one side; empty: nothing is known
+  std::vector<Index> group;    // of each point: ways stay within a group, and reach none of kNone; empty: all are one
+};
+
+// `limb_of` is the limb that explains each point (kNone: none), from which ways start; in groups where no point has one
+// they start at the lowest, on a new trunk. The longest way is a branch, then the longest of the rest, and so on, as
+// long as a branch explains at least a few points that no other does, and not most of it crosses gaps. New limbs have no
+// radii and are appended; limbs that end where a way begins go on along it. `limb_of` is brought up to date.
+void grow_limbs(const std::vector<Vec3>& points, const GrowthOptions& options, std::vector<Limb>& limbs,
+                std::vector<Index>& limb_of, const Context& context = {});
 
 }  // namespace bisector

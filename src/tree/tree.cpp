@@ -9,20 +9,16 @@
 #include "bisector/error.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "tree/allometry.h"
 #include "tree/branches.h"
 #include "tree/clusters.h"
+#include "tree/complete.h"
 #include "tree/frusta.h"
-#include "tree/growth.h"
 #include "tree/level_sections.h"
 #include "tree/loft.h"
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
 #include "tree/refine.h"
-#include "tree/refit.h"
 #include "tree/skeleton.h"
-#include "tree/support.h"
-#include "tree/trim.h"
 
 namespace bisector {
 namespace {
@@ -35,7 +31,8 @@ constexpr double kSlender = 4;          // radius of a cluster over its rms from
 constexpr double kAxisTolerance = 0.3;  // distance of fitted axes from the nodes, in the branch's median radius
 constexpr double kLeastTip = 0.3;  // of the base radius: what tolerances of a pointed branch's mesh go by, at least
 
-const double kSkin = getenv("SKIN")?atof(getenv("SKIN")):3.5, kTolN = getenv("TOLN")?atof(getenv("TOLN")):2.5; constexpr double  kTip=0.0003, kSlenderness=80;
+constexpr double kTipRadius = 3e-4;  // of the thinnest twigs, in the unit cube: 3 mm of a tree of 10 m
+
 // A plate of points at the bottom that is taken for ground: how low, how many of the points, how wide beside the tree.
 constexpr double kPlateHeight = 0.02, kPlateWidth = 0.5;
 constexpr std::size_t kPlateShare = 10;  // one point in so many
@@ -51,6 +48,8 @@ struct Scan {
 void check_options(const TreeOptions& options) {
   if (!(options.delta > 0 && options.delta < 1))
     throw Error(fmt::format("delta is {}; give a number above 0 and below 1", options.delta));
+  if (!(options.tip_radius >= 0 && std::isfinite(options.tip_radius)))
+    throw Error(fmt::format("the tips' radius is {}; give a positive length, or 0", options.tip_radius));
   if (std::isnan(options.ground)) throw Error("the ground's height is not a number; give its z");
 }
 
@@ -159,6 +158,16 @@ Network connect(const Scan& scan, const TreeOptions& options, TreeResult& result
   return network;
 }
 
+// The component of each point that is large enough for a tree.
+std::vector<Index> trees_of_points(const Network& network) {
+  std::vector<Index> group(network.graph.component.size(), kNone);
+  std::vector<char> is_tree(network.graph.components, 0);
+  for (const Index i : network.lowest) is_tree[network.graph.component[i]] = 1;
+  for (std::size_t i = 0; i < group.size(); ++i)
+    if (is_tree[network.graph.component[i]]) group[i] = network.graph.component[i];
+  return group;
+}
+
 Clusters make_clusters(const Scan& scan, const Network& network, const TreeOptions& options, const Context& context) {
   double width = std::max(kSliceSpacings * network.graph.spacing, kLeastSlice);
   LevelSections sections = level_sections(scan.points, network.neighbours, network.lowest, width);
@@ -241,7 +250,8 @@ void describe_branches(const std::vector<Limb>& limbs, TreeResult& result) {
     }
     for (std::size_t k = 0; k < limb.axis.size(); ++k) {
       branch.nodes.push_back(static_cast<Index>(result.skeleton.size()));
-      result.skeleton.push_back({limb.axis[k], limb.radii[k], previous, static_cast<Index>(b)});
+      result.skeleton.push_back({limb.axis[k], limb.radii[k], previous, static_cast<Index>(b), limb.fitted[k] != 0});
+      if (k > 0 && limb.fitted[k]) branch.fitted_length += norm(limb.axis[k] - limb.axis[k - 1]);
       previous = branch.nodes.back();
     }
     measure(limbs, b, branch);
@@ -288,51 +298,16 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
 
   phase("fitting branches", 0.55);
   limbs = refine_limbs(scan.points, network.neighbours, std::move(limbs), {.noise = noise}, context);
-
-  std::vector<Limb> expected = limbs;
-  for (Limb& limb : expected) {
-    const std::vector<char> strict = supported_radii(scan.points, limb, 0);
-    for (std::size_t k = 0; k < strict.size(); ++k) limb.fitted[k] = limb.fitted[k] && strict[k];
-  }
-  const double noise2 = surface_noise(scan.points, expected);
-  fmt::print(stderr, "noise {} {}\n", noise, noise2);
-  fill_radii(expected, 0, kSlenderness);
-  confirm_radii(scan.points, noise2, expected, limbs);
-  const double skin = kSkin * noise2;
-  const double height = bounding_box(scan.points).hi.z;
-  const double tolerance = getenv("TOL") ? atof(getenv("TOL"))*height : std::min(0.006*height, std::max(kTolN*noise2, 0.5*network.graph.spacing));
-  std::vector<Index> limb_of;
-  std::vector<double> radius;
-  const int rounds = getenv("ROUNDS") ? atoi(getenv("ROUNDS")) : 3;
-  for (int round = 0; round < rounds; ++round) {
-    trim_limbs(limbs);
-    fmt::print(stderr, "limbs kept {} spacing/H {} noise/H {} tol/H {}\n", limbs.size(), network.graph.spacing/height, noise/height, tolerance/height);
-    limb_of = limbs_of_points(scan.points, limbs, std::max(skin, tolerance));
-    fmt::print(stderr, "explained {}\n", std::count_if(limb_of.begin(), limb_of.end(), [](Index i){return i!=kNone;}));
-    grow_limbs(scan.points, radius, tolerance, limbs, limb_of, context);
-    for (Limb& limb : limbs) limb.points.clear();
-    for (std::size_t i = 0; i < limb_of.size(); ++i)
-      if (limb_of[i] != kNone) limbs[limb_of[i]].points.push_back(static_cast<Index>(i));
-    fill_radii(limbs, kTip * height, kSlenderness);
-    straighten_limbs(scan.points, tolerance, limbs);
-    fill_radii(limbs, kTip * height, kSlenderness);
-    if (round + 1 == rounds) break;
-    radius.assign(scan.points.size(), 0);
-    for (std::size_t i = 0; i < limb_of.size(); ++i)
-      if (limb_of[i] != kNone) radius[i] = value_at(limbs[limb_of[i]].radii, nearest_on_polyline(limbs[limb_of[i]].axis, scan.points[i]));
-    refit_limbs(scan.points, tolerance, noise2, limbs);
-  }
-  for (Limb& limb : limbs) limb.points.clear();
-  for (std::size_t i = 0; i < limb_of.size(); ++i)
-    if (limb_of[i] != kNone) limbs[limb_of[i]].points.push_back(static_cast<Index>(i));
-  const PipeModel pipe = fill_radii(limbs, kTip * height, kSlenderness);
-  fmt::print(stderr, "p {} {}\n", pipe.exponent, pipe.from_points);
+  CompletionOptions completion;
+  completion.spacing = network.graph.spacing;
+  completion.tip_radius = options.tip_radius > 0 ? options.tip_radius / scan.unit : kTipRadius;
+  if (options.components == TreeComponents::separate) completion.group = trees_of_points(network);
+  const Completion completed = complete_limbs(scan.points, completion, limbs, context);
+  result.pipe_exponent = completed.pipe.exponent;
+  result.pipe_fitted = completed.pipe.from_points;
   result.seconds.refine = watch.lap();
 
   phase("surfaces", 0.85);
-  std::vector<Index> branch_of(scan.points.size(), kNone);
-  for (std::size_t b = 0; b < limbs.size(); ++b)
-    for (const Index i : limbs[b].points) branch_of[i] = static_cast<Index>(b);
   for (Limb& limb : limbs) {
     for (Vec3& p : limb.axis) p = scan.origin + scan.unit * p;
     for (double& r : limb.radii) r *= scan.unit;
@@ -345,7 +320,9 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   for (std::size_t i = 0; i < points.size(); ++i)
     if (const Index p = scan.of_input[i]; p != kNone) {
       result.cluster[i] = clusters.label[p];
-      result.branch[i] = branch_of[p];
+      result.branch[i] = completed.limb_of[p];
+      const bool in_tree = completion.group.empty() || completion.group[p] != kNone;
+      result.unexplained_points += in_tree && completed.limb_of[p] == kNone;
     }
   result.seconds.surfaces = watch.lap();
   result.seconds.total = watch.seconds();

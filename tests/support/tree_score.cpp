@@ -16,7 +16,6 @@ namespace {
 constexpr std::size_t kSamples = 50;     // along a branch's axis, to score it
 constexpr double kSpacings = 3;          // length of the shortest branches of sparse scans that count
 constexpr std::size_t kLeastPoints = 5;  // on them
-constexpr std::size_t kAreaSamples = 20'000;
 constexpr double kBreastHeight = 1.3;  // m
 
 struct AxisSample {
@@ -303,13 +302,7 @@ SurfaceScore score_surfaces(const std::vector<Vec3>& points, const TreeResult& t
   for (const TreeBranch& branch : tree.branches) surfaces.push_back(branch.surface);
   score.near_points = share_within(cover_points(points, surfaces, mesh), 0.01 * height);
 
-  const PointSet all{points};
-  KdTree nearest(3, all);
-  nearest.buildIndex();
-  std::size_t bare = 0;
-  for (const SurfaceSample& s : sample_surface(mesh, kAreaSamples, 1))
-    bare += distance_to_nearest(nearest, s.point, 0) > 0.02 * height;
-  score.bare_area = static_cast<double>(bare) / static_cast<double>(kAreaSamples);
+  score.bare_area = bare_area(mesh, points, 0.02 * height);
 
   const std::vector<AxisBranch> branches = axes_of(tree);
   double breast = 0, volume = 0;
