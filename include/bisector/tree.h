@@ -97,7 +97,7 @@ struct TreeResult {
   // radii that rest on points; else there were too few, and it is 2.3.
   double pipe_exponent = 0;
   bool pipe_fitted = false;
-  double noise = 0;                        // standard deviation of points off thick branches
+  double noise = 0;  // standard deviation of points off thick branches
   TreeSeconds seconds;
 };
 

@@ -221,10 +221,10 @@ void print_summary(Console& console, const TreeCommand& command, const std::vect
                   "within two",
                   100 * share_of_height(measures), 100 * share_within_radii(measures.coverage, 1),
                   100 * share_within_radii(measures.coverage, 2)));
-  console.print(fmt::format("surface    {:.1f} % farther than 2 % of the height from all points; radii rest on points "
-                            "along {:.1f} % of the length, else on the pipe model with p = {:.2f}",
-                            100 * measures.bare, 100 * measures.fitted_length / std::max(measures.length, 1e-300),
-                            tree.pipe_exponent));
+  console.print(fmt::format(
+      "surface    {:.1f} % farther than 2 % of the height from all points; radii rest on points "
+      "along {:.1f} % of the length, else on the pipe model with p = {:.2f}",
+      100 * measures.bare, 100 * measures.fitted_length / std::max(measures.length, 1e-300), tree.pipe_exponent));
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose) print_seconds(console, seconds);
   console.print_written(
@@ -289,14 +289,13 @@ void run(const TreeCommand& command) {
 
 Command add_tree(CLI::App& program) {
   const auto command = std::make_shared<TreeCommand>();
-  CLI::App* app =
-      add_command(program, "tree", "Reconstruct the branches of a tree from a laser scan.",
-                  "bisector tree POINTS -o OUT [options]",
-                  "Examples:\n"
-                  "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
-                  "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
-                  "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
-                  "\"x y z\"; z is up and the tree has no leaves. Ctrl-C stops the run; nothing is written.");
+  CLI::App* app = add_command(
+      program, "tree", "Reconstruct the branches of a tree from a laser scan.", "bisector tree POINTS -o OUT [options]",
+      "Examples:\n"
+      "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
+      "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
+      "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
+      "\"x y z\"; z is up and the tree has no leaves. Ctrl-C stops the run; nothing is written.");
   add_options(app, *command);
   return {app,
           [=] {

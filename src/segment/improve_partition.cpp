@@ -287,8 +287,7 @@ std::vector<PartitionEditor::Removal> PartitionEditor::removals(const Partition&
       if (k < unknown.size())
         merging[k] = merging_cost(partition, unknown[k].first, unknown[k].second, distances, evaluations[k]);
       else
-        deletion[k - unknown.size()] =
-            deletion_cost(partition, static_cast<Index>(k - unknown.size()), evaluations[k]);
+        deletion[k - unknown.size()] = deletion_cost(partition, static_cast<Index>(k - unknown.size()), evaluations[k]);
   });
   for (std::size_t k = 0; k < unknown.size(); ++k)
     merging_.emplace(versions(unknown[k].first, unknown[k].second), merging[k]);
@@ -314,10 +313,8 @@ Partition PartitionEditor::without(const Partition& partition, const std::vector
   std::iota(into.begin(), into.end(), 0u);
   std::set<Index> deleted, around;
   for (const Removal& removal : removals)
-    if (removal.into != kNone)
-      into[removal.region] = removal.into;
-    else
-      deleted.insert(removal.region);
+    if (removal.into != kNone) into[removal.region] = removal.into;
+    else deleted.insert(removal.region);
   if (!deleted.empty())
     for (const auto& [a, b] : neighbouring(lloyd_.domain(), partition.labels)) {
       if (deleted.count(a)) around.insert(b);
@@ -416,10 +413,8 @@ bool PartitionEditor::remove_cheapest(Partition& partition, std::size_t most, do
         (chosen.size() == most || r.cost > kNearlyCheapest * all[0].cost || energy + r.cost > most_energy))
       break;
     std::vector<Index> touched{r.region};
-    if (r.into != kNone)
-      touched.push_back(r.into);
-    else
-      touched.insert(touched.end(), around.begin(r.region), around.end(r.region));
+    if (r.into != kNone) touched.push_back(r.into);
+    else touched.insert(touched.end(), around.begin(r.region), around.end(r.region));
     if (std::any_of(touched.begin(), touched.end(), [&](Index q) { return taken[q]; })) continue;
     for (const Index q : touched) taken[q] = 1;
     chosen.push_back(r);

@@ -61,8 +61,8 @@ std::size_t possible_count(const SegmentDomain& domain, std::size_t proxies, con
   const std::size_t least = domain.component_count, most = domain.triangles.size();
   if (proxies == 0) return 0;
   if (proxies > most)
-    context.warn(fmt::format("{} proxies are asked for, but the mesh has {} triangles only; each is a region of its own",
-                             proxies, most));
+    context.warn(fmt::format(
+        "{} proxies are asked for, but the mesh has {} triangles only; each is a region of its own", proxies, most));
   if (proxies < least)
     context.warn(fmt::format(
         "{} proxies are asked for, but the mesh has {} components, of which each needs one; there are as many regions",
@@ -305,8 +305,8 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
   report(context, "classifying", 0.9, partition.energy());
   Stopwatch clock;
   Classified result;
-  result.primitives = region_primitives(domain, partition.labels, partition.regions.size(), lloyd.proxies(partition),
-                                        options.surfaces);
+  result.primitives =
+      region_primitives(domain, partition.labels, partition.regions.size(), lloyd.proxies(partition), options.surfaces);
   result.labels = partition.labels;
   polish_borders(domain, proxies_of(result.primitives), result.labels, lloyd.counts.evaluations);
   simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
@@ -360,7 +360,8 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   for (std::size_t r = 0; r < count; ++r)
     result.regions.push_back(measure_region(domain, classified.primitives[r], triangles.begin(r), triangles.end(r)));
-  if (options.project) result.projected = projected_vertices(mesh, domain, labels, classified.primitives, result.regions);
+  if (options.project)
+    result.projected = projected_vertices(mesh, domain, labels, classified.primitives, result.regions);
   result.seconds.project = clock.lap();
   result.rms = domain.scale * classified.rms;
   result.rms_before = domain.scale * classified.rms_before;

@@ -20,6 +20,7 @@ constexpr double kLeastRatio = 1.5;       // of lengths beyond, of two places th
 struct Lengths {
   std::vector<std::vector<double>> beyond;
   std::vector<PolylineFoot> root;
+  std::vector<std::size_t> fork;  // the point of the parent's axis at or before the root
 };
 
 double median(std::vector<double> values) {
@@ -31,6 +32,7 @@ Lengths measure_lengths(const std::vector<Limb>& limbs) {
   Lengths lengths;
   lengths.beyond.resize(limbs.size());
   lengths.root.resize(limbs.size());
+  lengths.fork.resize(limbs.size(), 0);
   // What a scan no longer shows of a twig is taken to be as long as what it shows of the last ones.
   std::vector<char> bears(limbs.size(), 0);
   for (const Limb& limb : limbs)
@@ -39,17 +41,21 @@ Lengths measure_lengths(const std::vector<Limb>& limbs) {
   for (std::size_t b = 0; b < limbs.size(); ++b)
     if (!bears[b]) last.push_back(polyline_length(limbs[b].axis));
   const double unseen = last.empty() ? 0 : kUnseen * median(std::move(last));
-  std::vector<std::vector<double>> grown(limbs.size());  // on each segment
+  std::vector<std::vector<double>> grown(limbs.size());  // at each point
   for (std::size_t b = 0; b < limbs.size(); ++b) grown[b].assign(limbs[b].axis.size(), 0);
   for (std::size_t b = limbs.size(); b-- > 0;) {
     const Limb& limb = limbs[b];
+    const std::size_t m = limb.axis.size();
     std::vector<double>& beyond = lengths.beyond[b];
-    beyond.assign(limb.axis.size(), unseen);
-    for (std::size_t k = limb.axis.size() - 1; k-- > 0;)
+    beyond.resize(m);
+    beyond[m - 1] = grown[b][m - 1] > 0 ? grown[b][m - 1] : unseen;
+    for (std::size_t k = m - 1; k-- > 0;)
       beyond[k] = beyond[k + 1] + norm(limb.axis[k + 1] - limb.axis[k]) + grown[b][k];
     if (limb.parent == kNone) continue;
-    lengths.root[b] = nearest_on_polyline(limbs[limb.parent].axis, limb.axis.front());
-    grown[limb.parent][lengths.root[b].segment] += beyond.front();
+    const PolylineFoot foot = nearest_on_polyline(limbs[limb.parent].axis, limb.axis.front());
+    lengths.root[b] = foot;
+    lengths.fork[b] = foot.segment + (foot.t == 1);
+    grown[limb.parent][lengths.fork[b]] += beyond.front();
   }
   return lengths;
 }
@@ -156,7 +162,9 @@ PipeModel fill_radii(std::vector<Limb>& limbs, double tip_radius, double slender
     const Limb& parent = limbs[limb.parent];
     const PolylineFoot& foot = lengths.root[b];
     const double most = std::min(value_at(parent.radii, foot), free_radius(limbs, limb.parent));
-    filling.fill(b, most, filling.scaled(value_at(parent.radii, foot), lengths.beyond[limb.parent][foot.segment], lengths.beyond[b].front()),
+    filling.fill(b, most,
+                 filling.scaled(value_at(parent.radii, foot), lengths.beyond[limb.parent][lengths.fork[b]],
+                                lengths.beyond[b].front()),
                  limb);
   }
   return model;

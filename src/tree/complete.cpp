@@ -11,7 +11,7 @@
 namespace bisector {
 namespace {
 
-constexpr int kRounds = 3;         // of growing and fitting: a branch that is found lets those on it be found better
+constexpr int kRounds = 3;           // of growing and fitting: a branch that is found lets those on it be found better
 constexpr double kSlenderness = 80;  // height over the radius at the base: trees that stand alone have 60 to 110
 
 // A branch explains points within this distance, which is at least what noise and spacing blur, and at most what would

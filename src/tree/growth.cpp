@@ -19,14 +19,14 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kLeastGain = 2;   // points that a branch explains
-constexpr double kGap = 3;              // steps longer than so many tolerances, or median steps, cross a gap
-constexpr double kTurn = 2;             // what a step across a gap costs more at a right angle, in its own cost
-constexpr double kMostGaps = 0.5;       // of a branch's length
-constexpr double kLeastLength = 2;      // of it, in tolerances
-constexpr double kSimilar = 0.8;        // of the longest way's length: among ways so long the straightest goes on
-constexpr double kStep = 1;             // between points of an axis, in tolerances
-constexpr double kStiffness = 2;        // of an axis' second differences, beside the pull of the points on the way
+constexpr std::size_t kLeastGain = 2;  // points that a branch explains
+constexpr double kGap = 3;             // steps longer than so many tolerances, or median steps, cross a gap
+constexpr double kTurn = 2;            // what a step across a gap costs more at a right angle, in its own cost
+constexpr double kMostGaps = 0.5;      // of a branch's length
+constexpr double kLeastLength = 2;     // of it, in tolerances
+constexpr double kSimilar = 0.8;       // of the longest way's length: among ways so long the straightest goes on
+constexpr double kStep = 1;            // between points of an axis, in tolerances
+constexpr double kStiffness = 2;       // of an axis' second differences, beside the pull of the points on the way
 
 Csr<Index> make_graph(const std::vector<Vec3>& points) {
   if (auto graph = delaunay_neighbours(points)) return std::move(*graph);
@@ -48,7 +48,8 @@ class Growth {
  public:
   Growth(const std::vector<Vec3>& points, const GrowthOptions& options, std::vector<Limb>& limbs,
          std::vector<Index>& limb_of)
-      : points_(points), options_(options), tolerance_(options.tolerance), limbs_(limbs), limb_of_(limb_of), set_{points}, tree_(3, set_) {}
+      : points_(points), options_(options), tolerance_(options.tolerance), limbs_(limbs),
+        limb_of_(limb_of), set_{points}, tree_(3, set_) {}
 
   void find_ways() {
     const Csr<Index> graph = make_graph(points_);
@@ -307,8 +308,8 @@ class Growth {
   const GrowthOptions& options_;
   double tolerance_, gap_ = 0;
   std::vector<Limb>& limbs_;
-  std::vector<Index>& limb_of_;   // that explains each point
-  std::vector<Index> on_limb_;    // whose way each point is on
+  std::vector<Index>& limb_of_;  // that explains each point
+  std::vector<Index> on_limb_;   // whose way each point is on
   PointSet set_;
   KdTree tree_;
   Ways ways_;

@@ -23,8 +23,8 @@ struct GrowthOptions {
 
 // `limb_of` is the limb that explains each point (kNone: none), from which ways start; in groups where no point has one
 // they start at the lowest, on a new trunk. The longest way is a branch, then the longest of the rest, and so on, as
-// long as a branch explains at least a few points that no other does, and not most of it crosses gaps. New limbs have no
-// radii and are appended; limbs that end where a way begins go on along it. `limb_of` is brought up to date.
+// long as a branch explains at least a few points that no other does, and not most of it crosses gaps. New limbs have
+// no radii and are appended; limbs that end where a way begins go on along it. `limb_of` is brought up to date.
 void grow_limbs(const std::vector<Vec3>& points, const GrowthOptions& options, std::vector<Limb>& limbs,
                 std::vector<Index>& limb_of, const Context& context = {});
 

@@ -39,9 +39,9 @@ constexpr int kRootSteps = 24;       // places looked at straight on backwards
 constexpr double kRootReach = 3;     // up to so many times the base's distance from the parent's axis
 
 // Radii.
-constexpr double kOwnNoise = 1.2;  // noise taken out of a radius, in the deviation of the branch's own points, at most
-constexpr double kWider = 1.3;        // of a radius over those nearer to the base, at most
-constexpr double kUnfitted = 1e-3;    // weight of a radius that does not rest on points
+constexpr double kOwnNoise = 1.2;   // noise taken out of a radius, in the deviation of the branch's own points, at most
+constexpr double kWider = 1.3;      // of a radius over those nearer to the base, at most
+constexpr double kUnfitted = 1e-3;  // weight of a radius that does not rest on points
 
 class Refinement {
  public:
@@ -122,7 +122,8 @@ class Refinement {
       reject_wider(limb);
       remove_noise(noise, limb.radii);
       std::vector<double> weights = support_[b];
-      for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = (weights[k] + 0.01) * (limb.fitted[k] ? 1 : kUnfitted);
+      for (std::size_t k = 0; k < weights.size(); ++k)
+        weights[k] = (weights[k] + 0.01) * (limb.fitted[k] ? 1 : kUnfitted);
       limb.radii = non_increasing(limb.radii, weights);
       if (limb.parent == kNone) continue;
       const Limb& parent = limbs_[limb.parent];

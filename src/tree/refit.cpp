@@ -20,9 +20,9 @@ constexpr std::size_t kLeastPoints = 20;  // for a tube
 constexpr double kReach = 2;              // of a limb's points from its axis, in radii and with the tolerance added
 constexpr double kOwnNoise = 1.2;         // noise taken out of a radius, in the deviation of the branch's own points
 constexpr double kMostRatio = 2;          // of a fitted radius and that of the pipe model, either way
-constexpr double kTangent = 2;            // length that tells a branch's direction at its base, in that to the parent's axis
-constexpr int kRootSteps = 16;            // places looked at straight on backwards, over as much
-constexpr double kBend = 3;               // length over which an axis is straight, in radii
+constexpr double kTangent = 2;  // length that tells a branch's direction at its base, in that to the parent's axis
+constexpr int kRootSteps = 16;  // places looked at straight on backwards, over as much
+constexpr double kBend = 3;     // length over which an axis is straight, in radii
 
 // Each point's nearest limb by the distance from its surface, inside counting half.
 std::vector<std::vector<Index>> share_out(const std::vector<Vec3>& points, double tolerance,

@@ -8,9 +8,9 @@
 
 namespace bisector {
 
-// Of radii that rest on points as the noise lets them, those stay `fitted` that the pipe model confirms within a factor:
-// of a cloud of twigs a tube can be fitted that looks right but is far too thick. `expected` are the same limbs with the
-// model's radii.
+// Of radii that rest on points as the noise lets them, those stay `fitted` that the pipe model confirms within a
+// factor: of a cloud of twigs a tube can be fitted that looks right but is far too thick. `expected` are the same limbs
+// with the model's radii.
 void confirm_radii(const std::vector<Vec3>& points, double noise, const std::vector<Limb>& expected,
                    std::vector<Limb>& limbs);
 
@@ -18,8 +18,8 @@ void confirm_radii(const std::vector<Vec3>& points, double noise, const std::vec
 // points. Radii must be there, as a measure of how far points of a limb may be.
 void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs);
 
-// Where no points carry the radius axes bend no more sharply than their radius, for ways along single points wind within
-// the branch. Children start on their parent's axis again.
+// Where no points carry the radius axes bend no more sharply than their radius, for ways along single points wind
+// within the branch. Children start on their parent's axis again.
 void straighten_limbs(const std::vector<Vec3>& points, double tolerance, std::vector<Limb>& limbs);
 
 }  // namespace bisector

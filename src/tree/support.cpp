@@ -12,15 +12,15 @@
 namespace bisector {
 namespace {
 
-constexpr double kReach = 2;             // of the points asked, along the axis in radii
-constexpr double kLeastPoints = 12;      // that a radius rests on
-constexpr int kSectors = 12;             // around the axis
-constexpr int kLeastSectors = 4;         // with points in them: a third of the way round, as seen from one side
+constexpr double kReach = 2;               // of the points asked, along the axis in radii
+constexpr double kLeastPoints = 12;        // that a radius rests on
+constexpr int kSectors = 12;               // around the axis
+constexpr int kLeastSectors = 4;           // with points in them: a third of the way round, as seen from one side
 constexpr double kLargestResidual = 0.25;  // off the surface, rms, in radii; of thin branches, where the noise is more,
 constexpr double kNoisyResidual = 0.42;    // as long as they are
 constexpr double kNoise = 1.3;             // off the surface by so many times the noise at most
-constexpr double kOutlier = 0.6;         // off the surface in radii: points of something else
-constexpr double kMostOutliers = 0.3;    // of the points asked
+constexpr double kOutlier = 0.6;           // off the surface in radii: points of something else
+constexpr double kMostOutliers = 0.3;      // of the points asked
 
 struct Survey {
   double points = 0, squares = 0, outliers = 0;

@@ -10,9 +10,9 @@
 namespace bisector {
 namespace {
 
-constexpr double kGap = 12;          // between fitted places of an axis, in radii, at most
+constexpr double kGap = 12;              // between fitted places of an axis, in radii, at most
 constexpr std::size_t kLeastFitted = 3;  // places of a limb
-constexpr double kWider = 1.3;       // radius over that before a gap, at most
+constexpr double kWider = 1.3;           // radius over that before a gap, at most
 
 }  // namespace
 

@@ -23,8 +23,8 @@ struct Tube {
 // what there is.
 Tube fit_tube(const std::vector<Vec3>& points, const std::vector<Vec3>& line, double noise);
 
-// Takes the noise, a standard deviation in each direction, out of radii of noisy surfaces, but for the last third: noise
-// feigns no more than the rest.
+// Takes the noise, a standard deviation in each direction, out of radii of noisy surfaces, but for the last third:
+// noise feigns no more than the rest.
 void remove_noise(double noise, std::vector<double>& radii);
 
 // The non-increasing values nearest to the given ones in the sense of weighted least squares (pool adjacent violators).

@@ -167,8 +167,28 @@ TEST(Segment, EachComponentHasItsOwnRegions) {
   const SegmentResult result = segment(mesh, options);
   expect_sound(mesh, result);
   EXPECT_LT(result.rms, 1e-12);
+  // Fewer than there are components: one each, and a warning.
   options.proxies = 1;
-  EXPECT_THROW(segment(mesh, options), Error);
+  std::vector<std::string> warnings;
+  Context context;
+  context.warning = [&](const std::string& text) { warnings.push_back(text); };
+  const SegmentResult fewest = segment(mesh, options, context);
+  expect_sound(mesh, fewest);
+  EXPECT_EQ(fewest.regions.size(), 2u);
+  EXPECT_EQ(warnings.size(), 1u);
+}
+
+TEST(Segment, AsksForNoMoreRegionsThanThereAreTriangles) {
+  const TriangleMesh mesh = open_strip();
+  SegmentOptions options;
+  options.proxies = 100'000;
+  std::vector<std::string> warnings;
+  Context context;
+  context.warning = [&](const std::string& text) { warnings.push_back(text); };
+  const SegmentResult result = segment(mesh, options, context);
+  expect_sound(mesh, result);
+  EXPECT_LE(result.regions.size(), mesh.triangles.size());
+  EXPECT_EQ(warnings.size(), 1u);
 }
 
 TEST(Segment, TakesNonManifoldEdgesAndTrianglesWithoutArea) {
@@ -216,7 +236,6 @@ TEST(Segment, RefusesWhatCannotBe) {
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
     }
   };
-  refused([](SegmentOptions& o) { o.proxies = 1000; }, "1000");
   refused([](SegmentOptions& o) { o.error = 0; }, "error");
   refused([](SegmentOptions& o) { o.error = std::nan(""); }, "error");
   refused([](SegmentOptions& o) { o.smooth = -1; }, "smoothing");

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kSamples = 50;     // along a branch's axis, to score it
 constexpr double kSpacings = 3;          // length of the shortest branches of sparse scans that count
 constexpr std::size_t kLeastPoints = 5;  // on them
-constexpr double kBreastHeight = 1.3;  // m
+constexpr double kBreastHeight = 1.3;    // m
 
 struct AxisSample {
   Vec3 position;

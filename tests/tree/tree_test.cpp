@@ -29,7 +29,7 @@ namespace {
 
 using test::axes_of;
 
-// What holds for any scan.
+// What holds for any scan: no loops, radii that fall from parent to child and to the tip, every point counted once.
 void expect_sound(const std::vector<Vec3>& points, const TreeResult& tree, std::size_t trunks = 1) {
   std::size_t roots = 0;
   for (std::size_t k = 0; k < tree.skeleton.size(); ++k) {
@@ -57,7 +57,12 @@ void expect_sound(const std::vector<Vec3>& points, const TreeResult& tree, std::
       EXPECT_LE(tree.skeleton[branch.nodes[k]].radius, tree.skeleton[branch.nodes[k - 1]].radius * (1 + 1e-12));
     }
     EXPECT_GT(branch.length, 0);
+    EXPECT_GE(branch.fitted_length, 0);
+    EXPECT_LE(branch.fitted_length, branch.length * (1 + 1e-12));
     EXPECT_GE(branch.volume, 0);
+    if (branch.parent != kNone) {
+      EXPECT_LE(branch.base_radius, tree.branches[branch.parent].base_radius * (1 + 1e-9)) << "branch " << b;
+    }
   }
   ASSERT_EQ(tree.branch.size(), points.size());
   ASSERT_EQ(tree.cluster.size(), points.size());
@@ -68,7 +73,7 @@ void expect_sound(const std::vector<Vec3>& points, const TreeResult& tree, std::
     }
   std::size_t assigned = 0;
   for (std::size_t b = 0; b < count.size(); ++b) assigned += count[b];
-  EXPECT_EQ(assigned + tree.ground_points + tree.small_component_points, points.size());
+  EXPECT_EQ(assigned + tree.ground_points + tree.small_component_points + tree.unexplained_points, points.size());
 }
 
 std::vector<Vec3> cylinder(const Vec3& base, double radius, double height, std::size_t count, std::uint64_t seed = 1) {
