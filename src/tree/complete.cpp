@@ -63,6 +63,8 @@ Completion complete_limbs(const std::vector<Vec3>& points, const CompletionOptio
     context.check();
     trim_limbs(limbs);
     result.limb_of = limbs_of_points(points, limbs, std::max(kSkin * noise, tolerance));
+    for (std::size_t i = 0; i < options.group.size(); ++i)
+      if (options.group[i] == kNone) result.limb_of[i] = kNone;
     grow_limbs(points, {tolerance, radius, options.group}, limbs, result.limb_of, context);
     give_points(result.limb_of, limbs);
     fill_radii(limbs, options.tip_radius, kSlenderness);

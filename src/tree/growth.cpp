@@ -267,7 +267,8 @@ class Growth {
       found.clear();
       tree_.radiusSearch(at, (reach + half) * (reach + half), found, nanoflann::SearchParams(32, 0, false));
       for (const auto& [i, squared] : found)
-        if (nearest_on_polyline(line, points_[i], k, k).distance <= reach) result.push_back(i);
+        if (group_of(i) == group_of(way[k]) && nearest_on_polyline(line, points_[i], k, k).distance <= reach)
+          result.push_back(i);
     }
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
