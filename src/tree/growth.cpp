@@ -142,7 +142,7 @@ class Growth {
     const std::size_t n = points_.size();
     ways_.beyond.assign(n, 0);
     ways_.next.assign(n, kNone);
-    for (std::size_t k = n; k-- > 0;) {
+    for (std::size_t k = ways_.order.size(); k-- > 0;) {
       const Index i = ways_.order[k], from = ways_.previous[i];
       if (from == i) continue;
       const double length = ways_.beyond[i] + norm(points_[i] - points_[from]);
@@ -169,7 +169,7 @@ class Growth {
       }
     }
     ways_.next = std::move(straight);
-    for (std::size_t k = n; k-- > 0;) {  // lengths along the ways that were chosen
+    for (std::size_t k = ways_.order.size(); k-- > 0;) {  // lengths along the ways that were chosen
       const Index i = ways_.order[k], on = ways_.next[i];
       ways_.beyond[i] = on == kNone ? 0 : ways_.beyond[on] + norm(points_[on] - points_[i]);
     }

@@ -1,5 +1,6 @@
 // The program as scripts see it: exit codes, one-line errors, reports, and files that appear whole or not at all.
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -1501,11 +1502,18 @@ TEST_F(CliSegment, BadUsage) {
   expect_failure(2, {"segment"}, "IN");
 }
 
+TEST_F(CliSegment, NumbersOfRegionsThatCannotBeAreWarnings) {
+  write_mesh(in("two.off"), test::two_spheres());
+  const Result most = run(segment({"--proxies", "193"}));
+  EXPECT_EQ(most.code, 0);
+  EXPECT_NE(most.err.find("192 triangles"), std::string::npos) << most.err;
+  const Result fewest = run({"segment", in("two.off"), "-o", in("out.ply"), "--proxies", "1"});
+  EXPECT_EQ(fewest.code, 0);
+  EXPECT_NE(fewest.err.find("2 components"), std::string::npos) << fewest.err;
+}
+
 TEST_F(CliSegment, BadInputIsOneLine) {
   write_text("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
-  write_mesh(in("two.off"), test::two_spheres());
-  expect_failure(1, segment({"--proxies", "193"}), "192 triangles");
-  expect_failure(1, {"segment", in("two.off"), "-o", in("out.ply"), "--proxies", "1"}, "2 components");
   expect_failure(1, {"segment", in("flat.off"), "-o", in("out.ply"), "--quiet"}, "area");
   expect_failure(1, {"segment", in("missing.off"), "-o", in("out.ply")}, "missing.off");
   expect_failure(1, {"segment", in("box.ply"), "-o", in("out.msh")}, "format");
@@ -1643,7 +1651,8 @@ TEST_F(Cli, ReportsHaveTheWarnings) {
   std::string points;
   for (const Vec3& p : test::make_tree({.points = 6'000, .boughs = 3, .random_seed = 1}).points)
     points += std::to_string(p.x) + ' ' + std::to_string(p.y) + ' ' + std::to_string(p.z) + '\n';
-  write_text("tree.xyz", points + "1000 1000 0\n1000 1000 0.001\n1000 1000.001 0\n");
+  for (int k = 0; k < 12; ++k) points += fmt::format("1000 {} {}\n", 1000 + 0.001 * k, 0.001 * (k % 3));
+  write_text("tree.xyz", points);
 
   std::vector<std::vector<std::string>> commands{
       {"remesh", in("loose.off"), "-o", in("out.off"), "-n", "30"},
@@ -1707,7 +1716,7 @@ TEST_F(CliTree, WritesWhatItSays) {
   EXPECT_NE(result.out.find("points"), std::string::npos);
   const Json report = Json::parse(read_text(in("r.json")));
   EXPECT_EQ(report["input"]["points"], points_.size());
-  EXPECT_EQ(report["input"]["unassigned_points"], 0);
+  EXPECT_EQ(report["input"]["unassigned_points"], report["input"]["unexplained_points"]);
   EXPECT_EQ(report["tree"]["trunks"], 1);
   const std::size_t branches = report["tree"]["branches"];
   ASSERT_EQ(report["branches"].size(), branches);
@@ -1721,7 +1730,7 @@ TEST_F(CliTree, WritesWhatItSays) {
   }
   EXPECT_NEAR(report["tree"]["length"], length, 1e-9 * length);
   EXPECT_NEAR(report["tree"]["volume"], volume, 1e-9 * volume);
-  EXPECT_EQ(points, points_.size());
+  EXPECT_EQ(points + report["input"]["unexplained_points"].get<std::size_t>(), points_.size());
   EXPECT_GT(report["coverage"]["within_1_percent_of_height"], 0.9);
   EXPECT_GE(report["coverage"]["within_2_radii"], report["coverage"]["within_1_radius"].get<double>());
   for (const char* phase :
