@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "spatial/kd_tree.h"
+#include "tree/near_axis.h"
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
 #include "voronoi/delaunay.h"
@@ -258,18 +259,12 @@ class Growth {
     std::vector<Vec3> line;
     for (const Index i : way) line.push_back(points_[i]);
     std::vector<Index> result;
-    std::vector<std::pair<Index, double>> found;
-    for (std::size_t k = 0; k + 1 < line.size(); ++k) {
-      const Vec3 middle = 0.5 * (line[k] + line[k + 1]);
-      const double half = 0.5 * norm(line[k + 1] - line[k]);
-      const double reach = tolerance_ + 2 * std::max(radius_of(way[k]), radius_of(way[k + 1]));
-      const double at[3] = {middle.x, middle.y, middle.z};
-      found.clear();
-      tree_.radiusSearch(at, (reach + half) * (reach + half), found, nanoflann::SearchParams(32, 0, false));
-      for (const auto& [i, squared] : found)
-        if (group_of(i) == group_of(way[k]) && nearest_on_polyline(line, points_[i], k, k).distance <= reach)
-          result.push_back(i);
-    }
+    const auto reach = [&](std::size_t k) {
+      return tolerance_ + 2 * std::max(radius_of(way[k]), radius_of(way[k + 1]));
+    };
+    visit_near(tree_, points_, line, reach, [&](Index i, const PolylineFoot&) {
+      if (group_of(i) == group_of(way.front())) result.push_back(i);
+    });
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
     return result;

@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "spatial/kd_tree.h"
+#include "tree/near_axis.h"
 #include "tree/polyline.h"
 #include "tree/support.h"
 #include "tree/trim.h"
@@ -31,26 +32,16 @@ std::vector<std::vector<Index>> share_out(const std::vector<Vec3>& points, doubl
   std::vector<double> least(points.size(), std::numeric_limits<double>::infinity());
   const PointSet set{points};
   const KdTree tree(3, set);
-  std::vector<std::pair<Index, double>> found;
   for (std::size_t b = 0; b < limbs.size(); ++b) {
     const Limb& limb = limbs[b];
-    for (std::size_t k = 0; k + 1 < limb.axis.size(); ++k) {
-      const Vec3 middle = 0.5 * (limb.axis[k] + limb.axis[k + 1]);
-      const double reach = kReach * std::max(limb.radii[k], limb.radii[k + 1]) + tolerance;
-      const double half = 0.5 * norm(limb.axis[k + 1] - limb.axis[k]);
-      const double at[3] = {middle.x, middle.y, middle.z};
-      found.clear();
-      tree.radiusSearch(at, (reach + half) * (reach + half), found, nanoflann::SearchParams(32, 0, false));
-      for (const auto& [i, squared] : found) {
-        const PolylineFoot foot = nearest_on_polyline(limb.axis, points[i], k, k);
-        if (foot.distance > reach) continue;
-        const double off = foot.distance - value_at(limb.radii, foot);
-        const double cost = off > 0 ? off : -0.5 * off;
-        if (!(cost < least[i])) continue;
-        least[i] = cost;
-        limb_of[i] = static_cast<Index>(b);
-      }
-    }
+    const auto reach = [&](std::size_t k) { return kReach * std::max(limb.radii[k], limb.radii[k + 1]) + tolerance; };
+    visit_near(tree, points, limb.axis, reach, [&](Index i, const PolylineFoot& foot) {
+      const double off = foot.distance - value_at(limb.radii, foot);
+      const double cost = off > 0 ? off : -0.5 * off;
+      if (!(cost < least[i])) return;
+      least[i] = cost;
+      limb_of[i] = static_cast<Index>(b);
+    });
   }
   std::vector<std::vector<Index>> members(limbs.size());
   for (std::size_t i = 0; i < points.size(); ++i)
