@@ -26,8 +26,11 @@ constexpr double kTurn = 2;            // what a step across a gap costs more at
 constexpr double kMostGaps = 0.5;      // of a branch's length
 constexpr double kLeastLength = 2;     // of it, in tolerances
 constexpr double kSimilar = 0.8;       // of the longest way's length: among ways so long the straightest goes on
+constexpr double kDirection = 4;       // length that tells the direction of a way, in tolerances
 constexpr double kStep = 1;            // between points of an axis, in tolerances
 constexpr double kStiffness = 2;       // of an axis' second differences, beside the pull of the points on the way
+
+double squared(double x) { return x * x; }
 
 Csr<Index> make_graph(const std::vector<Vec3>& points) {
   if (auto graph = delaunay_neighbours(points)) return std::move(*graph);
@@ -177,14 +180,14 @@ class Growth {
   }
 
   Index far_along(Index i, Index from) const {
-    while (ways_.next[i] != kNone && norm2(points_[i] - points_[from]) < 16 * tolerance_ * tolerance_)
+    while (ways_.next[i] != kNone && norm2(points_[i] - points_[from]) < squared(kDirection * tolerance_))
       i = ways_.next[i];
     return i;
   }
 
   Index far_back(Index from) const {
     Index i = from;
-    while (ways_.previous[i] != i && norm2(points_[i] - points_[from]) < 16 * tolerance_ * tolerance_)
+    while (ways_.previous[i] != i && norm2(points_[i] - points_[from]) < squared(kDirection * tolerance_))
       i = ways_.previous[i];
     return i;
   }
