@@ -23,11 +23,6 @@ struct Lengths {
   std::vector<std::size_t> fork;  // the point of the parent's axis at or before the root
 };
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
-
 Lengths measure_lengths(const std::vector<Limb>& limbs) {
   Lengths lengths;
   lengths.beyond.resize(limbs.size());
@@ -40,7 +35,7 @@ Lengths measure_lengths(const std::vector<Limb>& limbs) {
   std::vector<double> last;
   for (std::size_t b = 0; b < limbs.size(); ++b)
     if (!bears[b]) last.push_back(polyline_length(limbs[b].axis));
-  const double unseen = last.empty() ? 0 : kUnseen * median(std::move(last));
+  const double unseen = last.empty() ? 0 : kUnseen * upper_median(std::move(last));
   std::vector<std::vector<double>> grown(limbs.size());  // at each point
   for (std::size_t b = 0; b < limbs.size(); ++b) grown[b].assign(limbs[b].axis.size(), 0);
   for (std::size_t b = limbs.size(); b-- > 0;) {
@@ -75,7 +70,7 @@ void fit_exponent(const std::vector<Limb>& limbs, const Lengths& lengths, PipeMo
       if (const double run = places[j].first - places[i].first; std::abs(run) > std::log(kLeastRatio))
         slopes.push_back((places[j].second - places[i].second) / run);
   if (slopes.size() < kLeastPlaces) return;
-  model.exponent = 1 / std::clamp(median(std::move(slopes)), 1 / kMostExponent, 1 / kLeastExponent);
+  model.exponent = 1 / std::clamp(upper_median(std::move(slopes)), 1 / kMostExponent, 1 / kLeastExponent);
   model.from_points = true;
 }
 

@@ -109,9 +109,8 @@ void root(const Limb& parent, double tolerance, Limb& limb) {
   while (ahead + 1 < limb.axis.size() && norm(limb.axis[ahead] - start) < reach) ++ahead;
   if (ahead > 1) {
     const Vec3 back = unit(start - limb.axis[ahead]);
-    const double farthest = reach;
     for (int k = 1; k <= kRootSteps; ++k) {
-      const PolylineFoot foot = nearest_on_polyline(parent.axis, start + (farthest * k / kRootSteps) * back);
+      const PolylineFoot foot = nearest_on_polyline(parent.axis, start + (reach * k / kRootSteps) * back);
       if (foot.distance < best.distance) best = foot;
     }
   }
