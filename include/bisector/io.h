@@ -43,7 +43,7 @@ struct GroupNames {
 // labels that are not one per triangle and labels without a name among those given.
 BISECTOR_API void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups = {});
 
-// A coloured polygon mesh as binary PLY (double coordinates; one colour and one integer label per face).
+// A mesh of polygons with one integer label and one colour each.
 struct PolygonMesh {
   std::vector<Vec3> vertices;
   Csr<Index> polygons;
@@ -51,7 +51,9 @@ struct PolygonMesh {
   std::vector<std::array<unsigned char, 3>> colours;     // one per polygon, or empty: red, green, blue
   std::vector<std::array<Index, 2>> feature_edges = {};  // element "edge", or empty
 };
-BISECTOR_API void write_polygons(const std::string& path, const PolygonMesh& mesh);
+// Writes polygons by extension, as write_mesh does: binary PLY with labels and colours, OBJ with labels as groups, OFF
+// with neither. Throws Error as write_mesh does, and for other formats.
+BISECTOR_API void write_polygons(const std::string& path, const PolygonMesh& mesh, const GroupNames& groups = {});
 
 // Reads a number for each vertex from a scalar property of a PLY file's element `vertex`. Throws Error, listing the
 // properties that are there, if `name` is not among them, and for other formats and values that are not finite.

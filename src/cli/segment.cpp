@@ -5,17 +5,17 @@
 #include <array>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "bisector/io.h"
+#include "bisector/polygonise.h"
 #include "bisector/preview.h"
 #include "bisector/quality.h"
+#include "bisector/region_borders.h"
 #include "bisector/segment.h"
 #include "cells.h"
 #include "commands.h"
@@ -25,6 +25,7 @@
 #include "core/stopwatch.h"
 #include "options.h"
 #include "outputs.h"
+#include "region_json.h"
 #include "report.h"
 #include "segment/dual_graph.h"
 #include "summary.h"
@@ -36,8 +37,10 @@ namespace {
 using Colour = std::array<unsigned char, 3>;
 
 struct SegmentCommand {
-  std::string input, output, preview;
+  std::string input, output, preview, trims, polygons;
   SegmentOptions options;
+  PolygoniseOptions polygonise;
+  bool triangulate = false;
   CommonOptions common;
 };
 
@@ -48,6 +51,23 @@ void add_options(CLI::App* app, SegmentCommand& command) {
       ->required()
       ->group("Output");
   add_file(app, "--preview", command.preview, "FILE.png", "draw a picture of the regions")->group("Output");
+  add_file(app, "--json", command.trims, "FILE.json",
+           "write the regions' surfaces with the loops that trim\n"
+           "them and the regions beside these")
+      ->group("Output");
+  add_file(app, "--polygons", command.polygons, "FILE",
+           "write a coarse mesh with a polygon for each plane:\n"
+           ".obj, .ply or .off")
+      ->group("Output");
+  app->add_option("--chord", command.polygonise.chord,
+                  "with --polygons: borders are divided where they are\n"
+                  "off a chord by more than R times its length;\n"
+                  "default 0.2")
+      ->type_name("R")
+      ->check(number_above_zero())
+      ->group("Output");
+  app->add_flag("--triangulate", command.triangulate, "with --polygons: divide the polygons into triangles")
+      ->group("Output");
   app->add_flag("--project", options.project, "move the vertices onto the surfaces found")->group("Output");
   app->add_option("--proxies", options.proxies, "so many regions")
       ->type_name("N")
@@ -97,6 +117,9 @@ void check_usage(const SegmentCommand& command, const Usage& usage) {
     throw CLI::ValidationError("--proxies and --error: give one of them");
   if (command.options.start != SegmentStart::random && usage.given("--random-seed"))
     throw CLI::ValidationError("--random-seed: only --start random is; add that or leave it out");
+  for (const char* option : {"--chord", "--triangulate"})
+    if (command.polygons.empty() && usage.given(option))
+      throw CLI::ValidationError(std::string(option) + ": only --polygons has polygons; add that or leave it out");
   if (command.options.smooth == 0 && usage.given("--fuzzy-rings"))
     throw CLI::ValidationError("--fuzzy-rings: borders are not smoothed with --smooth 0; leave one of the two out");
 }
@@ -116,7 +139,6 @@ TriangleMesh labelled_mesh(const TriangleMesh& input, const SegmentResult& resul
   return mesh;
 }
 
-// Of each triangle.
 std::vector<Colour> region_colours(const TriangleMesh& mesh, const SegmentResult& result) {
   const DualGraph graph = dual_graph(mesh);
   std::vector<std::array<Index, 2>> meeting;
@@ -125,10 +147,7 @@ std::vector<Colour> region_colours(const TriangleMesh& mesh, const SegmentResult
       if (result.labels[*u] < result.labels[t]) meeting.push_back({result.labels[t], result.labels[*u]});
   std::sort(meeting.begin(), meeting.end());
   meeting.erase(std::unique(meeting.begin(), meeting.end()), meeting.end());
-  const std::vector<Colour> of_region = contrasting_colours(meeting, result.regions.size());
-  std::vector<Colour> colours;
-  for (const Index label : result.labels) colours.push_back(of_region[label]);
-  return colours;
+  return contrasting_colours(meeting, result.regions.size());
 }
 
 std::vector<std::string> region_names(const SegmentResult& result) {
@@ -152,6 +171,43 @@ void write_regions(const std::string& path, const TriangleMesh& mesh, const Segm
   write_polygons(path, polygons);
 }
 
+PolygonisedMesh polygonise(Console& console, const SegmentCommand& command, const TriangleMesh& mesh,
+                           const SegmentResult& result) {
+  console.phase("making polygons");
+  PolygonisedMesh polygons = bisector::polygonise(mesh, result, command.polygonise);
+  const auto curved = std::count_if(result.regions.begin(), result.regions.end(), [](const SegmentRegion& region) {
+    return type_of(region.proxy) != SurfaceType::plane;
+  });
+  if (curved > 0)
+    console.warn(fmt::format("{}: {} no plane, and triangles are kept there; --surfaces planes gives polygons only",
+                             command.polygons, counted(static_cast<std::size_t>(curved), "region is", "regions are")));
+  if (polygons.folded > 0)
+    console.warn(
+        fmt::format("{}: {} not lie flat with few corners and became triangles; more proxies or a smaller "
+                    "--chord help",
+                    command.polygons, counted(polygons.folded, "region does", "regions do")));
+  return polygons;
+}
+
+void write_regions(const std::string& path, const PolygonisedMesh& mesh, const SegmentResult& result,
+                   const std::vector<Colour>& colours_of_regions, bool triangulate) {
+  PolygonMesh polygons;
+  if (triangulate) {
+    polygons.vertices = mesh.triangulated.vertices;
+    for (const Triangle& t : mesh.triangulated.triangles) {
+      polygons.polygons.values.insert(polygons.polygons.values.end(), t.begin(), t.end());
+      polygons.polygons.offsets.push_back(polygons.polygons.values.size());
+    }
+    polygons.labels.assign(mesh.triangulated.labels.begin(), mesh.triangulated.labels.end());
+  } else {
+    polygons.vertices = mesh.vertices;
+    polygons.polygons = mesh.polygons;
+    polygons.labels = mesh.labels;
+  }
+  for (const Index label : polygons.labels) polygons.colours.push_back(colours_of_regions[label]);
+  write_polygons(path, polygons, {"region", region_names(result)});
+}
+
 // "plane" to "planes", "plane_pair" to "plane pairs", "torus" to "tori".
 std::string counted_type(std::size_t n, const std::string& type) {
   std::string one = type;
@@ -169,54 +225,6 @@ std::string describe_regions(const SegmentResult& result) {
   std::string text = fmt::format("{}: ", result.regions.size());
   for (const auto& [type, n] : types) text += (&type == &types.front().first ? "" : ", ") + counted_type(n, type);
   return text;
-}
-
-void add_parameters(Json& json, const Plane& plane) {
-  const Vec3 foot = plane.offset * plane.normal;  // of the origin
-  json["normal"] = point_json(plane.normal);
-  json["offset"] = dot(plane.normal, foot);
-}
-
-void add_parameters(Json& json, const Sphere& sphere) {
-  json["centre"] = point_json(sphere.centre);
-  json["radius"] = sphere.radius;
-}
-
-void add_parameters(Json& json, const Cylinder& cylinder) {
-  json["centre"] = point_json(cylinder.point);
-  json["axis"] = point_json(cylinder.axis);
-  json["radius"] = cylinder.radius;
-}
-
-void add_parameters(Json& json, const Cone& cone) {
-  json["centre"] = point_json(cone.apex);
-  json["axis"] = point_json(cone.axis);
-  json["angle"] = 180 / std::numbers::pi * cone.angle;
-}
-
-void add_parameters(Json& json, const Torus& torus) {
-  json["centre"] = point_json(torus.centre);
-  json["axis"] = point_json(torus.axis);
-  json["radius"] = torus.radius;
-  json["minor_radius"] = torus.minor_radius;
-}
-
-void add_parameters(Json& json, const GeneralQuadric& quadric) {
-  json["centre"] = point_json(quadric.centre);
-  json["axes"] = {point_json(quadric.axes[0]), point_json(quadric.axes[1]), point_json(quadric.axes[2])};
-  json["lengths"] = quadric.lengths;
-}
-
-Json region_json(const SegmentRegion& region) {
-  Json json{{"type", name_of(type_of(region.proxy))},
-            {"triangles", region.triangles},
-            {"area", region.area},
-            {"rms", region.rms},
-            {"max", region.max}};
-  const std::optional<Quadric> quadric = quadric_of(region.proxy);
-  json["coefficients"] = quadric ? Json(quadric->c) : Json(nullptr);
-  std::visit([&](const auto& surface) { add_parameters(json, surface); }, region.proxy);
-  return json;
 }
 
 Json segmentation_json(const SegmentResult& result, double diagonal) {
@@ -277,13 +285,17 @@ void print_summary(Console& console, const SegmentCommand& command, const Segmen
                             counted(result.teleportations, "teleportation", "teleportations")));
   console.print(fmt::format("time       {:.2f} s", seconds["total"].get<double>()));
   if (command.common.verbose) print_seconds(console, seconds);
-  console.print_written({command.output, command.preview, command.common.report});
+  console.print_written({command.output, command.polygons, command.trims, command.preview, command.common.report});
 }
 
 void run(const SegmentCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
-  check_outputs({{command.output, kMeshFormats}, {command.preview, {".png"}}, report_output(report_path)},
+  check_outputs({{command.output, kMeshFormats},
+                 {command.preview, {".png"}},
+                 {command.trims, {".json"}},
+                 {command.polygons, {".obj", ".ply", ".off"}},
+                 report_output(report_path)},
                 {command.input});
   const ThreadLimit limit(command.common.threads);
   Console console(command.common.quiet, report_path == "-");
@@ -298,8 +310,15 @@ void run(const SegmentCommand& command) {
   console.phase("segmenting");
   const SegmentResult result = segment(input, command.options, context);
   const TriangleMesh mesh = labelled_mesh(input, result);
-  const std::vector<Colour> colours = region_colours(mesh, result);
+  const std::vector<Colour> colours_of_regions = region_colours(mesh, result);
+  std::vector<Colour> colours;
+  for (const Index label : result.labels) colours.push_back(colours_of_regions[label]);
   const double diagonal = bounding_box(input.vertices).diagonal();
+
+  std::optional<PolygonisedMesh> polygons;
+  if (!command.polygons.empty()) polygons = polygonise(console, command, mesh, result);
+  RegionBorders borders;
+  if (!command.trims.empty()) borders = region_borders(mesh, result);
 
   const Stopwatch measuring;
   Json report;
@@ -311,6 +330,9 @@ void run(const SegmentCommand& command) {
   stop_watching_interrupts();
   const Stopwatch writing;
   write_regions(command.output, mesh, result, colours);
+  if (polygons) write_regions(command.polygons, *polygons, result, colours_of_regions, command.triangulate);
+  if (!command.trims.empty())
+    write_report(command.trims, trims_json(command.input, mesh, result, borders), console.warnings());
   io += writing.seconds();
   const Stopwatch drawing;
   if (!command.preview.empty()) {

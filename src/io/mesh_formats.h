@@ -65,7 +65,9 @@ std::vector<double> read_ply_attribute(const std::string& path, std::string_view
 
 // The bytes of a file. Coordinates must be finite and indices in range; STL throws for what is beyond a float.
 std::string format_off(const TriangleMesh& mesh);
+std::string format_off(const PolygonMesh& mesh);
 std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups);
+std::string format_obj(const PolygonMesh& mesh, const GroupNames& groups);
 std::string format_ply(const TriangleMesh& mesh);
 std::string format_ply(const PolygonMesh& mesh);
 std::string format_stl(const std::string& path, const TriangleMesh& mesh);

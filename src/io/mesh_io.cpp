@@ -288,16 +288,23 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNa
   write_file(path, format.bytes_of(path, mesh, groups));
 }
 
-void write_polygons(const std::string& path, const PolygonMesh& mesh) {
+void write_polygons(const std::string& path, const PolygonMesh& mesh, const GroupNames& groups) {
   const std::size_t faces = mesh.polygons.rows();
-  if (lower_extension(path) != ".ply") fail(path, "polygons are written as PLY only; use .ply");
+  const std::string extension = lower_extension(path);
+  if (extension != ".ply" && extension != ".obj" && extension != ".off")
+    fail(path, "polygons are written as PLY, OBJ or OFF; use .ply, .obj or .off");
   if ((!mesh.labels.empty() && mesh.labels.size() != faces) || (!mesh.colours.empty() && mesh.colours.size() != faces))
     fail(path, fmt::format("{} labels and {} colours for {} polygons; give one each", mesh.labels.size(),
                            mesh.colours.size(), faces));
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < faces; ++i)
     check_face(path, i, mesh.polygons.begin(i), mesh.polygons.end(i), mesh.vertices.size());
-  write_file(path, format_ply(mesh));
+  for (const Index label : mesh.labels)
+    if (!groups.names.empty() && label >= groups.names.size())
+      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, groups.names.size()));
+  write_file(path, extension == ".ply"   ? format_ply(mesh)
+                   : extension == ".obj" ? format_obj(mesh, groups)
+                                         : format_off(mesh));
 }
 
 std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name) {

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -172,12 +173,23 @@ Soup read_obj(const std::string& path, std::string_view bytes) {
   return soup;
 }
 
-std::string format_off(const TriangleMesh& mesh) {
-  std::string out = fmt::format("OFF\n{} {} 0\n", mesh.vertices.size(), mesh.triangles.size());
+namespace {
+
+// The corners of each face, whichever kind of mesh it is.
+std::size_t face_count(const TriangleMesh& mesh) { return mesh.triangles.size(); }
+std::size_t face_count(const PolygonMesh& mesh) { return mesh.polygons.rows(); }
+std::span<const Index> face(const TriangleMesh& mesh, std::size_t i) { return mesh.triangles[i]; }
+std::span<const Index> face(const PolygonMesh& mesh, std::size_t i) {
+  return {mesh.polygons.begin(i), mesh.polygons.size(i)};
+}
+
+template <class Mesh>
+std::string off_of(const Mesh& mesh) {
+  std::string out = fmt::format("OFF\n{} {} 0\n", mesh.vertices.size(), face_count(mesh));
   for (const Vec3& p : mesh.vertices) append_point(out, p);
-  for (const Triangle& t : mesh.triangles) {
-    out += '3';
-    for (const Index v : t) {
+  for (std::size_t i = 0; i < face_count(mesh); ++i) {
+    append_index(out, face(mesh, i).size());
+    for (const Index v : face(mesh, i)) {
       out += ' ';
       append_index(out, v);
     }
@@ -186,21 +198,21 @@ std::string format_off(const TriangleMesh& mesh) {
   return out;
 }
 
-std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups) {
+template <class Mesh>
+std::string obj_of(const Mesh& mesh, const GroupNames& groups) {
   std::string out;
   for (const Vec3& p : mesh.vertices) {
     out += "v ";
     append_point(out, p);
   }
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+  for (std::size_t i = 0; i < face_count(mesh); ++i) {
     if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1])) {
-      const std::int32_t label = mesh.labels[i];
-      out += fmt::format("g {}_{}", groups.prefix, label);
-      if (!groups.names.empty()) out += '_' + groups.names[static_cast<std::size_t>(label)];
+      out += fmt::format("g {}_{}", groups.prefix, mesh.labels[i]);
+      if (!groups.names.empty()) out += '_' + groups.names[static_cast<std::size_t>(mesh.labels[i])];
       out += '\n';
     }
     out += 'f';
-    for (const Index v : mesh.triangles[i]) {
+    for (const Index v : face(mesh, i)) {
       out += ' ';
       append_index(out, std::size_t{v} + 1);
     }
@@ -210,5 +222,12 @@ std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups) {
     out += fmt::format("l {} {}\n", std::size_t{e[0]} + 1, std::size_t{e[1]} + 1);
   return out;
 }
+
+}  // namespace
+
+std::string format_off(const TriangleMesh& mesh) { return off_of(mesh); }
+std::string format_off(const PolygonMesh& mesh) { return off_of(mesh); }
+std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups) { return obj_of(mesh, groups); }
+std::string format_obj(const PolygonMesh& mesh, const GroupNames& groups) { return obj_of(mesh, groups); }
 
 }  // namespace bisector::io

@@ -808,7 +808,7 @@ TEST_F(Io, WritesPolygons) {
 
   mesh.labels.pop_back();
   EXPECT_THROW(write_polygons(path("b.ply"), mesh), Error);
-  EXPECT_THROW(write_polygons(path("b.off"), wheel), Error);
+  EXPECT_THROW(write_polygons(path("b.stl"), wheel), Error);
   EXPECT_FALSE(fs::exists(path("b.ply")));
 }
 
