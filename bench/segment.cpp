@@ -15,6 +15,7 @@
 
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "bisector/polygonise.h"
 #include "bisector/quality.h"
 #include "bisector/segment.h"
 #include "common.h"
@@ -39,7 +40,8 @@ struct Options {
   SegmentOptions segment;
   std::size_t repeat = 3, spread = 0, peer_iterations = 100;
   unsigned threads = 1;
-  bool peers = false;
+  double chord = 0.2;
+  bool peers = false, polygons = false;
 };
 
 std::string percent(double length, double diagonal) { return fmt::format("{:.5f}", 100 * length / diagonal); }
@@ -161,6 +163,61 @@ void add_peers(Table& table, const Options& options, const std::string& name, co
   }
 }
 
+// The region's best planes.
+SegmentResult with_best_planes(const TriangleMesh& mesh, std::vector<Index> labels) {
+  SegmentResult result;
+  std::map<Index, SurfaceMoments> regions;
+  for (std::size_t t = 0; t < labels.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const SurfaceMoments moments = triangle_moments(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], {});
+    const auto [at, is_new] = regions.try_emplace(labels[t], moments);
+    if (!is_new) at->second = merged(at->second, moments);
+  }
+  std::map<Index, Index> number;
+  for (const auto& [label, moments] : regions) {
+    number.try_emplace(label, static_cast<Index>(result.regions.size()));
+    const PlaneFit fit = fit_plane(moments);
+    result.regions.push_back({Plane{fit.normal, fit.offset}});
+    result.regions.back().rms = std::sqrt(std::max(0.0, fit.squared_distance) / moments.area());
+  }
+  for (Index& label : labels) label = number[label];
+  result.labels = std::move(labels);
+  return result;
+}
+
+void add_polygon_row(Table& table, const std::string& name, const char* method, std::size_t polygons,
+                     const TriangleMesh& made, const TriangleMesh& mesh, double seconds) {
+  const DistanceReport distance = measure_distance(made, mesh);
+  const MeshTopology before = analyse_topology(mesh.triangles, mesh.vertices.size());
+  const MeshTopology after = analyse_topology(made.triangles, made.vertices.size());
+  table.rows.push_back({name, method, std::to_string(polygons), std::to_string(made.vertices.size()),
+                        std::to_string(made.triangles.size()), fmt::format("{:.4f}", distance.rms_to_reference),
+                        fmt::format("{:.4f}", distance.rms_from_reference), fmt::format("{:.3f}", distance.max),
+                        after.manifold ? "yes" : "no", fmt::format("{} ({})", after.euler, before.euler),
+                        std::to_string(count_self_intersections(made)), fmt::format("{:.2f}", seconds)});
+}
+
+// Coarse meshes of planar regions: of this segmentation, of CGAL's regions, and CGAL's own of these.
+void add_polygons(Table& table, const Options& options, const std::string& name, const TriangleMesh& mesh,
+                  std::size_t proxies) {
+  SegmentOptions wanted = options_of(options, proxies);
+  wanted.surfaces = SegmentSurfaces::planes;
+  const SegmentResult own = segment(mesh, wanted);
+  const auto add_own = [&](const char* method, const SegmentResult& regions) {
+    const Stopwatch watch;
+    const PolygonisedMesh made = polygonise(mesh, regions, {options.chord});
+    add_polygon_row(table, name, method, made.polygons.rows(), made.triangulated, mesh, watch.seconds());
+  };
+  add_own("Bisector", own);
+  for (const double chord : {0.0, options.chord}) {
+    const Stopwatch watch;
+    const CgalPolygons made = cgal_polygons(mesh, proxies, options.peer_iterations, false, chord);
+    add_polygon_row(table, name, chord > 0 ? "CGAL L2, chords" : "CGAL L2", made.polygons, made.mesh, mesh,
+                    watch.seconds());
+    if (chord > 0) add_own("Bisector on CGAL's regions", with_best_planes(mesh, made.labels));
+  }
+}
+
 // Least, middle and largest error over random starts, or over equal meshes.
 void add_spread(Table& table, const Options& options, const std::string& name, const TriangleMesh& mesh,
                 std::size_t proxies) {
@@ -187,6 +244,9 @@ void run(const Options& options) {
   Table table;
   if (options.spread > 0)
     table.columns = {"model", "surfaces", "start", "proxies", "runs", "rms least", "rms median", "rms most", "total"};
+  else if (options.polygons)
+    table.columns = {"model", "method", "polygons", "vertices", "triangles", "rms to", "rms from", "largest", "manifold",
+                     "Euler (input)", "self-intersections", "seconds"};
   else
     table.columns = {"model",     "triangles", "surfaces",   "start",           "regions", "total",
                      "starting",  "Lloyd",     "post",       "rms unsmoothed",  "rms",     "projected",
@@ -197,6 +257,10 @@ void run(const Options& options) {
     const std::size_t proxies = options.proxies[std::min(k, options.proxies.size() - 1)];
     if (options.spread > 0) {
       add_spread(table, options, name, mesh, proxies);
+      continue;
+    }
+    if (options.polygons) {
+      add_polygons(table, options, name, mesh, proxies);
       continue;
     }
     add_run(table, options, name, mesh, proxies);
@@ -222,6 +286,8 @@ int main(int argc, char** argv) {
   app.add_option("--fuzzy-rings", options.segment.fuzzy_rings, "width of the strip")->check(CLI::Range(1, 1000));
   app.add_option("--repeat", options.repeat, "runs of each; times are medians")->check(CLI::Range(1, 1000));
   app.add_flag("--peers", options.peers, "also CGAL's planar regions, L2 and L2,1; for edge-manifold meshes");
+  app.add_flag("--polygons", options.polygons, "instead: coarse meshes of planar regions, CGAL's beside them");
+  app.add_option("--chord", options.chord, "with --polygons: where borders are divided")->check(CLI::PositiveNumber);
   app.add_option("--peer-iterations", options.peer_iterations, "of CGAL's")->check(CLI::Range(1, 100'000));
   app.add_option("--spread", options.spread,
                  "instead: errors over so many random seeds (random), or renumbered and moved meshes (merging)")

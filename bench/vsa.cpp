@@ -6,6 +6,10 @@
 #include <CGAL/Surface_mesh_approximation/L2_metric_plane_proxy.h>
 #include <CGAL/Variational_shape_approximation.h>
 
+#include <array>
+#include <iterator>
+#include <type_traits>
+
 namespace bisector::bench {
 namespace {
 
@@ -14,10 +18,12 @@ using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Points = boost::property_map<Mesh, boost::vertex_point_t>::type;
 
 template <class Metric>
-std::vector<Index> regions(Mesh& mesh, const Metric& metric, std::size_t proxies, std::size_t iterations) {
+using Approximation = CGAL::Variational_shape_approximation<Mesh, Points, Metric>;
+
+template <class Metric>
+std::vector<Index> find_regions(Mesh& mesh, Approximation<Metric>& approximation, std::size_t proxies,
+                                std::size_t iterations) {
   namespace np = CGAL::parameters;
-  CGAL::Variational_shape_approximation<Mesh, Points, Metric> approximation(mesh, get(CGAL::vertex_point, mesh),
-                                                                            metric);
   approximation.initialize_seeds(
       np::seeding_method(CGAL::Surface_mesh_approximation::HIERARCHICAL).max_number_of_proxies(proxies));
   approximation.run(iterations);
@@ -28,20 +34,59 @@ std::vector<Index> regions(Mesh& mesh, const Metric& metric, std::size_t proxies
   return labels;
 }
 
-}  // namespace
+template <class Metric>
+CgalPolygons polygons(Mesh& mesh, const Metric& metric, std::size_t proxies, std::size_t iterations, double chord) {
+  namespace np = CGAL::parameters;
+  Approximation<Metric> approximation(mesh, get(CGAL::vertex_point, mesh), metric);
+  CgalPolygons result;
+  result.labels = find_regions(mesh, approximation, proxies, iterations);
+  result.manifold = chord > 0 ? approximation.extract_mesh(np::subdivision_ratio(Kernel::FT(chord))
+                                                               .relative_to_chord(true)
+                                                               .with_dihedral_angle(true))
+                              : approximation.extract_mesh(np::all_default());
+  std::vector<Kernel::Point_3> anchors;
+  std::vector<std::array<std::size_t, 3>> triangles;
+  approximation.output(np::anchors(std::back_inserter(anchors)).triangles(std::back_inserter(triangles)));
+  for (const Kernel::Point_3& p : anchors) result.mesh.vertices.push_back({p.x(), p.y(), p.z()});
+  for (const auto& [a, b, c] : triangles)
+    result.mesh.triangles.push_back({static_cast<Index>(a), static_cast<Index>(b), static_cast<Index>(c)});
+  std::vector<std::vector<std::size_t>> borders;
+  approximation.indexed_boundary_polygons(std::back_inserter(borders));
+  result.polygons = borders.size();
+  return result;
+}
 
-std::vector<Index> cgal_regions(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, bool l21) {
+Mesh converted(const TriangleMesh& input) {
   Mesh mesh;
   std::vector<Mesh::Vertex_index> vertices;
   for (const Vec3& p : input.vertices) vertices.push_back(mesh.add_vertex({p.x, p.y, p.z}));
   for (const auto& [a, b, c] : input.triangles) mesh.add_face(vertices[a], vertices[b], vertices[c]);
+  return mesh;
+}
+
+// Calls `use` with the metric.
+template <class Use>
+auto with_metric(Mesh& mesh, bool l21, const Use& use) {
   const Points points = get(CGAL::vertex_point, mesh);
-  if (l21) {
-    const CGAL::Surface_mesh_approximation::L21_metric_plane_proxy<Mesh> metric(mesh, points);
-    return regions(mesh, metric, proxies, iterations);
-  }
-  const CGAL::Surface_mesh_approximation::L2_metric_plane_proxy<Mesh> metric(mesh, points);
-  return regions(mesh, metric, proxies, iterations);
+  if (l21) return use(CGAL::Surface_mesh_approximation::L21_metric_plane_proxy<Mesh>(mesh, points));
+  return use(CGAL::Surface_mesh_approximation::L2_metric_plane_proxy<Mesh>(mesh, points));
+}
+
+}  // namespace
+
+std::vector<Index> cgal_regions(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, bool l21) {
+  Mesh mesh = converted(input);
+  return with_metric(mesh, l21, [&](const auto& metric) {
+    Approximation<std::decay_t<decltype(metric)>> approximation(mesh, get(CGAL::vertex_point, mesh), metric);
+    return find_regions(mesh, approximation, proxies, iterations);
+  });
+}
+
+CgalPolygons cgal_polygons(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, bool l21,
+                           double chord) {
+  Mesh mesh = converted(input);
+  return with_metric(mesh, l21,
+                     [&](const auto& metric) { return polygons(mesh, metric, proxies, iterations, chord); });
 }
 
 }  // namespace bisector::bench

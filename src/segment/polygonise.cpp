@@ -24,12 +24,15 @@
 namespace bisector {
 namespace {
 
+// A region whose corners fold it gets its vertices back towards the mesh, by halves.
+constexpr int kHalvings = 4;
+
 using Edge = std::array<Index, 2>;
 
 class Polygoniser {
  public:
   Polygoniser(const TriangleMesh& mesh, const SegmentResult& segmentation, const PolygoniseOptions& options)
-      : segmentation_(segmentation), options_(options), borders_(region_borders(mesh, segmentation)),
+      : mesh_(mesh), segmentation_(segmentation), options_(options), borders_(region_borders(mesh, segmentation)),
         positions_(mesh.vertices), kept_(mesh.vertices.size(), 0), regions_(segmentation.regions.size()) {
     coarse_ = {borders_.triangles, segmentation.labels};
     for (std::size_t r = 0; r < regions_.size(); ++r) {
@@ -47,7 +50,9 @@ class Polygoniser {
     std::vector<Vec3> normals;
     for (const Region& region : regions_) normals.push_back(region.normal);
     collapse_vertices(positions_, kept_, normals, coarse_);
+    find_loops();
     fill_regions();
+    for (int k = 0; k < kHalvings && draw_back(k + 1 == kHalvings); ++k) fill_regions();
     separate_edges();
     return result();
   }
@@ -58,7 +63,7 @@ class Polygoniser {
     Vec3 normal;  // on the side that the triangles face; zero for other surfaces
     std::vector<std::vector<Index>> loops;
     std::vector<Triangle> triangles;
-    bool is_folded = false;
+    bool has_handles = false, is_folded = false;
   };
 
   // Other surfaces keep their triangles, and so does what is no manifold.
@@ -161,27 +166,44 @@ class Polygoniser {
     }
   }
 
-  // Planar regions are triangulated in their planes, where their corners let them.
-  void fill_regions() {
+  void find_loops() {
     const RegionBorders coarse =
         follow_borders(coarse_.triangles, positions_.size(), coarse_.labels, regions_.size()).borders;
+    for (std::size_t r = 0; r < regions_.size(); ++r) {
+      for (const BorderLoop& loop : coarse.regions[r].loops) regions_[r].loops.push_back(loop.vertices);
+      regions_[r].has_handles = coarse.regions[r].euler != 2 - static_cast<long long>(coarse.regions[r].loops.size());
+    }
+  }
+
+  // Planar regions are triangulated in their planes, where their corners let them.
+  void fill_regions() {
     const Csr<Index> of_region = items_of_labels<Index>(coarse_.labels, regions_.size());
     std::vector<std::array<double, 2>> points(positions_.size());
     for (std::size_t r = 0; r < regions_.size(); ++r) {
       Region& region = regions_[r];
-      for (const BorderLoop& loop : coarse.regions[r].loops) region.loops.push_back(loop.vertices);
-      const long long disk_with_holes = 2 - static_cast<long long>(region.loops.size());
-      if (region.plane && coarse.regions[r].euler == disk_with_holes) {
+      region.triangles.clear();
+      if (region.plane && !region.has_handles) {
         const auto [u, w] = frame_across(region.normal);
         for (const std::vector<Index>& loop : region.loops)
           for (const Index v : loop) points[v] = {dot(positions_[v], u), dot(positions_[v], w)};
         region.triangles = triangulate_loops(region.loops, points);
       }
+      region.is_folded = region.plane && region.triangles.empty();
       if (!region.triangles.empty()) continue;
-      region.is_folded = region.plane.has_value();
       for (const Index* t = of_region.begin(r); t != of_region.end(r); ++t)
         region.triangles.push_back(coarse_.triangles[*t]);
     }
+  }
+
+  // Moves the vertices of folded regions halfway back to the mesh, or all the way; false if there are no such regions.
+  bool draw_back(bool all_the_way) {
+    std::set<Index> moved;
+    for (const Region& region : regions_)
+      if (region.is_folded)
+        for (const std::vector<Index>& loop : region.loops) moved.insert(loop.begin(), loop.end());
+    for (const Index v : moved)
+      positions_[v] = all_the_way ? mesh_.vertices[v] : 0.5 * (positions_[v] + mesh_.vertices[v]);
+    return !moved.empty();
   }
 
   // Diagonals of planar regions may join vertices that another edge joins already: these get a vertex in the middle.
@@ -303,6 +325,7 @@ class Polygoniser {
     return mesh;
   }
 
+  const TriangleMesh& mesh_;
   const SegmentResult& segmentation_;
   const PolygoniseOptions& options_;
   const RegionBorders borders_;

@@ -1,0 +1,139 @@
+// bisector-step: the surfaces of a segmentation as STEP or IGES.
+#include <APIHeaderSection_MakeHeader.hxx>
+#include <IFSelect_ReturnStatus.hxx>
+#include <IGESControl_Controller.hxx>
+#include <IGESControl_Writer.hxx>
+#include <Interface_Static.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <Message_PrinterOStream.hxx>
+#include <STEPControl_Writer.hxx>
+#include <Standard_Failure.hxx>
+#include <TCollection_HAsciiString.hxx>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+
+#include "bisector/error.h"
+#include "step/shell.h"
+#include "step/trims.h"
+
+namespace {
+
+using namespace bisector;
+namespace fs = std::filesystem;
+
+// A border is within this share of the diagonal of where the surfaces meet, if they are exact.
+constexpr double kTolerance = 1e-5;
+
+struct Options {
+  std::string input, output, unit = "mm";
+  double tolerance = 0;
+};
+
+bool is_iges(const std::string& path) {
+  std::string extension = fs::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (extension == ".igs" || extension == ".iges") return true;
+  if (extension == ".stp" || extension == ".step") return false;
+  throw Error(fmt::format("{}: unknown format '{}'; use .step, .stp, .iges or .igs", path, extension));
+}
+
+std::string upper(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
+  return text;
+}
+
+// Coordinates are written as they are, with the name of their unit. The file is the same for the same shape.
+bool write_shape(const TopoDS_Shape& shape, const std::string& path, bool iges, const std::string& unit) {
+  if (iges) {
+    IGESControl_Controller::Init();
+    Interface_Static::SetCVal("xstep.cascade.unit", upper(unit).c_str());
+    IGESControl_Writer writer(upper(unit).c_str(), 1);  // as faces with boundaries (entity 510 and so on)
+    if (!writer.AddShape(shape)) return false;
+    writer.ComputeModel();
+    return writer.Write(path.c_str());
+  }
+  STEPControl_Writer writer;
+  Interface_Static::SetCVal("xstep.cascade.unit", upper(unit).c_str());
+  Interface_Static::SetCVal("write.step.unit", upper(unit).c_str());
+  Interface_Static::SetCVal("write.step.product.name", "regions");
+  if (writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone) return false;
+  APIHeaderSection_MakeHeader header(writer.Model());
+  header.SetName(new TCollection_HAsciiString("regions"));
+  header.SetTimeStamp(new TCollection_HAsciiString("1970-01-01T00:00:00"));
+  return writer.Write(path.c_str()) == IFSelect_RetDone;
+}
+
+void write_atomically(const TopoDS_Shape& shape, const Options& options) {
+  const fs::path target(options.output);
+  const fs::path temporary = target.parent_path() / fmt::format(".bisector-step-{}.tmp", ::getpid());
+  std::error_code error;
+  if (write_shape(shape, temporary.string(), is_iges(options.output), options.unit)) {
+    fs::rename(temporary, target, error);
+    if (!error) return;
+  }
+  std::error_code ignored;
+  fs::remove(temporary, ignored);
+  throw Error(fmt::format("{}: cannot be written; check the folder, its permissions and the free space",
+                          options.output));
+}
+
+void run(const Options& options) {
+  is_iges(options.output);
+  const step::Trims trims = step::read_trims(options.input);
+  double tolerance = options.tolerance;
+  if (tolerance == 0) {
+    tolerance = kTolerance * trims.diagonal;
+    for (const step::Region& region : trims.regions) tolerance = std::max(tolerance, region.rms);
+  }
+  const step::Shell shell = step::build_shell(trims, tolerance);
+  std::size_t sound = 0;
+  for (std::size_t r = 0; r < shell.flaws.size(); ++r) {
+    if (shell.flaws[r].empty()) ++sound;
+    else
+      fmt::print(stderr, "bisector-step: warning: the face of region {} ({}) {}\n", r,
+                 name_of(type_of(trims.regions[r].surface)), shell.flaws[r]);
+  }
+  write_atomically(shell.shape, options);
+  const char* kind = shell.shape.ShapeType() == TopAbs_SOLID    ? "a solid"
+                     : shell.shape.ShapeType() == TopAbs_SHELL ? "a shell"
+                                                               : "faces";
+  fmt::print("written    {}: {} of {} faces, {} sound\n", options.output, kind, shell.faces.size(), sound);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The surfaces of a segmentation as STEP or IGES, each trimmed by the borders of its region.");
+  Options options;
+  app.add_option("REGIONS", options.input, "what bisector segment --json wrote")->required();
+  app.add_option("-o", options.output, "file to write: .step, .stp, .iges or .igs")->required();
+  app.add_option("--tolerance", options.tolerance,
+                 "edges are so near to the borders and the surfaces, in the mesh's unit")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--unit", options.unit, "of the coordinates; they are not converted")
+      ->check(CLI::IsMember({"mm", "cm", "m", "in", "ft"}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  Message::DefaultMessenger()->RemovePrinters(STANDARD_TYPE(Message_PrinterOStream));
+  try {
+    run(options);
+    return 0;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bisector-step: {}\n", error.what());
+  } catch (const Standard_Failure& failure) {
+    fmt::print(stderr, "bisector-step: OpenCASCADE failed: {}\n", failure.GetMessageString());
+  }
+  return 1;
+}

@@ -1,0 +1,131 @@
+#include "step/shell.h"
+
+#include <BRepBuilderAPI_MakeFace.hxx>
+#include <BRepBuilderAPI_MakeSolid.hxx>
+#include <BRepBuilderAPI_Sewing.hxx>
+#include <BRepCheck_Analyzer.hxx>
+#include <BRepClass3d_SolidClassifier.hxx>
+#include <BRepGProp.hxx>
+#include <BRepLib.hxx>
+#include <BRep_Builder.hxx>
+#include <BRep_Tool.hxx>
+#include <GProp_GProps.hxx>
+#include <ShapeBuild_ReShape.hxx>
+#include <ShapeFix_Edge.hxx>
+#include <ShapeFix_Face.hxx>
+#include <ShapeFix_Shape.hxx>
+#include <Standard_Failure.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Compound.hxx>
+#include <TopoDS_Shell.hxx>
+#include <TopoDS_Solid.hxx>
+#include <TopoDS_Wire.hxx>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "step/edges.h"
+#include "step/surfaces.h"
+
+namespace bisector::step {
+namespace {
+
+constexpr double kAreaTolerance = 0.05;  // a face whose area is farther off its region's has gone wrong
+
+std::vector<Vec3> border_of(const Trims& trims, const Region& region) {
+  std::vector<Vec3> points;
+  for (const std::vector<Use>& loop : region.loops)
+    for (const Use& use : loop)
+      points.insert(points.end(), trims.chains[use.chain].points.begin(), trims.chains[use.chain].points.end());
+  return points;
+}
+
+// Trimmed by the region's loops, without curves in the surface's parameters. Null for a pair of planes.
+TopoDS_Face trimmed_face(const Trims& trims, const Region& region, const std::vector<TopoDS_Edge>& edges) {
+  bool flipped = false;
+  const Handle(Geom_Surface) surface = make_surface(region.surface, border_of(trims, region), flipped);
+  if (surface.IsNull()) return {};
+  const bool forward = region.same_sense != flipped;
+  TopoDS_Face face;
+  BRep_Builder builder;
+  if (region.loops.empty()) {
+    face = BRepBuilderAPI_MakeFace(surface, Precision::Confusion()).Face();
+  } else {
+    builder.MakeFace(face, surface, Precision::Confusion());
+    for (const std::vector<Use>& loop : region.loops) {
+      TopoDS_Wire wire;
+      builder.MakeWire(wire);
+      for (const Use& use : loop)
+        builder.Add(wire, edges[use.chain].Oriented(use.reversed == forward ? TopAbs_REVERSED : TopAbs_FORWARD));
+      wire.Closed(true);
+      builder.Add(face, wire);
+    }
+  }
+  if (!forward) face.Reverse();
+  return face;
+}
+
+double area_of(const TopoDS_Shape& shape) {
+  GProp_GProps properties;
+  BRepGProp::SurfaceProperties(shape, properties);
+  return std::abs(properties.Mass());
+}
+
+std::string flaw_of(const TopoDS_Shape& face, const Region& region) {
+  if (face.IsNull()) return "has no face";
+  try {
+    if (!BRepCheck_Analyzer(face).IsValid()) return "is not valid";
+    const double area = area_of(face);
+    if (std::abs(area - region.area) > kAreaTolerance * region.area)
+      return fmt::format("has the area {:.4g}, its region {:.4g}", area, region.area);
+  } catch (const Standard_Failure& failure) {
+    return fmt::format("cannot be measured ({})", failure.GetMessageString());
+  }
+  return "";
+}
+
+// Curves in the parameters of the surfaces, seams, degenerate edges at poles, and tolerances that cover the gaps.
+TopoDS_Shape healed(const TopoDS_Shape& shape, double tolerance, const Handle(ShapeBuild_ReShape) & context) {
+  const Handle(ShapeFix_Shape) fixer = new ShapeFix_Shape(shape);
+  fixer->SetContext(context);
+  fixer->SetPrecision(Precision::Confusion());
+  fixer->SetMaxTolerance(std::max(100 * tolerance, 1e-3));
+  fixer->Perform();
+  return fixer->Shape();
+}
+
+bool is_closed(const TopoDS_Shape& shape) { return shape.ShapeType() == TopAbs_SHELL && BRep_Tool::IsClosed(shape); }
+
+TopoDS_Shape as_solid(const TopoDS_Shape& shell) {
+  TopoDS_Solid solid = BRepBuilderAPI_MakeSolid(TopoDS::Shell(shell)).Solid();
+  BRepLib::OrientClosedSolid(solid);
+  return solid;
+}
+
+}  // namespace
+
+Shell build_shell(const Trims& trims, double tolerance) {
+  const std::vector<TopoDS_Edge> edges = make_edges(trims, tolerance);
+  Shell result;
+  std::vector<TopoDS_Face> raw;
+  BRep_Builder builder;
+  TopoDS_Shell shell;
+  builder.MakeShell(shell);
+  for (const Region& region : trims.regions) {
+    raw.push_back(trimmed_face(trims, region, edges));
+    if (!raw.back().IsNull()) builder.Add(shell, raw.back());
+  }
+  const Handle(ShapeBuild_ReShape) context = new ShapeBuild_ReShape;
+  result.shape = healed(shell, tolerance, context);
+  BRepLib::SameParameter(result.shape, Precision::Confusion(), true);
+  BRepLib::UpdateTolerances(result.shape);
+  for (std::size_t r = 0; r < raw.size(); ++r) {
+    result.faces.push_back(raw[r].IsNull() ? TopoDS_Shape() : context->Apply(raw[r]));
+    result.flaws.push_back(flaw_of(result.faces.back(), trims.regions[r]));
+  }
+  if (is_closed(result.shape)) result.shape = as_solid(result.shape);
+  return result;
+}
+
+}  // namespace bisector::step

@@ -1,0 +1,226 @@
+#include "step/surfaces.h"
+
+#include <GeomConvert.hxx>
+#include <Geom_BSplineSurface.hxx>
+#include <Geom_BezierSurface.hxx>
+#include <Geom_ConicalSurface.hxx>
+#include <Geom_CylindricalSurface.hxx>
+#include <Geom_Circle.hxx>
+#include <Geom_Ellipse.hxx>
+#include <Geom_Hyperbola.hxx>
+#include <Geom_Line.hxx>
+#include <Geom_Parabola.hxx>
+#include <Geom_Plane.hxx>
+#include <Geom_RectangularTrimmedSurface.hxx>
+#include <Geom_SphericalSurface.hxx>
+#include <Geom_SurfaceOfLinearExtrusion.hxx>
+#include <Geom_SurfaceOfRevolution.hxx>
+#include <Geom_ToroidalSurface.hxx>
+#include <Geom_TrimmedCurve.hxx>
+#include <TColgp_Array2OfPnt.hxx>
+#include <algorithm>
+#include <cmath>
+#include <gp_Ax3.hxx>
+#include <numbers>
+#include <variant>
+
+#include "segment/primitive.h"
+#include "segment/surface_normal.h"
+
+namespace bisector::step {
+namespace {
+
+constexpr double kMargin = 0.1;  // of their extent, that unbounded surfaces go beyond the border
+
+gp_Pnt point(const Vec3& p) { return {p.x, p.y, p.z}; }
+gp_Dir direction(const Vec3& v) { return {v.x, v.y, v.z}; }
+
+Vec3 mean_of(const std::vector<Vec3>& points) {
+  Vec3 sum;
+  for (const Vec3& p : points) sum += p;
+  return points.empty() ? sum : (1 / static_cast<double>(points.size())) * sum;
+}
+
+// The direction across the axis where the widest gap between the points' directions is: the seam's place.
+Vec3 away_from(const std::vector<Vec3>& points, const Vec3& centre, const Vec3& axis) {
+  const auto [u, v] = frame_across(axis);
+  std::vector<double> angles;
+  for (const Vec3& p : points) {
+    const double x = dot(p - centre, u), y = dot(p - centre, v);
+    if (x != 0 || y != 0) angles.push_back(std::atan2(y, x));
+  }
+  if (angles.empty()) return u;
+  std::sort(angles.begin(), angles.end());
+  double widest = angles.front() + 2 * std::numbers::pi - angles.back(), at = angles.back();
+  for (std::size_t k = 1; k < angles.size(); ++k)
+    if (angles[k] - angles[k - 1] > widest) {
+      widest = angles[k] - angles[k - 1];
+      at = angles[k - 1];
+    }
+  const double middle = at + 0.5 * widest;
+  return std::cos(middle) * u + std::sin(middle) * v;
+}
+
+// A frame about an axis whose x direction, where seams lie, is away from the points.
+gp_Ax3 frame(const Vec3& centre, const Vec3& axis, const std::vector<Vec3>& points) {
+  return {point(centre), direction(axis), direction(away_from(points, centre, axis))};
+}
+
+Handle(Geom_Surface) surface_of(const Plane& s, const std::vector<Vec3>& border) {
+  const Vec3 middle = mean_of(border);
+  return new Geom_Plane(point(middle - (dot(s.normal, middle) - s.offset) * s.normal), direction(s.normal));
+}
+
+Handle(Geom_Surface) surface_of(const Sphere& s, const std::vector<Vec3>& border) {
+  // Poles across the middle of a piece are off it.
+  const Vec3 middle = unit(mean_of(border) - s.centre);
+  const Vec3 axis = border.empty() || norm(middle) == 0 ? Vec3{0, 0, 1} : perpendicular(middle);
+  return new Geom_SphericalSurface(frame(s.centre, axis, border), s.radius);
+}
+
+Handle(Geom_Surface) surface_of(const Cylinder& s, const std::vector<Vec3>& border) {
+  const Vec3 at = s.point + dot(mean_of(border) - s.point, s.axis) * s.axis;
+  return new Geom_CylindricalSurface(frame(at, s.axis, border), s.radius);
+}
+
+Handle(Geom_Surface) surface_of(const Cone& s, const std::vector<Vec3>& border) {
+  const double height = std::max(0.0, dot(mean_of(border) - s.apex, s.axis));
+  return new Geom_ConicalSurface(frame(s.apex + height * s.axis, s.axis, border), s.angle,
+                                 height * std::tan(s.angle));
+}
+
+Handle(Geom_Surface) surface_of(const Torus& s, const std::vector<Vec3>& border) {
+  return new Geom_ToroidalSurface(frame(s.centre, s.axis, border), s.radius, s.minor_radius);
+}
+
+// Extent of points along an axis from a centre, with a margin.
+struct Range {
+  double low, high;
+};
+Range range_along(const std::vector<Vec3>& points, const Vec3& centre, const Vec3& axis) {
+  Range range{1e300, -1e300};
+  for (const Vec3& p : points) {
+    const double t = dot(p - centre, axis);
+    range = {std::min(range.low, t), std::max(range.high, t)};
+  }
+  const double margin = kMargin * (range.high - range.low);
+  return {range.low - margin, range.high + margin};
+}
+
+// A quadric of revolution about z with unit lengths, made by turning a curve in the half-plane of `seam` and z, and
+// stretched along the quadric's axes.
+Handle(Geom_Surface) stretched(const GeneralQuadric& q, const Handle(Geom_Curve) & profile, const Vec3& scale) {
+  const Handle(Geom_SurfaceOfRevolution) turned = new Geom_SurfaceOfRevolution(profile, gp_Ax1());
+  const Handle(Geom_BSplineSurface) spline = GeomConvert::SurfaceToBSplineSurface(turned);
+  for (int i = 1; i <= spline->NbUPoles(); ++i)
+    for (int j = 1; j <= spline->NbVPoles(); ++j) {
+      const gp_Pnt p = spline->Pole(i, j);
+      spline->SetPole(i, j, point(q.centre + (scale.x * p.X()) * q.axes[0] + (scale.y * p.Y()) * q.axes[1] +
+                                  (scale.z * p.Z()) * q.axes[2]));
+    }
+  return Handle(Geom_Surface)(spline);
+}
+
+// Hyperbolic paraboloid x^2 / (2a) - y^2 / (2b) = z over a rectangle: one bilinear-by-degree-two patch.
+Handle(Geom_Surface) saddle(const GeneralQuadric& q, const std::vector<Vec3>& border) {
+  const Range x = range_along(border, q.centre, q.axes[0]), y = range_along(border, q.centre, q.axes[1]);
+  const double xs[3] = {x.low, 0.5 * (x.low + x.high), x.high}, ys[3] = {y.low, 0.5 * (y.low + y.high), y.high};
+  // Blossoms of the squares at the Bezier points.
+  const double xx[3] = {x.low * x.low, x.low * x.high, x.high * x.high};
+  const double yy[3] = {y.low * y.low, y.low * y.high, y.high * y.high};
+  TColgp_Array2OfPnt poles(1, 3, 1, 3);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const double z = xx[i] / (2 * q.lengths[0]) - yy[j] / (2 * q.lengths[1]);
+      poles(i + 1, j + 1) = point(q.centre + xs[i] * q.axes[0] + ys[j] * q.axes[1] + z * q.axes[2]);
+    }
+  return GeomConvert::SurfaceToBSplineSurface(new Geom_BezierSurface(poles));
+}
+
+Handle(Geom_Surface) surface_of(const GeneralQuadric& q, const std::vector<Vec3>& border) {
+  const auto [a, b, c] = q.lengths;
+  // In the coordinates that `stretched` turns in, with the seam off the border.
+  std::vector<Vec3> local;
+  const bool is_paraboloid = q.type == SurfaceType::elliptic_paraboloid;
+  const Vec3 scale{is_paraboloid ? std::sqrt(a) : a, is_paraboloid ? std::sqrt(b) : b, c > 0 ? c : 1};
+  for (const Vec3& p : border) {
+    const Vec3 v = p - q.centre;
+    local.push_back({dot(v, q.axes[0]) / scale.x, dot(v, q.axes[1]) / scale.y, dot(v, q.axes[2])});
+  }
+  const Vec3 seam = away_from(local, {}, {0, 0, 1});
+  const gp_Dir x(seam.x, seam.y, 0), z(0, 0, 1);
+  const Range heights = range_along(border, q.centre, q.axes[2]);
+  const gp_Ax2 across(gp_Pnt(), x.Crossed(z), x);  // x and z are its axes
+  switch (q.type) {
+    case SurfaceType::ellipsoid: {
+      const Handle(Geom_Circle) circle = new Geom_Circle(across, 1);
+      return stretched(q, new Geom_TrimmedCurve(circle, -std::numbers::pi / 2, std::numbers::pi / 2), scale);
+    }
+    case SurfaceType::one_sheet_hyperboloid: {
+      // x^2 - z^2 = 1: (cosh t, sinh t).
+      const Handle(Geom_Hyperbola) curve = new Geom_Hyperbola(across, 1, 1);
+      return stretched(q, new Geom_TrimmedCurve(curve, std::asinh(heights.low / c), std::asinh(heights.high / c)),
+                       scale);
+    }
+    case SurfaceType::two_sheet_hyperboloid: {
+      const bool is_upper = heights.low + heights.high > 0;
+      const double farthest = std::max(1.0, (is_upper ? heights.high : -heights.low) / c);
+      const Handle(Geom_Hyperbola) curve =
+          new Geom_Hyperbola(gp_Ax2(gp_Pnt(), is_upper ? z.Crossed(x) : x.Crossed(z), is_upper ? z : z.Reversed()), 1, 1);
+      return stretched(q, new Geom_TrimmedCurve(curve, 0, std::acosh(farthest) + kMargin), scale);
+    }
+    case SurfaceType::elliptic_cone: {
+      const bool is_upper = heights.low + heights.high > 0;
+      const double farthest = is_upper ? heights.high : -heights.low;
+      const gp_Dir along(seam.x, seam.y, is_upper ? 1 : -1);
+      const Handle(Geom_Line) line = new Geom_Line(gp_Pnt(), along);
+      return stretched(q, new Geom_TrimmedCurve(line, 0, std::numbers::sqrt2 * farthest), scale);
+    }
+    case SurfaceType::elliptic_paraboloid: {
+      // x^2 = 2 z with the focal length 1/2, and lengths that are radii of curvature.
+      const Handle(Geom_Parabola) curve = new Geom_Parabola(gp_Ax2(gp_Pnt(), z.Crossed(x), z), 0.5);
+      return stretched(q, new Geom_TrimmedCurve(curve, 0, std::sqrt(2 * std::max(heights.high, 0.0))), scale);
+    }
+    case SurfaceType::hyperbolic_paraboloid: return saddle(q, border);
+    case SurfaceType::elliptic_cylinder: {
+      const bool first_is_major = a >= b;
+      const gp_Ax2 axes(point(q.centre), direction(q.axes[2]), direction(q.axes[first_is_major ? 0 : 1]));
+      return new Geom_SurfaceOfLinearExtrusion(new Geom_Ellipse(axes, std::max(a, b), std::min(a, b)),
+                                               direction(q.axes[2]));
+    }
+    case SurfaceType::hyperbolic_cylinder: {
+      const bool is_right = dot(mean_of(border) - q.centre, q.axes[0]) > 0;
+      const gp_Ax2 axes(point(q.centre), direction(q.axes[2]), direction(is_right ? q.axes[0] : -q.axes[0]));
+      return new Geom_SurfaceOfLinearExtrusion(new Geom_Hyperbola(axes, a, b), direction(q.axes[2]));
+    }
+    case SurfaceType::parabolic_cylinder: {
+      // x^2 / (2a) = z, rulings along y.
+      const gp_Ax2 axes(point(q.centre), direction(q.axes[1]), direction(q.axes[2]));
+      return new Geom_SurfaceOfLinearExtrusion(new Geom_Parabola(axes, a / 2), direction(q.axes[1]));
+    }
+    default: return {};
+  }
+}
+
+}  // namespace
+
+Handle(Geom_Surface) make_surface(const Primitive& surface, const std::vector<Vec3>& border, bool& flipped) {
+  const Handle(Geom_Surface) made = std::visit([&](const auto& s) { return surface_of(s, border); }, surface);
+  flipped = false;
+  if (made.IsNull()) return made;
+  double u0, u1, v0, v1;
+  made->Bounds(u0, u1, v0, v1);
+  const auto inside = [](double low, double high) {
+    const bool has_low = low > -1e50, has_high = high < 1e50;
+    return has_low && has_high ? 0.37 * low + 0.63 * high : has_low ? low + 1 : has_high ? high - 1 : 0.5;
+  };
+  gp_Pnt p;
+  gp_Vec du, dv;
+  made->D1(inside(u0, u1), inside(v0, v1), p, du, dv);
+  const gp_Vec normal = du.Crossed(dv);
+  const Vec3 own = surface_normal(surface, foot_point(surface, {p.X(), p.Y(), p.Z()}));
+  flipped = dot({normal.X(), normal.Y(), normal.Z()}, own) < 0;
+  return made;
+}
+
+}  // namespace bisector::step

@@ -1,0 +1,18 @@
+// Surfaces of regions for OpenCASCADE.
+#pragma once
+
+#include <Geom_Surface.hxx>
+#include <vector>
+
+#include "bisector/segment.h"
+#include "core/geometry.h"
+
+namespace bisector::step {
+
+// The surface, large enough for a region with these points on its border: a plane, cylinder, cone, sphere or torus as
+// such, general cylinders as extrusions and other quadrics as exact rational B-splines. Its normal (du x dv) points where
+// the primitive's own does if `flipped` comes back false. Seams and poles are far from the points where that can be had.
+// Null for a pair of planes.
+Handle(Geom_Surface) make_surface(const Primitive& surface, const std::vector<Vec3>& border, bool& flipped);
+
+}  // namespace bisector::step
