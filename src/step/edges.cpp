@@ -28,7 +28,8 @@
 namespace bisector::step {
 namespace {
 
-constexpr int kSamples = 16;  // of a curve, to see whether it is on the surfaces
+constexpr int kSamples = 32;          // of a curve, to see whether it is on the surfaces, at least
+constexpr double kTolerance = 1e-5;   // of the diagonal, for surfaces that are exact
 
 gp_Pnt point(const Vec3& p) { return {p.x, p.y, p.z}; }
 Vec3 vector(const gp_Pnt& p) { return {p.X(), p.Y(), p.Z()}; }
@@ -104,12 +105,50 @@ class EdgeMaker {
     return points;
   }
 
-  Curve curve_through(const std::vector<Vec3>& points, const Chain& chain) const {
+  // How far a curve may be off the surfaces beside it.
+  double tolerance_of(const Chain& chain) const {
+    if (tolerance_ > 0) return tolerance_;
+    double tolerance = kTolerance * trims_.diagonal;
+    for (const Index r : chain.regions) tolerance = std::max(tolerance, trims_.regions[r].rms);
+    return tolerance;
+  }
+
+  Curve curve_through(const std::vector<Vec3>& points, const Chain& chain) {
+    // Where more than two surfaces meet, they need not do so in one point.
+    surface_tolerance_ = tolerance_of(chain);
+    for (const Vec3& end : {points.front(), points.back()})
+      for (const Index r : chain.regions)
+        surface_tolerance_ = std::max(surface_tolerance_, distance(trims_.regions[r].surface, end));
+    // Between two surfaces these tell where the curve runs, and where they do not, the mesh knows it up to an edge.
+    point_tolerance_ = chain.regions.size() == 2 ? std::max(surface_tolerance_, spread_of(chain)) : surface_tolerance_;
     if (const std::optional<Curve> line = as_line(points, chain)) return *line;
     if (const std::optional<Curve> circle = chain.closed ? as_circle(points) : as_arc(points))
       if (is_on_surfaces(*circle, chain)) return *circle;
-    if (const std::optional<Curve> spline = as_spline(points)) return *spline;
-    return as_polyline(points);
+    const std::vector<Vec3> smoothed = smooth(points, chain);
+    if (const std::optional<Curve> spline = as_spline(smoothed, 0.5 * surface_tolerance_))
+      if (is_on_surfaces(*spline, chain)) return *spline;
+    return as_polyline(smoothed);
+  }
+
+  // Points of a smooth curve near these, closer together, where the surfaces meet. The ends stay.
+  std::vector<Vec3> smooth(const std::vector<Vec3>& points, const Chain& chain) const {
+    std::vector<Vec3> dense;
+    const std::size_t n = points.size() - 1, pieces = 1 + kSamples / n;
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t k = 0; k < pieces; ++k)
+        dense.push_back(points[i] +
+                        (static_cast<double>(k) / static_cast<double>(pieces)) * (points[i + 1] - points[i]));
+    dense.push_back(points.back());
+    const std::set<Index> regions(chain.regions.begin(), chain.regions.end());
+    const double spread = spread_of(chain);
+    if (const std::optional<Curve> curve = as_spline(dense, point_tolerance_)) {
+      const std::size_t count = dense.size() - 1;
+      for (std::size_t k = 1; k < count; ++k)
+        dense[k] = vector(curve->geometry->Value(curve->first + static_cast<double>(k) / static_cast<double>(count) *
+                                                                    (curve->last - curve->first)));
+    }
+    for (std::size_t k = 1; k + 1 < dense.size(); ++k) dense[k] = meet(dense[k], regions, spread);
+    return dense;
   }
 
   bool is_near(const Handle(Geom_Curve) & curve, const std::vector<Vec3>& points) const {
@@ -117,15 +156,16 @@ class EdgeMaker {
       const GeomAPI_ProjectPointOnCurve foot(point(p), curve);
       const double ends = std::min(curve->Value(curve->FirstParameter()).Distance(point(p)),
                                    curve->Value(curve->LastParameter()).Distance(point(p)));
-      return std::min(ends, foot.NbPoints() > 0 ? foot.LowerDistance() : ends) <= tolerance_;
+      return std::min(ends, foot.NbPoints() > 0 ? foot.LowerDistance() : ends) <= point_tolerance_;
     });
   }
 
   bool is_on_surfaces(const Curve& curve, const Chain& chain) const {
-    for (int k = 0; k <= kSamples; ++k) {
-      const Vec3 p = vector(curve.geometry->Value(curve.first + k * (curve.last - curve.first) / kSamples));
+    const auto samples = static_cast<int>(kSamples + 4 * chain.points.size());
+    for (int k = 0; k <= samples; ++k) {
+      const Vec3 p = vector(curve.geometry->Value(curve.first + k * (curve.last - curve.first) / samples));
       for (const Index r : chain.regions)
-        if (distance(trims_.regions[r].surface, p) > tolerance_) return false;
+        if (distance(trims_.regions[r].surface, p) > surface_tolerance_) return false;
     }
     return true;
   }
@@ -133,11 +173,10 @@ class EdgeMaker {
   std::optional<Curve> as_line(const std::vector<Vec3>& points, const Chain& chain) const {
     const Vec3 &a = points.front(), &b = points.back();
     const double length = norm(b - a);
-    if (chain.closed || !(length > tolerance_)) return {};
+    if (chain.closed || !(length > Precision::Confusion())) return {};
     for (const Vec3& p : points)
-      if (norm(p - nearest_on_segment(p, a, b)) > tolerance_) return {};
+      if (norm(p - nearest_on_segment(p, a, b)) > point_tolerance_) return {};
     const Curve line{new Geom_Line(point(a), gp_Dir(gp_Vec(point(a), point(b)))), 0, length};
-    // A chord of a few points is near them, but perhaps not near the surface.
     if (!is_on_surfaces(line, chain)) return {};
     return line;
   }
@@ -198,14 +237,13 @@ class EdgeMaker {
     return Curve{circle, 0, 2 * std::numbers::pi};
   }
 
-  std::optional<Curve> as_spline(const std::vector<Vec3>& points) const {
-    if (points.size() < 5) return {};
+  std::optional<Curve> as_spline(const std::vector<Vec3>& points, double tolerance) const {
     TColgp_Array1OfPnt array(1, static_cast<int>(points.size()));
     for (std::size_t i = 0; i < points.size(); ++i) array(static_cast<int>(i) + 1) = point(points[i]);
     try {
-      const GeomAPI_PointsToBSpline made(array, 3, 8, GeomAbs_C2, tolerance_);
+      const GeomAPI_PointsToBSpline made(array, 3, 5, GeomAbs_C2, tolerance);
       if (!made.IsDone()) return {};
-      const Handle(Geom_Curve) curve = made.Curve();
+      const Handle(Geom_Curve) curve(made.Curve());
       if (!is_near(curve, points)) return {};
       return Curve{curve, curve->FirstParameter(), curve->LastParameter()};
     } catch (const Standard_Failure&) {
@@ -245,7 +283,8 @@ class EdgeMaker {
   }
 
   const Trims& trims_;
-  const double tolerance_;
+  const double tolerance_;  // 0: as the regions' distances demand
+  double surface_tolerance_ = 0, point_tolerance_ = 0;  // of the chain at hand
   std::map<Index, Vec3> ends_;
   std::map<Index, TopoDS_Vertex> vertices_;
 };

@@ -29,9 +29,6 @@ namespace {
 using namespace bisector;
 namespace fs = std::filesystem;
 
-// A border is within this share of the diagonal of where the surfaces meet, if they are exact.
-constexpr double kTolerance = 1e-5;
-
 struct Options {
   std::string input, output, unit = "mm";
   double tolerance = 0;
@@ -88,12 +85,7 @@ void write_atomically(const TopoDS_Shape& shape, const Options& options) {
 void run(const Options& options) {
   is_iges(options.output);
   const step::Trims trims = step::read_trims(options.input);
-  double tolerance = options.tolerance;
-  if (tolerance == 0) {
-    tolerance = kTolerance * trims.diagonal;
-    for (const step::Region& region : trims.regions) tolerance = std::max(tolerance, region.rms);
-  }
-  const step::Shell shell = step::build_shell(trims, tolerance);
+  const step::Shell shell = step::build_shell(trims, options.tolerance);
   std::size_t sound = 0;
   for (std::size_t r = 0; r < shell.flaws.size(); ++r) {
     if (shell.flaws[r].empty()) ++sound;
@@ -116,7 +108,8 @@ int main(int argc, char** argv) {
   app.add_option("REGIONS", options.input, "what bisector segment --json wrote")->required();
   app.add_option("-o", options.output, "file to write: .step, .stp, .iges or .igs")->required();
   app.add_option("--tolerance", options.tolerance,
-                 "edges are so near to the borders and the surfaces, in the mesh's unit")
+                 "edges are so near to the surfaces beside them, in the\n"
+                 "mesh's unit; default: as near as the regions are")
       ->check(CLI::PositiveNumber);
   app.add_option("--unit", options.unit, "of the coordinates; they are not converted")
       ->check(CLI::IsMember({"mm", "cm", "m", "in", "ft"}))

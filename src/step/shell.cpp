@@ -31,20 +31,28 @@
 namespace bisector::step {
 namespace {
 
+constexpr double kLargestGap = 0.01;     // between edges and faces, of the diagonal: what is off by more stays a flaw
 constexpr double kAreaTolerance = 0.05;  // a face whose area is farther off its region's has gone wrong
 
-std::vector<Vec3> border_of(const Trims& trims, const Region& region) {
-  std::vector<Vec3> points;
-  for (const std::vector<Use>& loop : region.loops)
-    for (const Use& use : loop)
-      points.insert(points.end(), trims.chains[use.chain].points.begin(), trims.chains[use.chain].points.end());
-  return points;
+Outline outline_of(const Trims& trims, const Region& region) {
+  Outline outline;
+  outline.area = region.area;
+  for (const std::vector<Use>& loop : region.loops) {
+    std::vector<Vec3>& points = outline.loops.emplace_back();
+    for (const Use& use : loop) {
+      const std::vector<Vec3>& chain = trims.chains[use.chain].points;
+      if (use.reversed) points.insert(points.end(), chain.rbegin(), chain.rend());
+      else points.insert(points.end(), chain.begin(), chain.end());
+    }
+    outline.points.insert(outline.points.end(), points.begin(), points.end());
+  }
+  return outline;
 }
 
 // Trimmed by the region's loops, without curves in the surface's parameters. Null for a pair of planes.
 TopoDS_Face trimmed_face(const Trims& trims, const Region& region, const std::vector<TopoDS_Edge>& edges) {
   bool flipped = false;
-  const Handle(Geom_Surface) surface = make_surface(region.surface, border_of(trims, region), flipped);
+  const Handle(Geom_Surface) surface = make_surface(region.surface, outline_of(trims, region), flipped);
   if (surface.IsNull()) return {};
   const bool forward = region.same_sense != flipped;
   TopoDS_Face face;
@@ -90,7 +98,7 @@ TopoDS_Shape healed(const TopoDS_Shape& shape, double tolerance, const Handle(Sh
   const Handle(ShapeFix_Shape) fixer = new ShapeFix_Shape(shape);
   fixer->SetContext(context);
   fixer->SetPrecision(Precision::Confusion());
-  fixer->SetMaxTolerance(std::max(100 * tolerance, 1e-3));
+  fixer->SetMaxTolerance(tolerance);
   fixer->Perform();
   return fixer->Shape();
 }
@@ -117,7 +125,7 @@ Shell build_shell(const Trims& trims, double tolerance) {
     if (!raw.back().IsNull()) builder.Add(shell, raw.back());
   }
   const Handle(ShapeBuild_ReShape) context = new ShapeBuild_ReShape;
-  result.shape = healed(shell, tolerance, context);
+  result.shape = healed(shell, kLargestGap * trims.diagonal, context);
   BRepLib::SameParameter(result.shape, Precision::Confusion(), true);
   BRepLib::UpdateTolerances(result.shape);
   for (std::size_t r = 0; r < raw.size(); ++r) {

@@ -17,7 +17,7 @@ struct Shell {
   std::vector<std::string> flaws;   // of each region, what is wrong with its face; empty if nothing is
 };
 
-// `tolerance` is how far an edge may be from the surfaces' common curve.
+// The tolerance is that of make_edges.
 Shell build_shell(const Trims& trims, double tolerance);
 
 }  // namespace bisector::step

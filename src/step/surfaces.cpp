@@ -19,6 +19,7 @@
 #include <Geom_TrimmedCurve.hxx>
 #include <TColgp_Array2OfPnt.hxx>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <gp_Ax3.hxx>
 #include <numbers>
@@ -41,56 +42,84 @@ Vec3 mean_of(const std::vector<Vec3>& points) {
   return points.empty() ? sum : (1 / static_cast<double>(points.size())) * sum;
 }
 
-// The direction across the axis where the widest gap between the points' directions is: the seam's place.
-Vec3 away_from(const std::vector<Vec3>& points, const Vec3& centre, const Vec3& axis) {
+// The widest range of directions across an axis that the loops leave out.
+struct Gap {
+  double middle = 0, width = 2 * std::numbers::pi;  // radians, from the first of the axes across
+};
+
+Gap widest_gap(const std::vector<std::vector<Vec3>>& loops, const Vec3& centre, const Vec3& axis) {
+  constexpr double kTurn = 2 * std::numbers::pi;
   const auto [u, v] = frame_across(axis);
-  std::vector<double> angles;
-  for (const Vec3& p : points) {
-    const double x = dot(p - centre, u), y = dot(p - centre, v);
-    if (x != 0 || y != 0) angles.push_back(std::atan2(y, x));
-  }
-  if (angles.empty()) return u;
-  std::sort(angles.begin(), angles.end());
-  double widest = angles.front() + 2 * std::numbers::pi - angles.back(), at = angles.back();
-  for (std::size_t k = 1; k < angles.size(); ++k)
-    if (angles[k] - angles[k - 1] > widest) {
-      widest = angles[k] - angles[k - 1];
-      at = angles[k - 1];
+  // Arcs from the lower to the higher direction, the start in [0, 2 pi).
+  std::vector<std::array<double, 2>> arcs;
+  for (const std::vector<Vec3>& loop : loops)
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const Vec3 p = loop[i] - centre, q = loop[(i + 1) % loop.size()] - centre;
+      const double from = std::atan2(dot(p, v), dot(p, u));
+      const double turn = std::remainder(std::atan2(dot(q, v), dot(q, u)) - from, kTurn);
+      const double low = std::min(from, from + turn), start = low - kTurn * std::floor(low / kTurn);
+      arcs.push_back({start, start + std::abs(turn)});
     }
-  const double middle = at + 0.5 * widest;
-  return std::cos(middle) * u + std::sin(middle) * v;
+  if (arcs.empty()) return {};
+  std::sort(arcs.begin(), arcs.end());
+  double reach = 0;
+  for (const auto& [from, to] : arcs) reach = std::max(reach, to - kTurn);
+  Gap gap{0, 0};
+  arcs.push_back({arcs.front()[0] + kTurn, 0});
+  reach = std::max(reach, arcs.front()[0]);
+  for (const auto& [from, to] : arcs) {
+    if (from - reach > gap.width) gap = {0.5 * (from + reach), from - reach};
+    reach = std::max(reach, to);
+  }
+  return gap;
 }
 
-// A frame about an axis whose x direction, where seams lie, is away from the points.
-gp_Ax3 frame(const Vec3& centre, const Vec3& axis, const std::vector<Vec3>& points) {
-  return {point(centre), direction(axis), direction(away_from(points, centre, axis))};
+// A frame about an axis whose x direction, where seams lie, is away from the outline.
+gp_Ax3 frame(const Vec3& centre, const Vec3& axis, const Outline& outline) {
+  const double seam = widest_gap(outline.loops, centre, axis).middle;
+  const auto [u, v] = frame_across(axis);
+  return {point(centre), direction(axis), direction(std::cos(seam) * u + std::sin(seam) * v)};
 }
 
-Handle(Geom_Surface) surface_of(const Plane& s, const std::vector<Vec3>& border) {
-  const Vec3 middle = mean_of(border);
+Handle(Geom_Surface) surface_of(const Plane& s, const Outline& outline) {
+  const Vec3 middle = mean_of(outline.points);
   return new Geom_Plane(point(middle - (dot(s.normal, middle) - s.offset) * s.normal), direction(s.normal));
 }
 
-Handle(Geom_Surface) surface_of(const Sphere& s, const std::vector<Vec3>& border) {
-  // Poles across the middle of a piece are off it.
-  const Vec3 middle = unit(mean_of(border) - s.centre);
-  const Vec3 axis = border.empty() || norm(middle) == 0 ? Vec3{0, 0, 1} : perpendicular(middle);
-  return new Geom_SphericalSurface(frame(s.centre, axis, border), s.radius);
+// Twice the vector area of a surface that the loop bounds.
+Vec3 vector_area(const std::vector<Vec3>& loop) {
+  Vec3 sum;
+  for (std::size_t i = 2; i < loop.size(); ++i) sum += twice_area_normal(loop[0], loop[i - 1], loop[i]);
+  return sum;
 }
 
-Handle(Geom_Surface) surface_of(const Cylinder& s, const std::vector<Vec3>& border) {
-  const Vec3 at = s.point + dot(mean_of(border) - s.point, s.axis) * s.axis;
-  return new Geom_CylindricalSurface(frame(at, s.axis, border), s.radius);
+// A piece with one loop that is smaller than a hemisphere has its poles and seam off it. Other pieces are about an axis
+// through their loops.
+Handle(Geom_Surface) surface_of(const Sphere& s, const Outline& outline) {
+  Vec3 axis{0, 0, 1};
+  if (outline.loops.size() == 1 && outline.area < 2 * std::numbers::pi * s.radius * s.radius) {
+    const Vec3 middle = unit(mean_of(outline.points) - s.centre);
+    if (norm2(middle) > 0) axis = perpendicular(middle);
+  } else if (!outline.loops.empty()) {
+    const Vec3 around = unit(vector_area(outline.loops[0]));
+    if (norm2(around) > 0) axis = around;
+  }
+  return new Geom_SphericalSurface(frame(s.centre, axis, outline), s.radius);
 }
 
-Handle(Geom_Surface) surface_of(const Cone& s, const std::vector<Vec3>& border) {
-  const double height = std::max(0.0, dot(mean_of(border) - s.apex, s.axis));
-  return new Geom_ConicalSurface(frame(s.apex + height * s.axis, s.axis, border), s.angle,
+Handle(Geom_Surface) surface_of(const Cylinder& s, const Outline& outline) {
+  const Vec3 at = s.point + dot(mean_of(outline.points) - s.point, s.axis) * s.axis;
+  return new Geom_CylindricalSurface(frame(at, s.axis, outline), s.radius);
+}
+
+Handle(Geom_Surface) surface_of(const Cone& s, const Outline& outline) {
+  const double height = std::max(0.0, dot(mean_of(outline.points) - s.apex, s.axis));
+  return new Geom_ConicalSurface(frame(s.apex + height * s.axis, s.axis, outline), s.angle,
                                  height * std::tan(s.angle));
 }
 
-Handle(Geom_Surface) surface_of(const Torus& s, const std::vector<Vec3>& border) {
-  return new Geom_ToroidalSurface(frame(s.centre, s.axis, border), s.radius, s.minor_radius);
+Handle(Geom_Surface) surface_of(const Torus& s, const Outline& outline) {
+  return new Geom_ToroidalSurface(frame(s.centre, s.axis, outline), s.radius, s.minor_radius);
 }
 
 // Extent of points along an axis from a centre, with a margin.
@@ -108,9 +137,12 @@ Range range_along(const std::vector<Vec3>& points, const Vec3& centre, const Vec
 }
 
 // A quadric of revolution about z with unit lengths, made by turning a curve in the half-plane of `seam` and z, and
-// stretched along the quadric's axes.
-Handle(Geom_Surface) stretched(const GeneralQuadric& q, const Handle(Geom_Curve) & profile, const Vec3& scale) {
-  const Handle(Geom_SurfaceOfRevolution) turned = new Geom_SurfaceOfRevolution(profile, gp_Ax1());
+// stretched along the quadric's axes. On both sides of the seam an angle is left out.
+Handle(Geom_Surface) stretched(const GeneralQuadric& q, const Handle(Geom_Curve) & profile, const Vec3& scale,
+                               double left_out) {
+  Handle(Geom_Surface) turned = new Geom_SurfaceOfRevolution(profile, gp_Ax1());
+  if (left_out > 0)
+    turned = new Geom_RectangularTrimmedSurface(turned, left_out, 2 * std::numbers::pi - left_out, true);
   const Handle(Geom_BSplineSurface) spline = GeomConvert::SurfaceToBSplineSurface(turned);
   for (int i = 1; i <= spline->NbUPoles(); ++i)
     for (int j = 1; j <= spline->NbVPoles(); ++j) {
@@ -137,49 +169,55 @@ Handle(Geom_Surface) saddle(const GeneralQuadric& q, const std::vector<Vec3>& bo
   return GeomConvert::SurfaceToBSplineSurface(new Geom_BezierSurface(poles));
 }
 
-Handle(Geom_Surface) surface_of(const GeneralQuadric& q, const std::vector<Vec3>& border) {
+Handle(Geom_Surface) surface_of(const GeneralQuadric& q, const Outline& outline) {
+  const std::vector<Vec3>& border = outline.points;
   const auto [a, b, c] = q.lengths;
-  // In the coordinates that `stretched` turns in, with the seam off the border.
-  std::vector<Vec3> local;
   const bool is_paraboloid = q.type == SurfaceType::elliptic_paraboloid;
   const Vec3 scale{is_paraboloid ? std::sqrt(a) : a, is_paraboloid ? std::sqrt(b) : b, c > 0 ? c : 1};
-  for (const Vec3& p : border) {
-    const Vec3 v = p - q.centre;
-    local.push_back({dot(v, q.axes[0]) / scale.x, dot(v, q.axes[1]) / scale.y, dot(v, q.axes[2])});
+  // In the coordinates that `stretched` turns in, with the seam off the border.
+  std::vector<std::vector<Vec3>> local;
+  for (const std::vector<Vec3>& loop : outline.loops) {
+    std::vector<Vec3>& scaled = local.emplace_back();
+    for (const Vec3& p : loop)
+      scaled.push_back({dot(p - q.centre, q.axes[0]) / scale.x, dot(p - q.centre, q.axes[1]) / scale.y, 0});
   }
-  const Vec3 seam = away_from(local, {}, {0, 0, 1});
+  const Gap gap = widest_gap(local, {}, {0, 0, 1});
+  const auto [first, second] = frame_across({0, 0, 1});
+  const Vec3 seam = std::cos(gap.middle) * first + std::sin(gap.middle) * second;
+  // A piece of an ellipsoid may be all but what its loop encloses; what is around a gap of others is not theirs.
+  const double left_out = q.type == SurfaceType::ellipsoid ? 0 : (0.5 - kMargin) * gap.width;
   const gp_Dir x(seam.x, seam.y, 0), z(0, 0, 1);
   const Range heights = range_along(border, q.centre, q.axes[2]);
   const gp_Ax2 across(gp_Pnt(), x.Crossed(z), x);  // x and z are its axes
   switch (q.type) {
     case SurfaceType::ellipsoid: {
       const Handle(Geom_Circle) circle = new Geom_Circle(across, 1);
-      return stretched(q, new Geom_TrimmedCurve(circle, -std::numbers::pi / 2, std::numbers::pi / 2), scale);
+      return stretched(q, new Geom_TrimmedCurve(circle, -std::numbers::pi / 2, std::numbers::pi / 2), scale, left_out);
     }
     case SurfaceType::one_sheet_hyperboloid: {
       // x^2 - z^2 = 1: (cosh t, sinh t).
       const Handle(Geom_Hyperbola) curve = new Geom_Hyperbola(across, 1, 1);
       return stretched(q, new Geom_TrimmedCurve(curve, std::asinh(heights.low / c), std::asinh(heights.high / c)),
-                       scale);
+                       scale, left_out);
     }
     case SurfaceType::two_sheet_hyperboloid: {
       const bool is_upper = heights.low + heights.high > 0;
       const double farthest = std::max(1.0, (is_upper ? heights.high : -heights.low) / c);
       const Handle(Geom_Hyperbola) curve =
           new Geom_Hyperbola(gp_Ax2(gp_Pnt(), is_upper ? z.Crossed(x) : x.Crossed(z), is_upper ? z : z.Reversed()), 1, 1);
-      return stretched(q, new Geom_TrimmedCurve(curve, 0, std::acosh(farthest) + kMargin), scale);
+      return stretched(q, new Geom_TrimmedCurve(curve, 0, std::acosh(farthest) + kMargin), scale, left_out);
     }
     case SurfaceType::elliptic_cone: {
       const bool is_upper = heights.low + heights.high > 0;
       const double farthest = is_upper ? heights.high : -heights.low;
       const gp_Dir along(seam.x, seam.y, is_upper ? 1 : -1);
       const Handle(Geom_Line) line = new Geom_Line(gp_Pnt(), along);
-      return stretched(q, new Geom_TrimmedCurve(line, 0, std::numbers::sqrt2 * farthest), scale);
+      return stretched(q, new Geom_TrimmedCurve(line, 0, std::numbers::sqrt2 * farthest), scale, left_out);
     }
     case SurfaceType::elliptic_paraboloid: {
       // x^2 = 2 z with the focal length 1/2, and lengths that are radii of curvature.
       const Handle(Geom_Parabola) curve = new Geom_Parabola(gp_Ax2(gp_Pnt(), z.Crossed(x), z), 0.5);
-      return stretched(q, new Geom_TrimmedCurve(curve, 0, std::sqrt(2 * std::max(heights.high, 0.0))), scale);
+      return stretched(q, new Geom_TrimmedCurve(curve, 0, std::sqrt(2 * std::max(heights.high, 0.0))), scale, left_out);
     }
     case SurfaceType::hyperbolic_paraboloid: return saddle(q, border);
     case SurfaceType::elliptic_cylinder: {
@@ -204,8 +242,8 @@ Handle(Geom_Surface) surface_of(const GeneralQuadric& q, const std::vector<Vec3>
 
 }  // namespace
 
-Handle(Geom_Surface) make_surface(const Primitive& surface, const std::vector<Vec3>& border, bool& flipped) {
-  const Handle(Geom_Surface) made = std::visit([&](const auto& s) { return surface_of(s, border); }, surface);
+Handle(Geom_Surface) make_surface(const Primitive& surface, const Outline& outline, bool& flipped) {
+  const Handle(Geom_Surface) made = std::visit([&](const auto& s) { return surface_of(s, outline); }, surface);
   flipped = false;
   if (made.IsNull()) return made;
   double u0, u1, v0, v1;

@@ -9,10 +9,16 @@
 
 namespace bisector::step {
 
-// The surface, large enough for a region with these points on its border: a plane, cylinder, cone, sphere or torus as
+struct Outline {
+  std::vector<std::vector<Vec3>> loops;
+  std::vector<Vec3> points;  // of all loops
+  double area = 0;           // of the region
+};
+
+// The surface, large enough for a region with this outline: a plane, cylinder, cone, sphere or torus as
 // such, general cylinders as extrusions and other quadrics as exact rational B-splines. Its normal (du x dv) points where
-// the primitive's own does if `flipped` comes back false. Seams and poles are far from the points where that can be had.
+// the primitive's own does if `flipped` comes back false. Seams and poles are far from the outline where that can be had.
 // Null for a pair of planes.
-Handle(Geom_Surface) make_surface(const Primitive& surface, const std::vector<Vec3>& border, bool& flipped);
+Handle(Geom_Surface) make_surface(const Primitive& surface, const Outline& outline, bool& flipped);
 
 }  // namespace bisector::step
