@@ -245,8 +245,8 @@ void run(const Options& options) {
   if (options.spread > 0)
     table.columns = {"model", "surfaces", "start", "proxies", "runs", "rms least", "rms median", "rms most", "total"};
   else if (options.polygons)
-    table.columns = {"model", "method", "polygons", "vertices", "triangles", "rms to", "rms from", "largest", "manifold",
-                     "Euler (input)", "self-intersections", "seconds"};
+    table.columns = {"model",    "method",  "polygons", "vertices",      "triangles",          "rms to",
+                     "rms from", "largest", "manifold", "Euler (input)", "self-intersections", "seconds"};
   else
     table.columns = {"model",     "triangles", "surfaces",   "start",           "regions", "total",
                      "starting",  "Lloyd",     "post",       "rms unsmoothed",  "rms",     "projected",

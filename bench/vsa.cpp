@@ -40,10 +40,10 @@ CgalPolygons polygons(Mesh& mesh, const Metric& metric, std::size_t proxies, std
   Approximation<Metric> approximation(mesh, get(CGAL::vertex_point, mesh), metric);
   CgalPolygons result;
   result.labels = find_regions(mesh, approximation, proxies, iterations);
-  result.manifold = chord > 0 ? approximation.extract_mesh(np::subdivision_ratio(Kernel::FT(chord))
-                                                               .relative_to_chord(true)
-                                                               .with_dihedral_angle(true))
-                              : approximation.extract_mesh(np::all_default());
+  result.manifold =
+      chord > 0 ? approximation.extract_mesh(
+                      np::subdivision_ratio(Kernel::FT(chord)).relative_to_chord(true).with_dihedral_angle(true))
+                : approximation.extract_mesh(np::all_default());
   std::vector<Kernel::Point_3> anchors;
   std::vector<std::array<std::size_t, 3>> triangles;
   approximation.output(np::anchors(std::back_inserter(anchors)).triangles(std::back_inserter(triangles)));
@@ -85,8 +85,7 @@ std::vector<Index> cgal_regions(const TriangleMesh& input, std::size_t proxies, 
 CgalPolygons cgal_polygons(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, bool l21,
                            double chord) {
   Mesh mesh = converted(input);
-  return with_metric(mesh, l21,
-                     [&](const auto& metric) { return polygons(mesh, metric, proxies, iterations, chord); });
+  return with_metric(mesh, l21, [&](const auto& metric) { return polygons(mesh, metric, proxies, iterations, chord); });
 }
 
 }  // namespace bisector::bench

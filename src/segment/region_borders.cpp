@@ -83,8 +83,11 @@ class Measurer {
       const double length = norm(q - p);
       chain.length += length;
       if (chain.right == kNone) continue;
-      const Vec3 along = unit(q - p), middle = 0.5 * (p + q);
-      surfaces += length * angle_between(facing_normal(chain.left, middle), facing_normal(chain.right, middle), along);
+      const Vec3 along = unit(q - p);
+      // At the vertices, for between them edges are off curved surfaces.
+      for (const Vec3& end : {p, q})
+        surfaces +=
+            0.5 * length * angle_between(facing_normal(chain.left, end), facing_normal(chain.right, end), along);
       triangles += length * angle_between(twice_normals_[h / 3], twice_normals_[followed_.twins.twin[h] / 3], along);
     }
     if (chain.right == kNone || !(chain.length > 0)) return;

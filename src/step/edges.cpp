@@ -1,8 +1,8 @@
 #include "step/edges.h"
 
 #include <BRep_Builder.hxx>
-#include <ElCLib.hxx>
 #include <Eigen/Eigenvalues>
+#include <ElCLib.hxx>
 #include <GC_MakeArcOfCircle.hxx>
 #include <GeomAPI_PointsToBSpline.hxx>
 #include <GeomAPI_ProjectPointOnCurve.hxx>
@@ -28,8 +28,8 @@
 namespace bisector::step {
 namespace {
 
-constexpr int kSamples = 32;          // of a curve, to see whether it is on the surfaces, at least
-constexpr double kTolerance = 1e-5;   // of the diagonal, for surfaces that are exact
+constexpr int kSamples = 32;         // of a curve, to see whether it is on the surfaces, at least
+constexpr double kTolerance = 1e-5;  // of the diagonal, for surfaces that are exact
 
 gp_Pnt point(const Vec3& p) { return {p.x, p.y, p.z}; }
 Vec3 vector(const gp_Pnt& p) { return {p.X(), p.Y(), p.Z()}; }
@@ -50,9 +50,9 @@ class EdgeMaker {
     TopoDS_Edge edge;
     builder.MakeEdge(edge, curve.geometry, Precision::Confusion());
     builder.Add(edge, vertex_at(chain.vertices.front(), points.front(), curve, curve.first).Oriented(TopAbs_FORWARD));
-    builder.Add(edge, vertex_at(chain.closed ? chain.vertices.front() : chain.vertices.back(), points.back(), curve,
-                                curve.last)
-                          .Oriented(TopAbs_REVERSED));
+    builder.Add(
+        edge, vertex_at(chain.closed ? chain.vertices.front() : chain.vertices.back(), points.back(), curve, curve.last)
+                  .Oriented(TopAbs_REVERSED));
     builder.Range(edge, curve.first, curve.last);
     return edge;
   }
@@ -115,10 +115,10 @@ class EdgeMaker {
 
   Curve curve_through(const std::vector<Vec3>& points, const Chain& chain) {
     // Where more than two surfaces meet, they need not do so in one point.
-    surface_tolerance_ = tolerance_of(chain);
+    double gap = 0;
     for (const Vec3& end : {points.front(), points.back()})
-      for (const Index r : chain.regions)
-        surface_tolerance_ = std::max(surface_tolerance_, distance(trims_.regions[r].surface, end));
+      for (const Index r : chain.regions) gap = std::max(gap, distance(trims_.regions[r].surface, end));
+    surface_tolerance_ = tolerance_of(chain) + gap;
     // Between two surfaces these tell where the curve runs, and where they do not, the mesh knows it up to an edge.
     point_tolerance_ = chain.regions.size() == 2 ? std::max(surface_tolerance_, spread_of(chain)) : surface_tolerance_;
     if (const std::optional<Curve> line = as_line(points, chain)) return *line;
@@ -147,7 +147,13 @@ class EdgeMaker {
         dense[k] = vector(curve->geometry->Value(curve->first + static_cast<double>(k) / static_cast<double>(count) *
                                                                     (curve->last - curve->first)));
     }
-    for (std::size_t k = 1; k + 1 < dense.size(); ++k) dense[k] = meet(dense[k], regions, spread);
+    // The ends may be off both surfaces; the way there is spread over all points.
+    const Vec3 at_start = dense.front() - meet(dense.front(), regions, spread);
+    const Vec3 at_end = dense.back() - meet(dense.back(), regions, spread);
+    for (std::size_t k = 1; k + 1 < dense.size(); ++k) {
+      const double share = static_cast<double>(k) / static_cast<double>(dense.size() - 1);
+      dense[k] = meet(dense[k], regions, spread) + (1 - share) * at_start + share * at_end;
+    }
     return dense;
   }
 
@@ -283,7 +289,7 @@ class EdgeMaker {
   }
 
   const Trims& trims_;
-  const double tolerance_;  // 0: as the regions' distances demand
+  const double tolerance_;                              // 0: as the regions' distances demand
   double surface_tolerance_ = 0, point_tolerance_ = 0;  // of the chain at hand
   std::map<Index, Vec3> ends_;
   std::map<Index, TopoDS_Vertex> vertices_;

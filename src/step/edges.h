@@ -9,9 +9,9 @@
 namespace bisector::step {
 
 // An edge for each chain, with common vertices where chains meet: a line or an arc of a circle where that is within the
-// tolerance of both surfaces and near the chain, else a B-spline, at worst a polyline. It runs where the surfaces beside
-// the chain meet. The tolerance 0 stands for the larger root mean square distance of the two regions, at least 1e-5 of
-// the diagonal.
+// tolerance of both surfaces and near the chain, else a B-spline, at worst a polyline. It runs where the surfaces
+// beside the chain meet. The tolerance 0 stands for the larger root mean square distance of the two regions, at least
+// 1e-5 of the diagonal.
 std::vector<TopoDS_Edge> make_edges(const Trims& trims, double tolerance);
 
 }  // namespace bisector::step

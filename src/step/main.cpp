@@ -1,4 +1,6 @@
 // bisector-step: the surfaces of a segmentation as STEP or IGES.
+#include <fmt/format.h>
+#include <unistd.h>
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <IFSelect_ReturnStatus.hxx>
 #include <IGESControl_Controller.hxx>
@@ -10,8 +12,6 @@
 #include <STEPControl_Writer.hxx>
 #include <Standard_Failure.hxx>
 #include <TCollection_HAsciiString.hxx>
-#include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -36,7 +36,8 @@ struct Options {
 
 bool is_iges(const std::string& path) {
   std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
   if (extension == ".igs" || extension == ".iges") return true;
   if (extension == ".stp" || extension == ".step") return false;
   throw Error(fmt::format("{}: unknown format '{}'; use .step, .stp, .iges or .igs", path, extension));
@@ -78,8 +79,8 @@ void write_atomically(const TopoDS_Shape& shape, const Options& options) {
   }
   std::error_code ignored;
   fs::remove(temporary, ignored);
-  throw Error(fmt::format("{}: cannot be written; check the folder, its permissions and the free space",
-                          options.output));
+  throw Error(
+      fmt::format("{}: cannot be written; check the folder, its permissions and the free space", options.output));
 }
 
 void run(const Options& options) {
@@ -94,7 +95,7 @@ void run(const Options& options) {
                  name_of(type_of(trims.regions[r].surface)), shell.flaws[r]);
   }
   write_atomically(shell.shape, options);
-  const char* kind = shell.shape.ShapeType() == TopAbs_SOLID    ? "a solid"
+  const char* kind = shell.shape.ShapeType() == TopAbs_SOLID   ? "a solid"
                      : shell.shape.ShapeType() == TopAbs_SHELL ? "a shell"
                                                                : "faces";
   fmt::print("written    {}: {} of {} faces, {} sound\n", options.output, kind, shell.faces.size(), sound);

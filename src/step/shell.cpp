@@ -1,5 +1,6 @@
 #include "step/shell.h"
 
+#include <fmt/format.h>
 #include <BRepBuilderAPI_MakeFace.hxx>
 #include <BRepBuilderAPI_MakeSolid.hxx>
 #include <BRepBuilderAPI_Sewing.hxx>
@@ -21,9 +22,10 @@
 #include <TopoDS_Shell.hxx>
 #include <TopoDS_Solid.hxx>
 #include <TopoDS_Wire.hxx>
-#include <cmath>
 
-#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+#include <variant>
 
 #include "step/edges.h"
 #include "step/surfaces.h"
@@ -50,9 +52,13 @@ Outline outline_of(const Trims& trims, const Region& region) {
 }
 
 // Trimmed by the region's loops, without curves in the surface's parameters. Null for a pair of planes.
-TopoDS_Face trimmed_face(const Trims& trims, const Region& region, const std::vector<TopoDS_Edge>& edges) {
+TopoDS_Face trimmed_face(const Trims& trims, const Region& region, const std::vector<TopoDS_Edge>& edges,
+                         bool as_patch) {
   bool flipped = false;
-  const Handle(Geom_Surface) surface = make_surface(region.surface, outline_of(trims, region), flipped);
+  const Outline outline = outline_of(trims, region);
+  const Handle(Geom_Surface) surface =
+      as_patch ? make_patch(std::get<GeneralQuadric>(region.surface), outline, region.same_sense, flipped)
+               : make_surface(region.surface, outline, flipped);
   if (surface.IsNull()) return {};
   const bool forward = region.same_sense != flipped;
   TopoDS_Face face;
@@ -111,17 +117,16 @@ TopoDS_Shape as_solid(const TopoDS_Shape& shell) {
   return solid;
 }
 
-}  // namespace
-
-Shell build_shell(const Trims& trims, double tolerance) {
+// Those of `as_patch` are height fields.
+Shell attempt(const Trims& trims, double tolerance, const std::vector<char>& as_patch) {
   const std::vector<TopoDS_Edge> edges = make_edges(trims, tolerance);
   Shell result;
   std::vector<TopoDS_Face> raw;
   BRep_Builder builder;
   TopoDS_Shell shell;
   builder.MakeShell(shell);
-  for (const Region& region : trims.regions) {
-    raw.push_back(trimmed_face(trims, region, edges));
+  for (std::size_t r = 0; r < trims.regions.size(); ++r) {
+    raw.push_back(trimmed_face(trims, trims.regions[r], edges, as_patch[r]));
     if (!raw.back().IsNull()) builder.Add(shell, raw.back());
   }
   const Handle(ShapeBuild_ReShape) context = new ShapeBuild_ReShape;
@@ -134,6 +139,24 @@ Shell build_shell(const Trims& trims, double tolerance) {
   }
   if (is_closed(result.shape)) result.shape = as_solid(result.shape);
   return result;
+}
+
+std::size_t sound_faces(const Shell& shell) {
+  return static_cast<std::size_t>(
+      std::count_if(shell.flaws.begin(), shell.flaws.end(), [](const std::string& flaw) { return flaw.empty(); }));
+}
+
+}  // namespace
+
+Shell build_shell(const Trims& trims, double tolerance) {
+  std::vector<char> as_patch(trims.regions.size(), 0);
+  Shell result = attempt(trims, tolerance, as_patch);
+  for (std::size_t r = 0; r < as_patch.size(); ++r)
+    as_patch[r] = !result.flaws[r].empty() && trims.regions[r].has_outer &&
+                  std::holds_alternative<GeneralQuadric>(trims.regions[r].surface);
+  if (std::count(as_patch.begin(), as_patch.end(), 1) == 0) return result;
+  Shell other = attempt(trims, tolerance, as_patch);
+  return sound_faces(other) > sound_faces(result) ? other : result;
 }
 
 }  // namespace bisector::step

@@ -1,11 +1,12 @@
 #include "step/surfaces.h"
 
+#include <GeomAPI_PointsToBSplineSurface.hxx>
 #include <GeomConvert.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_BezierSurface.hxx>
+#include <Geom_Circle.hxx>
 #include <Geom_ConicalSurface.hxx>
 #include <Geom_CylindricalSurface.hxx>
-#include <Geom_Circle.hxx>
 #include <Geom_Ellipse.hxx>
 #include <Geom_Hyperbola.hxx>
 #include <Geom_Line.hxx>
@@ -17,6 +18,7 @@
 #include <Geom_SurfaceOfRevolution.hxx>
 #include <Geom_ToroidalSurface.hxx>
 #include <Geom_TrimmedCurve.hxx>
+#include <Precision.hxx>
 #include <TColgp_Array2OfPnt.hxx>
 #include <algorithm>
 #include <array>
@@ -26,12 +28,14 @@
 #include <variant>
 
 #include "segment/primitive.h"
+#include "segment/quadric.h"
 #include "segment/surface_normal.h"
 
 namespace bisector::step {
 namespace {
 
-constexpr double kMargin = 0.1;  // of their extent, that unbounded surfaces go beyond the border
+constexpr double kMargin = 0.1;   // of their extent, that unbounded surfaces go beyond the border
+constexpr int kPatchPoints = 32;  // on each side of a height field
 
 gp_Pnt point(const Vec3& p) { return {p.x, p.y, p.z}; }
 gp_Dir direction(const Vec3& v) { return {v.x, v.y, v.z}; }
@@ -114,8 +118,7 @@ Handle(Geom_Surface) surface_of(const Cylinder& s, const Outline& outline) {
 
 Handle(Geom_Surface) surface_of(const Cone& s, const Outline& outline) {
   const double height = std::max(0.0, dot(mean_of(outline.points) - s.apex, s.axis));
-  return new Geom_ConicalSurface(frame(s.apex + height * s.axis, s.axis, outline), s.angle,
-                                 height * std::tan(s.angle));
+  return new Geom_ConicalSurface(frame(s.apex + height * s.axis, s.axis, outline), s.angle, height * std::tan(s.angle));
 }
 
 Handle(Geom_Surface) surface_of(const Torus& s, const Outline& outline) {
@@ -138,8 +141,8 @@ Range range_along(const std::vector<Vec3>& points, const Vec3& centre, const Vec
 
 // A quadric of revolution about z with unit lengths, made by turning a curve in the half-plane of `seam` and z, and
 // stretched along the quadric's axes. On both sides of the seam an angle is left out.
-Handle(Geom_Surface) stretched(const GeneralQuadric& q, const Handle(Geom_Curve) & profile, const Vec3& scale,
-                               double left_out) {
+Handle(Geom_Surface)
+    stretched(const GeneralQuadric& q, const Handle(Geom_Curve) & profile, const Vec3& scale, double left_out) {
   Handle(Geom_Surface) turned = new Geom_SurfaceOfRevolution(profile, gp_Ax1());
   if (left_out > 0)
     turned = new Geom_RectangularTrimmedSurface(turned, left_out, 2 * std::numbers::pi - left_out, true);
@@ -147,8 +150,9 @@ Handle(Geom_Surface) stretched(const GeneralQuadric& q, const Handle(Geom_Curve)
   for (int i = 1; i <= spline->NbUPoles(); ++i)
     for (int j = 1; j <= spline->NbVPoles(); ++j) {
       const gp_Pnt p = spline->Pole(i, j);
-      spline->SetPole(i, j, point(q.centre + (scale.x * p.X()) * q.axes[0] + (scale.y * p.Y()) * q.axes[1] +
-                                  (scale.z * p.Z()) * q.axes[2]));
+      spline->SetPole(i, j,
+                      point(q.centre + (scale.x * p.X()) * q.axes[0] + (scale.y * p.Y()) * q.axes[1] +
+                            (scale.z * p.Z()) * q.axes[2]));
     }
   return Handle(Geom_Surface)(spline);
 }
@@ -203,8 +207,8 @@ Handle(Geom_Surface) surface_of(const GeneralQuadric& q, const Outline& outline)
     case SurfaceType::two_sheet_hyperboloid: {
       const bool is_upper = heights.low + heights.high > 0;
       const double farthest = std::max(1.0, (is_upper ? heights.high : -heights.low) / c);
-      const Handle(Geom_Hyperbola) curve =
-          new Geom_Hyperbola(gp_Ax2(gp_Pnt(), is_upper ? z.Crossed(x) : x.Crossed(z), is_upper ? z : z.Reversed()), 1, 1);
+      const Handle(Geom_Hyperbola) curve = new Geom_Hyperbola(
+          gp_Ax2(gp_Pnt(), is_upper ? z.Crossed(x) : x.Crossed(z), is_upper ? z : z.Reversed()), 1, 1);
       return stretched(q, new Geom_TrimmedCurve(curve, 0, std::acosh(farthest) + kMargin), scale, left_out);
     }
     case SurfaceType::elliptic_cone: {
@@ -240,16 +244,12 @@ Handle(Geom_Surface) surface_of(const GeneralQuadric& q, const Outline& outline)
   }
 }
 
-}  // namespace
-
-Handle(Geom_Surface) make_surface(const Primitive& surface, const Outline& outline, bool& flipped) {
-  const Handle(Geom_Surface) made = std::visit([&](const auto& s) { return surface_of(s, outline); }, surface);
-  flipped = false;
-  if (made.IsNull()) return made;
+// Whether the normal of what was made is opposite to the primitive's own.
+bool is_flipped(const Handle(Geom_Surface) & made, const Primitive& surface) {
   double u0, u1, v0, v1;
   made->Bounds(u0, u1, v0, v1);
   const auto inside = [](double low, double high) {
-    const bool has_low = low > -1e50, has_high = high < 1e50;
+    const bool has_low = !Precision::IsNegativeInfinite(low), has_high = !Precision::IsPositiveInfinite(high);
     return has_low && has_high ? 0.37 * low + 0.63 * high : has_low ? low + 1 : has_high ? high - 1 : 0.5;
   };
   gp_Pnt p;
@@ -257,7 +257,42 @@ Handle(Geom_Surface) make_surface(const Primitive& surface, const Outline& outli
   made->D1(inside(u0, u1), inside(v0, v1), p, du, dv);
   const gp_Vec normal = du.Crossed(dv);
   const Vec3 own = surface_normal(surface, foot_point(surface, {p.X(), p.Y(), p.Z()}));
-  flipped = dot({normal.X(), normal.Y(), normal.Z()}, own) < 0;
+  return dot({normal.X(), normal.Y(), normal.Z()}, own) < 0;
+}
+
+// Where the line p + t along meets the quadric with a gradient that rises along it, or falls if `falls`. Where it
+// misses the quadric, the place where it is nearest to meeting it.
+double height_on(const Quadric& q, const Vec3& p, const Vec3& along, bool falls) {
+  const double c = value_of(q, p), b = dot(gradient_of(q, p), along);
+  const double a = value_of(q, p + along) - c - b;
+  const double root = (falls ? -1 : 1) * std::sqrt(std::max(0.0, b * b - 4 * a * c));
+  // Two forms of the same root: one of them has no difference of like numbers.
+  if (b * root > 0 || a == 0) return b + root != 0 ? -2 * c / (b + root) : 0;
+  return (root - b) / (2 * a);
+}
+
+}  // namespace
+
+Handle(Geom_Surface) make_patch(const GeneralQuadric& quadric, const Outline& outline, bool same_sense, bool& flipped) {
+  const Vec3 facing = unit(vector_area(outline.loops[0])), middle = mean_of(outline.points);
+  const auto [u, v] = frame_across(facing);
+  const Range x = range_along(outline.points, middle, u), y = range_along(outline.points, middle, v);
+  TColgp_Array2OfPnt points(1, kPatchPoints, 1, kPatchPoints);
+  for (int i = 0; i < kPatchPoints; ++i)
+    for (int j = 0; j < kPatchPoints; ++j) {
+      const double s = static_cast<double>(i) / (kPatchPoints - 1), t = static_cast<double>(j) / (kPatchPoints - 1);
+      const Vec3 p = middle + (x.low + s * (x.high - x.low)) * u + (y.low + t * (y.high - y.low)) * v;
+      points(i + 1, j + 1) = point(p + height_on(quadric.polynomial, p, facing, !same_sense) * facing);
+    }
+  GeomAPI_PointsToBSplineSurface made;
+  made.Interpolate(points);
+  flipped = is_flipped(made.Surface(), quadric);
+  return Handle(Geom_Surface)(made.Surface());
+}
+
+Handle(Geom_Surface) make_surface(const Primitive& surface, const Outline& outline, bool& flipped) {
+  const Handle(Geom_Surface) made = std::visit([&](const auto& s) { return surface_of(s, outline); }, surface);
+  flipped = !made.IsNull() && is_flipped(made, surface);
   return made;
 }
 

@@ -51,6 +51,7 @@ Region region_of(const Json& json) {
   Region region;
   region.surface = surface_of(json);
   region.same_sense = json.at("same_sense").get<bool>();
+  region.has_outer = json.at("has_outer").get<bool>();
   region.area = json.at("area").get<double>();
   region.rms = json.at("rms").get<double>();
   region.max = json.at("max").get<double>();
