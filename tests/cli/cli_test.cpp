@@ -1446,6 +1446,75 @@ TEST_F(CliSegment, EveryFormatHoldsTheSameRegions) {
   }
 }
 
+TEST_F(CliSegment, WritesPolygonsOfPlanes) {
+  for (const char* name : {"p.ply", "p.obj", "p.off"}) {
+    const Result result = run(segment({"--proxies", "6", "--surfaces", "planes", "--polygons", in(name)}));
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    EXPECT_NE(result.out.find(name), std::string::npos);
+    const TriangleMesh mesh = read_mesh(in(name));
+    EXPECT_EQ(mesh.vertices.size(), 8u);
+    EXPECT_EQ(mesh.triangles.size(), 12u);
+    EXPECT_EQ(mesh.face_of_triangle.back(), 5u);  // six polygons
+    EXPECT_EQ(mesh.labels.empty(), std::string(name) == "p.off");
+  }
+  EXPECT_NE(read_text(in("p.obj")).find("g region_3_plane\n"), std::string::npos);
+  ASSERT_EQ(run(segment({"--proxies", "6", "--polygons", in("p.off"), "--chord", "0.1", "--triangulate"})).code, 0);
+  EXPECT_TRUE(read_mesh(in("p.off")).face_of_triangle.empty());
+  // A ball of one region has no polygon.
+  const Result ball =
+      run({"segment", in("sphere.off"), "-o", in("out.ply"), "--proxies", "1", "--polygons", in("b.ply")});
+  EXPECT_EQ(ball.code, 0);
+  EXPECT_NE(ball.err.find("--surfaces planes"), std::string::npos) << ball.err;
+}
+
+TEST_F(CliSegment, WritesRegionsAsJson) {
+  const Result result = run(segment({"--proxies", "6", "--json", in("regions.json"), "--quiet"}));
+  ASSERT_EQ(result.code, 0) << result.err;
+  const Json json = Json::parse(read_text(in("regions.json")));
+  EXPECT_EQ(json["command"], "segment");
+  EXPECT_EQ(json["input"], in("box.ply"));
+  EXPECT_TRUE(json["warnings"].empty());
+  EXPECT_NEAR(json["diagonal"].get<double>(), std::sqrt(3.0), 1e-12);
+  const std::vector<Vec3> vertices = read_mesh(in("out.ply")).vertices;
+  const auto expect_points = [&](const Json& path) {
+    ASSERT_EQ(path["points"].size(), path["vertices"].size());
+    for (std::size_t i = 0; i < path["points"].size(); ++i) {
+      const Vec3& p = vertices[path["vertices"][i].get<std::size_t>()];
+      EXPECT_EQ(path["points"][i], Json::array({p.x, p.y, p.z}));
+    }
+  };
+  ASSERT_EQ(json["regions"].size(), 6u);
+  for (const Json& region : json["regions"]) {
+    EXPECT_EQ(region["type"], "plane");
+    EXPECT_EQ(region["euler"], 1);
+    EXPECT_EQ(region["has_outer"], true);
+    ASSERT_EQ(region["loops"].size(), 1u);
+    EXPECT_EQ(region["loops"][0]["chains"].size(), 4u);
+    EXPECT_NEAR(region["loops"][0]["length"].get<double>(), 4, 1e-12);
+    expect_points(region["loops"][0]);
+    // The box is in [0, 1], so that a face's plane is behind the middle if its normal points outward.
+    double middle = 0;
+    for (const Json& x : region["normal"]) middle += 0.5 * x.get<double>();
+    EXPECT_EQ(region["same_sense"].get<bool>(), middle < region["offset"].get<double>());
+  }
+  ASSERT_EQ(json["chains"].size(), 12u);
+  for (const Json& chain : json["chains"]) {
+    EXPECT_EQ(chain["kind"], "sharp");
+    EXPECT_EQ(chain["closed"], false);
+    EXPECT_NEAR(chain["length"].get<double>(), 1, 1e-12);
+    EXPECT_NEAR(chain["surface_angle"].get<double>(), 90, 1e-6);
+    EXPECT_NEAR(chain["mesh_angle"].get<double>(), 90, 1e-9);
+    EXPECT_LT(chain["left"].get<int>(), chain["right"].get<int>());
+    expect_points(chain);
+  }
+  ASSERT_EQ(json["adjacency"].size(), 12u);
+  for (const Json& meeting : json["adjacency"]) {
+    EXPECT_EQ(meeting["kind"], "sharp");
+    EXPECT_EQ(meeting["chains"].size(), 1u);
+  }
+}
+
 TEST_F(CliSegment, ProjectsOntoTheSurfaces) {
   TriangleMesh ball = test::icosphere(3);
   test::SplitMix64 random(1);
@@ -1479,10 +1548,12 @@ TEST_F(CliSegment, OutputDoesNotDependOnThreads) {
   std::vector<std::string> files;
   std::vector<Json> reports;
   for (const char* threads : {"1", "2"}) {
-    reports.push_back(timeless(report_of({"segment", in("sphere.off"), "-o", in("out.ply"), "--proxies", "5",
-                                          "--surfaces", "quadrics", "--start", "insertion", "--threads", threads,
-                                          "--report", "-", "--preview", in("out.png"), "--project"})));
-    files.push_back(read_text(in("out.ply")) + read_text(in("out.png")));
+    reports.push_back(timeless(report_of(
+        {"segment",   in("sphere.off"), "-o",        in("out.ply"), "--proxies", "5",        "--surfaces",
+         "quadrics",  "--start",        "insertion", "--threads",   threads,     "--report", "-",
+         "--preview", in("out.png"),    "--project", "--polygons",  in("p.ply"), "--json",   in("regions.json")})));
+    files.push_back(read_text(in("out.ply")) + read_text(in("out.png")) + read_text(in("p.ply")) +
+                    read_text(in("regions.json")));
   }
   EXPECT_EQ(reports[0], reports[1]);
   EXPECT_TRUE(files[0] == files[1]);
@@ -1498,6 +1569,10 @@ TEST_F(CliSegment, BadUsage) {
   expect_failure(2, segment({"--random-seed", "3"}), "--random-seed");
   expect_failure(2, segment({"--random-seed", "-3", "--start", "insertion"}), "--random-seed");
   expect_failure(2, segment({"--smooth", "0", "--fuzzy-rings", "2"}), "--fuzzy-rings");
+  expect_failure(2, segment({"--triangulate"}), "--polygons");
+  expect_failure(2, segment({"--chord", "0.1"}), "--polygons");
+  for (const char* r : {"0", "-1", "nan", "x"})
+    expect_failure(2, segment({"--polygons", in("p.ply"), "--chord", r}), "--chord");
   expect_failure(2, {"segment", in("box.ply")}, "-o");
   expect_failure(2, {"segment"}, "IN");
 }
@@ -1518,6 +1593,8 @@ TEST_F(CliSegment, BadInputIsOneLine) {
   expect_failure(1, {"segment", in("missing.off"), "-o", in("out.ply")}, "missing.off");
   expect_failure(1, {"segment", in("box.ply"), "-o", in("out.msh")}, "format");
   expect_failure(1, segment({"--preview", in("out.jpg")}), "format");
+  expect_failure(1, segment({"--polygons", in("p.stl")}), "format");
+  expect_failure(1, segment({"--json", in("regions.txt")}), "format");
   expect_failure(1, segment({"--report", in("out.ply")}), "two outputs");
 }
 

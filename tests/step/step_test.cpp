@@ -113,14 +113,25 @@ std::string type_in_step(const std::string& type) {
   return "other";
 }
 
-// Each region has a face of its type and area, whatever their order.
-void expect_faces(const Json& regions, const std::vector<Face>& faces, double tolerance) {
+struct Expected {
+  std::string type;
+  double area;
+};
+
+std::vector<Expected> regions_of(const Json& json) {
+  std::vector<Expected> regions;
+  for (const Json& region : json["regions"]) regions.push_back({type_in_step(region["type"]), region["area"]});
+  return regions;
+}
+
+// Each region has a face of its type and area, whatever their order, and all together have the area of all regions.
+void expect_faces(const std::vector<Expected>& regions, const std::vector<Face>& faces, double tolerance) {
   ASSERT_EQ(faces.size(), regions.size());
   std::map<std::string, std::vector<double>> expected, found;
   double area = 0, sum = 0;
-  for (const Json& region : regions) {
-    expected[type_in_step(region["type"])].push_back(region["area"]);
-    area += region["area"].get<double>();
+  for (const Expected& region : regions) {
+    expected[region.type].push_back(region.area);
+    area += region.area;
   }
   for (const Face& face : faces) {
     found[face.type].push_back(face.area);
@@ -144,7 +155,16 @@ TEST_F(Step, GeneratedPartsAreSolids) {
     EXPECT_TRUE(BRepCheck_Analyzer(shape).IsValid());
     const std::vector<Face> faces = faces_of(shape);
     for (const Face& face : faces) EXPECT_TRUE(face.valid) << face.type;
-    expect_faces(json["regions"], faces, 0.03);
+    // The true surfaces have areas that are known; those of the triangles in them are smaller.
+    std::vector<Expected> exact;
+    for (std::size_t k = 0; k < model.primitives.size(); ++k)
+      exact.push_back({type_in_step(name_of(type_of(model.primitives[k]))), model.areas[k]});
+    expect_faces(exact, faces, 0.01);
+    double area = 0;
+    for (const Face& face : faces) area += face.area;
+    double of_regions = 0;
+    for (const Expected& region : regions_of(json)) of_regions += region.area;
+    EXPECT_NEAR(area, of_regions, 0.01 * of_regions);
     GProp_GProps properties;
     BRepGProp::VolumeProperties(shape, properties);
     const double volume = test::enclosed_volume(model.mesh);
@@ -169,7 +189,12 @@ TEST_F(Step, FandiskHasItsSurfaces) {
   if (path.empty()) GTEST_SKIP() << "no fandisk";
   const Json json = segment(read_mesh(path), "--proxies 22");
   ASSERT_EQ(convert("fandisk.step"), 0);
-  expect_faces(json["regions"], faces_of(read_step("fandisk.step")), 0.1);
+  const std::vector<Face> faces = faces_of(read_step("fandisk.step"));
+  expect_faces(regions_of(json), faces, 0.1);
+  // Where surfaces touch along a band, border and intersection differ, and a few faces may come out crossing
+  // themselves.
+  const auto valid = std::count_if(faces.begin(), faces.end(), [](const Face& face) { return face.valid; });
+  EXPECT_GE(static_cast<double>(valid), 0.8 * static_cast<double>(faces.size()));
 }
 
 TEST_F(Step, WholeSurfacesAndIges) {
