@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "bisector/error.h"
+#include "bisector/quality.h"
 #include "bisector/region_borders.h"
 #include "core/disjoint_sets.h"
 #include "core/grouping.h"
@@ -24,8 +25,11 @@
 namespace bisector {
 namespace {
 
-// A region whose corners fold it gets its vertices back towards the mesh, by halves.
+// Where corners fold a region or make polygons cross, vertices go back towards the mesh, by halves.
 constexpr int kHalvings = 4;
+// And regions that stay folded get more corners.
+constexpr int kRefinements = 6;
+constexpr double kFinerChord = 0.5;
 
 using Edge = std::array<Index, 2>;
 
@@ -33,8 +37,7 @@ class Polygoniser {
  public:
   Polygoniser(const TriangleMesh& mesh, const SegmentResult& segmentation, const PolygoniseOptions& options)
       : mesh_(mesh), segmentation_(segmentation), options_(options), borders_(region_borders(mesh, segmentation)),
-        positions_(mesh.vertices), kept_(mesh.vertices.size(), 0), regions_(segmentation.regions.size()) {
-    coarse_ = {borders_.triangles, segmentation.labels};
+        positions_(mesh.vertices), fixed_(mesh.vertices.size(), 0), regions_(segmentation.regions.size()) {
     for (std::size_t r = 0; r < regions_.size(); ++r) {
       const auto* plane = std::get_if<Plane>(&segmentation.regions[r].proxy);
       if (plane == nullptr) continue;
@@ -46,13 +49,9 @@ class Polygoniser {
   PolygonisedMesh run() {
     keep_curved_and_non_manifold();
     place_vertices();
-    keep_anchors();
-    std::vector<Vec3> normals;
-    for (const Region& region : regions_) normals.push_back(region.normal);
-    collapse_vertices(positions_, kept_, normals, coarse_);
-    find_loops();
-    fill_regions();
-    for (int k = 0; k < kHalvings && draw_back(k + 1 == kHalvings); ++k) fill_regions();
+    const std::vector<Vec3> placed = positions_;
+    simplify();
+    if (folded() > 0) refine(placed);
     separate_edges();
     return result();
   }
@@ -64,20 +63,67 @@ class Polygoniser {
     std::vector<std::vector<Index>> loops;
     std::vector<Triangle> triangles;
     bool has_handles = false, is_folded = false;
+    double chord = 1;  // share of the options'
   };
+
+  // Regions that their corners fold get more of them. Those that stay folded get none, and if
+  // all this gives more faces than before, it is undone.
+  void refine(const std::vector<Vec3>& placed) {
+    const std::vector<Vec3> positions = positions_;
+    const std::vector<Region> regions = regions_;
+    const LabelledTriangles coarse = coarse_;
+    const std::size_t before = faces();
+    const auto simplify_with = [&](double factor) {
+      for (Region& region : regions_)
+        if (region.is_folded) region.chord = std::min(1.0, factor * region.chord);
+      positions_ = placed;
+      simplify();
+    };
+    for (int k = 0; k < kRefinements && folded() > 0; ++k) simplify_with(kFinerChord);
+    if (folded() > 0) simplify_with(1 / std::pow(kFinerChord, kRefinements));
+    if (faces() < before) return;
+    positions_ = positions;
+    regions_ = regions;
+    coarse_ = coarse;
+  }
+
+  void simplify() {
+    kept_ = fixed_;
+    coarse_ = {borders_.triangles, segmentation_.labels};
+    keep_anchors();
+    std::vector<Vec3> normals;
+    for (const Region& region : regions_) normals.push_back(region.normal);
+    collapse_vertices(positions_, kept_, normals, coarse_);
+    find_loops();
+    fill_regions();
+    for (int k = 0; k < kHalvings && draw_back(k + 1 == kHalvings); ++k) fill_regions();
+  }
+
+  // But for holes: one for each region, or as many as it has triangles.
+  std::size_t faces() const {
+    std::size_t count = 0;
+    for (const Region& region : regions_) count += region.plane && !region.is_folded ? 1 : region.triangles.size();
+    return count;
+  }
+
+  std::size_t folded() const {
+    return static_cast<std::size_t>(
+        std::count_if(regions_.begin(), regions_.end(), [](const Region& region) { return region.is_folded; }));
+  }
 
   // Other surfaces keep their triangles, and so does what is no manifold.
   void keep_curved_and_non_manifold() {
     const std::size_t n = positions_.size();
-    for (std::size_t t = 0; t < coarse_.triangles.size(); ++t)
-      if (!regions_[coarse_.labels[t]].plane)
-        for (const Index v : coarse_.triangles[t]) kept_[v] = 1;
-    const HalfEdgeTwins twins = half_edge_twins(coarse_.triangles, n);
-    DisjointSets<std::size_t> fans(3 * coarse_.triangles.size());
+    const std::vector<Triangle>& triangles = borders_.triangles;
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+      if (!regions_[segmentation_.labels[t]].plane)
+        for (const Index v : triangles[t]) fixed_[v] = 1;
+    const HalfEdgeTwins twins = half_edge_twins(triangles, n);
+    DisjointSets<std::size_t> fans(3 * triangles.size());
     for (std::size_t h = 0; h < twins.twin.size(); ++h) {
       if (twins.twin[h] == kNoTwin) {
         if (twins.is_single[h]) continue;
-        for (const std::size_t end : {h, next_half_edge(h)}) kept_[origin(coarse_.triangles, end)] = 1;
+        for (const std::size_t end : {h, next_half_edge(h)}) fixed_[origin(triangles, end)] = 1;
       } else {
         fans.join(h, next_half_edge(twins.twin[h]));
       }
@@ -85,12 +131,11 @@ class Polygoniser {
     // More than one fan of triangles.
     std::vector<char> seen(n, 0);
     for (std::size_t h = 0; h < twins.twin.size(); ++h)
-      if (fans.is_root(h) && std::exchange(seen[origin(coarse_.triangles, h)], 1))
-        kept_[origin(coarse_.triangles, h)] = 1;
+      if (fans.is_root(h) && std::exchange(seen[origin(triangles, h)], 1)) fixed_[origin(triangles, h)] = 1;
   }
 
   void place_vertices() {
-    const Csr<Index> at_vertex = items_at_vertices<Index>(coarse_.triangles, positions_.size());
+    const Csr<Index> at_vertex = items_at_vertices<Index>(borders_.triangles, positions_.size());
     const std::vector<Vec3> old = positions_;
     for (std::size_t v = 0; v < old.size(); ++v) {
       if (at_vertex.size(v) == 0) continue;
@@ -98,8 +143,8 @@ class Polygoniser {
       double length = 0;
       std::size_t edges = 0;
       for (const Index* t = at_vertex.begin(v); t != at_vertex.end(v); ++t) {
-        around.insert(coarse_.labels[*t]);
-        for (const Index w : coarse_.triangles[*t]) length += norm(old[w] - old[v]);
+        around.insert(segmentation_.labels[*t]);
+        for (const Index w : borders_.triangles[*t]) length += norm(old[w] - old[v]);
         edges += 2;
       }
       const bool is_flat = std::all_of(around.begin(), around.end(), [&](Index r) { return regions_[r].plane; });
@@ -114,8 +159,7 @@ class Polygoniser {
   void keep_anchors() {
     for (const BorderChain& chain : borders_.chains) {
       std::vector<Index> path = chain.vertices;
-      const double bend =
-          chain.right == kNone ? 1 : norm(cross(regions_[chain.left].normal, regions_[chain.right].normal));
+      const double bend = bend_of(chain);
       if (!chain.closed) {
         kept_[path.front()] = kept_[path.back()] = 1;
         divide(path, 0, path.size() - 1, bend);
@@ -129,6 +173,14 @@ class Polygoniser {
       divide(path, 0, second, bend);
       divide(path, second, path.size() - 1, bend);
     }
+  }
+
+  // The sine of the angle between the planes, larger for regions that want more corners.
+  double bend_of(const BorderChain& chain) const {
+    const Region& left = regions_[chain.left];
+    if (chain.right == kNone) return 1 / left.chord;
+    const Region& right = regions_[chain.right];
+    return norm(cross(left.normal, right.normal)) / std::min(left.chord, right.chord);
   }
 
   Vec3 centre_of(const std::vector<Index>& path) const {
@@ -170,6 +222,7 @@ class Polygoniser {
     const RegionBorders coarse =
         follow_borders(coarse_.triangles, positions_.size(), coarse_.labels, regions_.size()).borders;
     for (std::size_t r = 0; r < regions_.size(); ++r) {
+      regions_[r].loops.clear();
       for (const BorderLoop& loop : coarse.regions[r].loops) regions_[r].loops.push_back(loop.vertices);
       regions_[r].has_handles = coarse.regions[r].euler != 2 - static_cast<long long>(coarse.regions[r].loops.size());
     }
@@ -195,12 +248,18 @@ class Polygoniser {
     }
   }
 
-  // Moves the vertices of folded regions halfway back to the mesh, or all the way; false if there are no such regions.
+  // Moves vertices of folded regions, and of triangles that cross, halfway back to the mesh, or all the way. False if
+  // there are none.
   bool draw_back(bool all_the_way) {
     std::set<Index> moved;
-    for (const Region& region : regions_)
-      if (region.is_folded)
-        for (const std::vector<Index>& loop : region.loops) moved.insert(loop.begin(), loop.end());
+    TriangleMesh made{positions_, {}};
+    for (const Region& region : regions_) {
+      made.triangles.insert(made.triangles.end(), region.triangles.begin(), region.triangles.end());
+      if (!region.is_folded) continue;
+      for (const std::vector<Index>& loop : region.loops) moved.insert(loop.begin(), loop.end());
+    }
+    for (const auto& pair : find_self_intersections(made))
+      for (const Index t : pair) moved.insert(made.triangles[t].begin(), made.triangles[t].end());
     for (const Index v : moved)
       positions_[v] = all_the_way ? mesh_.vertices[v] : 0.5 * (positions_[v] + mesh_.vertices[v]);
     return !moved.empty();
@@ -330,7 +389,7 @@ class Polygoniser {
   const PolygoniseOptions& options_;
   const RegionBorders borders_;
   std::vector<Vec3> positions_;
-  std::vector<char> kept_;
+  std::vector<char> fixed_, kept_;  // vertices that stay whatever happens, and these with the anchors
   std::vector<Region> regions_;
   LabelledTriangles coarse_;
 };
