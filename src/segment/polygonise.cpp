@@ -50,6 +50,7 @@ class Polygoniser {
     keep_curved_and_non_manifold();
     place_vertices();
     const std::vector<Vec3> placed = positions_;
+    remove_inner_vertices();
     simplify();
     if (folded() > 0) refine(placed);
     separate_edges();
@@ -87,13 +88,26 @@ class Polygoniser {
     coarse_ = coarse;
   }
 
-  void simplify() {
+  // What all choices of anchors have in common.
+  void remove_inner_vertices() {
     kept_ = fixed_;
-    coarse_ = {borders_.triangles, segmentation_.labels};
-    keep_anchors();
+    for (const BorderChain& chain : borders_.chains)
+      for (const Index v : chain.vertices) kept_[v] = 1;
+    without_inner_ = {borders_.triangles, segmentation_.labels};
+    collapse_vertices(positions_, kept_, normals(), without_inner_);
+  }
+
+  std::vector<Vec3> normals() const {
     std::vector<Vec3> normals;
     for (const Region& region : regions_) normals.push_back(region.normal);
-    collapse_vertices(positions_, kept_, normals, coarse_);
+    return normals;
+  }
+
+  void simplify() {
+    kept_ = fixed_;
+    coarse_ = without_inner_;
+    keep_anchors();
+    collapse_vertices(positions_, kept_, normals(), coarse_);
     find_loops();
     fill_regions();
     for (int k = 0; k < kHalvings && draw_back(k + 1 == kHalvings); ++k) fill_regions();
@@ -391,7 +405,7 @@ class Polygoniser {
   std::vector<Vec3> positions_;
   std::vector<char> fixed_, kept_;  // vertices that stay whatever happens, and these with the anchors
   std::vector<Region> regions_;
-  LabelledTriangles coarse_;
+  LabelledTriangles without_inner_, coarse_;  // without vertices inside regions, and without those between anchors
 };
 
 }  // namespace
