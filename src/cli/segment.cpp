@@ -261,6 +261,14 @@ Json segment_report(Console& console, const SegmentResult& result, const Triangl
   return report;
 }
 
+Json polygons_json(const PolygonisedMesh& polygons) {
+  return {{"vertices", polygons.vertices.size()},
+          {"faces", polygons.polygons.rows()},
+          {"triangles", polygons.triangulated.triangles.size()},
+          {"divided", polygons.divided},
+          {"folded", polygons.folded}};
+}
+
 Json segment_seconds(const SegmentSeconds& seconds) {
   return {{"total", seconds.total},     {"start", seconds.start},       {"lloyd", seconds.lloyd},
           {"improve", seconds.improve}, {"classify", seconds.classify}, {"smooth", seconds.smooth},
@@ -268,7 +276,8 @@ Json segment_seconds(const SegmentSeconds& seconds) {
 }
 
 void print_summary(Console& console, const SegmentCommand& command, const SegmentResult& result,
-                   const TriangleMesh& input, double diagonal, const Json& seconds) {
+                   const std::optional<PolygonisedMesh>& polygons, const TriangleMesh& input, double diagonal,
+                   const Json& seconds) {
   const auto worst = std::max_element(result.regions.begin(), result.regions.end(),
                                       [](const auto& a, const auto& b) { return a.max < b.max; });
   console.print(fmt::format("input      {}: {}", command.input, size_of(input_json(input))));
@@ -279,6 +288,7 @@ void print_summary(Console& console, const SegmentCommand& command, const Segmen
   if (command.options.smooth > 0)
     console.print(
         fmt::format("borders    {:.6g} long, {:.6g} before smoothing", result.border_after, result.border_before));
+  if (polygons) console.print(fmt::format("polygons   {}", size_of(polygons_json(*polygons))));
   console.print(fmt::format("steps      {}, {}, {}, {}", counted(result.iterations, "iteration", "iterations"),
                             counted(result.insertions, "insertion", "insertions"),
                             counted(result.merges, "merge", "merges"),
@@ -323,6 +333,7 @@ void run(const SegmentCommand& command) {
   const Stopwatch measuring;
   Json report;
   if (!report_path.empty()) report = segment_report(console, result, mesh, input, diagonal);
+  if (!report_path.empty() && polygons) report["polygons"] = polygons_json(*polygons);
   Json seconds = segment_seconds(result.seconds);
   seconds["quality"] = measuring.seconds();
 
@@ -349,7 +360,7 @@ void run(const SegmentCommand& command) {
     report["seconds"] = seconds;
     write_report(report_path, report, console.warnings());
   }
-  print_summary(console, command, result, input, diagonal, seconds);
+  print_summary(console, command, result, polygons, input, diagonal, seconds);
 }
 
 }  // namespace

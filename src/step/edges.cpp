@@ -43,7 +43,8 @@ class EdgeMaker {
  public:
   EdgeMaker(const Trims& trims, double tolerance) : trims_(trims), tolerance_(tolerance) { place_ends(); }
 
-  TopoDS_Edge make(const Chain& chain) {
+  TopoDS_Edge make(const Chain& chain, bool along_mesh) {
+    along_mesh_ = along_mesh;
     const std::vector<Vec3> points = placed(chain);
     const Curve curve = curve_through(points, chain);
     BRep_Builder builder;
@@ -65,6 +66,7 @@ class EdgeMaker {
   }
 
   Vec3 meet(const Vec3& p, const std::set<Index>& regions, double spread) const {
+    if (along_mesh_) return p;
     std::vector<MeetingSurface> surfaces;
     for (const Index r : regions) surfaces.push_back({&trims_.regions[r].surface, trims_.regions[r].rms});
     return meeting_point(p, surfaces, spread);
@@ -116,8 +118,8 @@ class EdgeMaker {
   Curve curve_through(const std::vector<Vec3>& points, const Chain& chain) {
     // Where more than two surfaces meet, they need not do so in one point.
     double gap = 0;
-    for (const Vec3& end : {points.front(), points.back()})
-      for (const Index r : chain.regions) gap = std::max(gap, distance(trims_.regions[r].surface, end));
+    for (std::size_t i = 0; i < points.size(); i += along_mesh_ ? 1 : points.size() - 1)
+      for (const Index r : chain.regions) gap = std::max(gap, distance(trims_.regions[r].surface, points[i]));
     surface_tolerance_ = tolerance_of(chain) + gap;
     // Between two surfaces these tell where the curve runs, and where they do not, the mesh knows it up to an edge.
     point_tolerance_ = chain.regions.size() == 2 ? std::max(surface_tolerance_, spread_of(chain)) : surface_tolerance_;
@@ -289,18 +291,20 @@ class EdgeMaker {
   }
 
   const Trims& trims_;
-  const double tolerance_;                              // 0: as the regions' distances demand
-  double surface_tolerance_ = 0, point_tolerance_ = 0;  // of the chain at hand
+  const double tolerance_;  // 0: as the regions' distances demand
+  // Of the chain at hand.
+  bool along_mesh_ = false;
+  double surface_tolerance_ = 0, point_tolerance_ = 0;
   std::map<Index, Vec3> ends_;
   std::map<Index, TopoDS_Vertex> vertices_;
 };
 
 }  // namespace
 
-std::vector<TopoDS_Edge> make_edges(const Trims& trims, double tolerance) {
+std::vector<TopoDS_Edge> make_edges(const Trims& trims, double tolerance, const std::vector<char>& along_mesh) {
   EdgeMaker maker(trims, tolerance);
   std::vector<TopoDS_Edge> edges;
-  for (const Chain& chain : trims.chains) edges.push_back(maker.make(chain));
+  for (std::size_t k = 0; k < trims.chains.size(); ++k) edges.push_back(maker.make(trims.chains[k], along_mesh[k]));
   return edges;
 }
 

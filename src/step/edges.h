@@ -12,6 +12,7 @@ namespace bisector::step {
 // tolerance of both surfaces and near the chain, else a B-spline, at worst a polyline. It runs where the surfaces
 // beside the chain meet. The tolerance 0 stands for the larger root mean square distance of the two regions, at least
 // 1e-5 of the diagonal.
-std::vector<TopoDS_Edge> make_edges(const Trims& trims, double tolerance);
+// Chains that are `along_mesh` keep to the mesh's border instead, whatever the surfaces say.
+std::vector<TopoDS_Edge> make_edges(const Trims& trims, double tolerance, const std::vector<char>& along_mesh);
 
 }  // namespace bisector::step

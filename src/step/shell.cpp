@@ -25,6 +25,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <variant>
 
 #include "step/edges.h"
@@ -86,13 +87,21 @@ double area_of(const TopoDS_Shape& shape) {
   return std::abs(properties.Mass());
 }
 
-std::string flaw_of(const TopoDS_Shape& face, const Region& region) {
+// That of a plane's piece comes from its loops, for noise makes triangles larger than what they cover.
+double expected_area(const Trims& trims, const Region& region) {
+  if (!std::holds_alternative<Plane>(region.surface)) return region.area;
+  Vec3 twice;
+  for (const std::vector<Vec3>& loop : outline_of(trims, region).loops) twice += vector_area(loop);
+  return 0.5 * norm(twice);
+}
+
+std::string flaw_of(const TopoDS_Shape& face, const Trims& trims, const Region& region) {
   if (face.IsNull()) return "has no face";
   try {
     if (!BRepCheck_Analyzer(face).IsValid()) return "is not valid";
-    const double area = area_of(face);
-    if (std::abs(area - region.area) > kAreaTolerance * region.area)
-      return fmt::format("has the area {:.4g}, its region {:.4g}", area, region.area);
+    const double area = area_of(face), expected = expected_area(trims, region);
+    if (std::abs(area - expected) > kAreaTolerance * expected)
+      return fmt::format("has the area {:.4g}, its region {:.4g}", area, expected);
   } catch (const Standard_Failure& failure) {
     return fmt::format("cannot be measured ({})", failure.GetMessageString());
   }
@@ -117,16 +126,21 @@ TopoDS_Shape as_solid(const TopoDS_Shape& shell) {
   return solid;
 }
 
-// Those of `as_patch` are height fields.
-Shell attempt(const Trims& trims, double tolerance, const std::vector<char>& as_patch) {
-  const std::vector<TopoDS_Edge> edges = make_edges(trims, tolerance);
+// What is done about flaws.
+struct Repair {
+  std::vector<char> as_patch;    // regions whose quadric becomes a height field
+  std::vector<char> along_mesh;  // chains that keep to the mesh's border
+};
+
+Shell attempt(const Trims& trims, double tolerance, const Repair& repair) {
+  const std::vector<TopoDS_Edge> edges = make_edges(trims, tolerance, repair.along_mesh);
   Shell result;
   std::vector<TopoDS_Face> raw;
   BRep_Builder builder;
   TopoDS_Shell shell;
   builder.MakeShell(shell);
   for (std::size_t r = 0; r < trims.regions.size(); ++r) {
-    raw.push_back(trimmed_face(trims, trims.regions[r], edges, as_patch[r]));
+    raw.push_back(trimmed_face(trims, trims.regions[r], edges, repair.as_patch[r]));
     if (!raw.back().IsNull()) builder.Add(shell, raw.back());
   }
   const Handle(ShapeBuild_ReShape) context = new ShapeBuild_ReShape;
@@ -135,7 +149,7 @@ Shell attempt(const Trims& trims, double tolerance, const std::vector<char>& as_
   BRepLib::UpdateTolerances(result.shape);
   for (std::size_t r = 0; r < raw.size(); ++r) {
     result.faces.push_back(raw[r].IsNull() ? TopoDS_Shape() : context->Apply(raw[r]));
-    result.flaws.push_back(flaw_of(result.faces.back(), trims.regions[r]));
+    result.flaws.push_back(flaw_of(result.faces.back(), trims, trims.regions[r]));
   }
   if (is_closed(result.shape)) result.shape = as_solid(result.shape);
   return result;
@@ -148,15 +162,28 @@ std::size_t sound_faces(const Shell& shell) {
 
 }  // namespace
 
+// Quadrics whose faces are flawed become height fields first; then the borders of flawed faces keep to the mesh, for
+// where surfaces touch along a band they hardly tell where they meet.
 Shell build_shell(const Trims& trims, double tolerance) {
-  std::vector<char> as_patch(trims.regions.size(), 0);
-  Shell result = attempt(trims, tolerance, as_patch);
-  for (std::size_t r = 0; r < as_patch.size(); ++r)
-    as_patch[r] = !result.flaws[r].empty() && trims.regions[r].has_outer &&
-                  std::holds_alternative<GeneralQuadric>(trims.regions[r].surface);
-  if (std::count(as_patch.begin(), as_patch.end(), 1) == 0) return result;
-  Shell other = attempt(trims, tolerance, as_patch);
-  return sound_faces(other) > sound_faces(result) ? other : result;
+  Repair repair{std::vector<char>(trims.regions.size(), 0), std::vector<char>(trims.chains.size(), 0)};
+  Shell best = attempt(trims, tolerance, repair);
+  for (const bool edges_too : {false, true}) {
+    if (sound_faces(best) == trims.regions.size()) break;
+    Repair more = repair;
+    for (std::size_t r = 0; r < trims.regions.size(); ++r) {
+      if (best.flaws[r].empty()) continue;
+      more.as_patch[r] |=
+          trims.regions[r].has_outer && std::holds_alternative<GeneralQuadric>(trims.regions[r].surface);
+      if (!edges_too) continue;
+      for (const std::vector<Use>& loop : trims.regions[r].loops)
+        for (const Use& use : loop) more.along_mesh[use.chain] = 1;
+    }
+    Shell shell = attempt(trims, tolerance, more);
+    if (sound_faces(shell) <= sound_faces(best)) continue;
+    best = std::move(shell);
+    repair = std::move(more);
+  }
+  return best;
 }
 
 }  // namespace bisector::step

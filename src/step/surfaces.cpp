@@ -90,13 +90,6 @@ Handle(Geom_Surface) surface_of(const Plane& s, const Outline& outline) {
   return new Geom_Plane(point(middle - (dot(s.normal, middle) - s.offset) * s.normal), direction(s.normal));
 }
 
-// Twice the vector area of a surface that the loop bounds.
-Vec3 vector_area(const std::vector<Vec3>& loop) {
-  Vec3 sum;
-  for (std::size_t i = 2; i < loop.size(); ++i) sum += twice_area_normal(loop[0], loop[i - 1], loop[i]);
-  return sum;
-}
-
 // A piece with one loop that is smaller than a hemisphere has its poles and seam off it. Other pieces are about an axis
 // through their loops.
 Handle(Geom_Surface) surface_of(const Sphere& s, const Outline& outline) {
@@ -272,6 +265,12 @@ double height_on(const Quadric& q, const Vec3& p, const Vec3& along, bool falls)
 }
 
 }  // namespace
+
+Vec3 vector_area(const std::vector<Vec3>& loop) {
+  Vec3 sum;
+  for (std::size_t i = 2; i < loop.size(); ++i) sum += twice_area_normal(loop[0], loop[i - 1], loop[i]);
+  return sum;
+}
 
 Handle(Geom_Surface) make_patch(const GeneralQuadric& quadric, const Outline& outline, bool same_sense, bool& flipped) {
   const Vec3 facing = unit(vector_area(outline.loops[0])), middle = mean_of(outline.points);
