@@ -2,22 +2,29 @@
 #include <fmt/format.h>
 #include <unistd.h>
 #include <APIHeaderSection_MakeHeader.hxx>
+#include <BRepBuilderAPI_Transform.hxx>
 #include <IFSelect_ReturnStatus.hxx>
 #include <IGESControl_Controller.hxx>
 #include <IGESControl_Writer.hxx>
+#include <IGESData_GlobalSection.hxx>
+#include <IGESData_IGESModel.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Message_PrinterOStream.hxx>
+#include <STEPControl_Controller.hxx>
 #include <STEPControl_Writer.hxx>
 #include <Standard_Failure.hxx>
 #include <TCollection_HAsciiString.hxx>
+#include <gp_Pnt.hxx>
+#include <gp_Trsf.hxx>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <iterator>
 #include <string>
 
 #include "bisector/error.h"
@@ -43,24 +50,39 @@ bool is_iges(const std::string& path) {
   throw Error(fmt::format("{}: unknown format '{}'; use .step, .stp, .iges or .igs", path, extension));
 }
 
-std::string upper(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
-  return text;
+struct Unit {
+  const char* word;
+  const char* name;  // OpenCASCADE's
+  double millimetres;
+};
+constexpr Unit kUnits[] = {
+    {"mm", "MM", 1}, {"cm", "CM", 10}, {"m", "M", 1000}, {"in", "INCH", 25.4}, {"ft", "FT", 304.8}};
+
+const Unit& unit_of(const std::string& word) {
+  return *std::find_if(std::begin(kUnits), std::end(kUnits) - 1, [&](const Unit& unit) { return word == unit.word; });
 }
 
-// Coordinates are written as they are, with the name of their unit. The file is the same for the same shape.
-bool write_shape(const TopoDS_Shape& shape, const std::string& path, bool iges, const std::string& unit) {
+// Coordinates are written as they are, with the name of their unit: OpenCASCADE, which takes shapes to be in
+// millimetres, converts them. Dates are fixed, so that the same shape gives the same file.
+bool write_shape(const TopoDS_Shape& given, const std::string& path, bool iges, const Unit& unit) {
+  gp_Trsf scaling;
+  scaling.SetScale(gp_Pnt(), unit.millimetres);
+  const TopoDS_Shape shape = unit.millimetres == 1 ? given : BRepBuilderAPI_Transform(given, scaling, true).Shape();
   if (iges) {
     IGESControl_Controller::Init();
-    Interface_Static::SetCVal("xstep.cascade.unit", upper(unit).c_str());
-    IGESControl_Writer writer(upper(unit).c_str(), 1);  // as faces with boundaries (entity 510 and so on)
+    IGESControl_Writer writer(unit.name, 1);  // as faces with boundaries
     if (!writer.AddShape(shape)) return false;
     writer.ComputeModel();
+    IGESData_GlobalSection header = writer.Model()->GlobalSection();
+    header.SetFileName(new TCollection_HAsciiString("regions"));
+    header.SetDate(new TCollection_HAsciiString("19700101.000000"));
+    header.SetLastChangeDate(new TCollection_HAsciiString("19700101.000000"));
+    writer.Model()->SetGlobalSection(header);
     return writer.Write(path.c_str());
   }
-  STEPControl_Writer writer;
-  Interface_Static::SetCVal("xstep.cascade.unit", upper(unit).c_str());
-  Interface_Static::SetCVal("write.step.unit", upper(unit).c_str());
+  STEPControl_Controller::Init();
+  Interface_Static::SetCVal("write.step.unit", unit.name);
+  STEPControl_Writer writer;  // reads the unit
   Interface_Static::SetCVal("write.step.product.name", "regions");
   if (writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone) return false;
   APIHeaderSection_MakeHeader header(writer.Model());
@@ -73,7 +95,7 @@ void write_atomically(const TopoDS_Shape& shape, const Options& options) {
   const fs::path target(options.output);
   const fs::path temporary = target.parent_path() / fmt::format(".bisector-step-{}.tmp", ::getpid());
   std::error_code error;
-  if (write_shape(shape, temporary.string(), is_iges(options.output), options.unit)) {
+  if (write_shape(shape, temporary.string(), is_iges(options.output), unit_of(options.unit))) {
     fs::rename(temporary, target, error);
     if (!error) return;
   }

@@ -204,6 +204,10 @@ TEST_F(Step, WholeSurfacesAndIges) {
   const std::vector<Face> faces = faces_of(read_step("ball.step"));
   ASSERT_EQ(faces.size(), 1u);
   EXPECT_TRUE(faces[0].valid);
+  const double of_region = json["regions"][0]["area"];
+  EXPECT_NEAR(faces[0].area, 1e6 * of_region, 0.02e6 * of_region);  // it is read in millimetres
+  ASSERT_EQ(convert("ball.step", "--unit in"), 0);
+  EXPECT_NEAR(area_of(read_step("ball.step")), 25.4 * 25.4 * of_region, 0.02 * 25.4 * 25.4 * of_region);
   ASSERT_EQ(convert("ball.igs"), 0);
   IGESControl_Reader reader;
   EXPECT_EQ(reader.ReadFile(in("ball.igs").c_str()), IFSelect_RetDone);
