@@ -13,6 +13,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/stopwatch.h"
+#include "segment/border_weights.h"
 #include "segment/flood.h"
 #include "segment/improve_partition.h"
 #include "segment/lloyd.h"
@@ -52,8 +53,8 @@ void check_options(const SegmentOptions& options) {
     throw Error(fmt::format("{} iterations are asked for; ask for 0 or more", options.iterations));
   if (!(options.smooth >= 0) || !std::isfinite(options.smooth))
     throw Error(fmt::format("the smoothing weight is {}; it must be 0 or positive", options.smooth));
-  if (options.fuzzy_rings < 1)
-    throw Error(fmt::format("{} fuzzy rings are asked for; ask for 1 or more", options.fuzzy_rings));
+  if (options.fuzzy_rings < 0)
+    throw Error(fmt::format("{} fuzzy rings are asked for; ask for 0 or more", options.fuzzy_rings));
 }
 
 // How many regions there can be nearest to the number asked for: each component needs one, and each a triangle.
@@ -222,14 +223,14 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
 // Smooths the borders and fits the primitives anew. Returns the weight, 0 if every one raised the distance too far.
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
                      double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
-  // Distances that differ by rounding only say nothing about where a border belongs.
-  const auto distance = [&](Index t, Index r) {
-    return distance_to(domain, t, proxies[r]) + kNegligible * kNegligible * domain.areas[t];
-  };
+  const auto distance = [&](Index t, Index r) { return distance_to(domain, t, proxies[r]); };
+  const std::vector<double> weights = border_weights(domain, labels, proxies);
   SmoothBordersOptions smoothing;
-  smoothing.lambda = options.smooth;
   smoothing.rings = options.fuzzy_rings;
-  for (int k = 0; k < kHalvings; ++k, smoothing.lambda /= 2) {
+  double factor = options.smooth;
+  for (int k = 0; k < kHalvings; ++k, factor /= 2) {
+    smoothing.weights = weights;
+    for (double& weight : smoothing.weights) weight *= factor;
     std::vector<Index> smoothed = labels;
     std::vector<Primitive> refined = primitives;
     smooth_borders(domain.graph, domain.triangles, distance, smoothing, smoothed);
@@ -237,7 +238,7 @@ double smooth_within(const SegmentDomain& domain, const SegmentOptions& options,
     if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > kMostGrowth * rms + kNegligible) continue;
     labels = std::move(smoothed);
     primitives = std::move(refined);
-    return smoothing.lambda;
+    return factor;
   }
   return 0;
 }
