@@ -9,6 +9,9 @@
 namespace bisector {
 namespace {
 
+// Units that a length l of border costs. The likelihood leaves it open; on generated parts with noise 4 of 1/4, 1/2, 1 to
+// 16 leaves the most triangles with their surfaces.
+constexpr double kBorderCost = 4;
 constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
 // The approximate distance, negative where the polynomial is.
@@ -62,7 +65,7 @@ std::vector<double> border_weights(const SegmentDomain& domain, const std::vecto
     const double area =
         correlation > 0 ? std::max(vertex_area, std::numbers::pi * square / -std::log(correlation)) : vertex_area;
     const double square_distance = std::max(s.distance / s.area, kNegligible * kNegligible);
-    weights.push_back(2 * square_distance * std::sqrt(std::min(area, s.area)) / domain.scale);
+    weights.push_back(2 * kBorderCost * square_distance * std::sqrt(std::min(area, s.area)) / domain.scale);
   }
   return weights;
 }

@@ -10,10 +10,11 @@
 
 namespace bisector {
 
-// For each region 2 s^2 l: s is the root mean square distance to its proxy and l^2 the area over which distances are
-// alike, that of a vertex where they are noise and more where the proxy is not the surface's shape. The weight makes
-// squared distances plus weighted lengths the negative logarithm of a likelihood, Gaussian distances with one sample for
-// each such area against borders of one unit for each such length (Potts; Geman and Geman 1984).
+// For each region 8 s^2 l: s is the root mean square distance to its proxy and l^2 the area over which distances are
+// alike, that of a vertex where they are noise and more where the proxy does not have the surface's shape. So squared
+// distances plus weighted lengths are, up to a factor, the negative logarithm of a likelihood: Gaussian distances, one
+// sample for each such area, and borders that cost four units for each such length (Geman and Geman 1984). In
+// SmoothBordersOptions' units: distances in the unit-sized model, lengths in the mesh's.
 std::vector<double> border_weights(const SegmentDomain& domain, const std::vector<Index>& labels,
                                    const std::vector<Proxy>& proxies);
 

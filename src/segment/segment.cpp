@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -34,9 +35,10 @@ constexpr int kPlanarSteps = 4;  // of Lloyd's iteration, for the pieces
 constexpr std::size_t kSpareShare =
     5;  // one region in so many is added: which can be spared shows after Lloyd's iteration
 
-// Smoothing: the weight is halved while the root mean square distance grows by more than this ratio.
+// Smoothing: the root mean square distance may grow by this ratio, and the weights tried first and least are that asked
+// for, halved so many times.
 constexpr double kMostGrowth = 1.05;
-constexpr int kHalvings = 6;
+constexpr int kFirstHalvings = 3, kMostHalvings = 8;
 constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
 // Types and smooth borders cost some of the error; where they take more than was left, a smaller error is aimed at.
@@ -220,27 +222,36 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
   relax_borders(domain, proxies, std::move(all), labels, distances, evaluations);
 }
 
-// Smooths the borders and fits the primitives anew. Returns the weight, 0 if every one raised the distance too far.
+// Smooths the borders and fits the primitives anew, with weights that grow up to the one asked for, so long as the
+// distance does not grow too far; borders go on from where the last weight left them. Returns the last weight, 0 if even
+// the least raised the distance too far.
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
                      double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
   const auto distance = [&](Index t, Index r) { return distance_to(domain, t, proxies[r]); };
   const std::vector<double> weights = border_weights(domain, labels, proxies);
-  SmoothBordersOptions smoothing;
-  smoothing.rings = options.fuzzy_rings;
-  double factor = options.smooth;
-  for (int k = 0; k < kHalvings; ++k, factor /= 2) {
-    smoothing.weights = weights;
-    for (double& weight : smoothing.weights) weight *= factor;
+  const double most = kMostGrowth * rms + kNegligible;
+  const std::vector<Primitive> unsmoothed = primitives;
+  double used = 0;
+  const auto advance = [&](double weight) {
+    SmoothBordersOptions smoothing;
+    smoothing.rings = options.fuzzy_rings;
+    for (const double w : weights) smoothing.weights.push_back(weight * w);
     std::vector<Index> smoothed = labels;
-    std::vector<Primitive> refined = primitives;
+    std::vector<Primitive> refined = unsmoothed;
     smooth_borders(domain.graph, domain.triangles, distance, smoothing, smoothed);
     refine_primitives(domain, smoothed, refined);
-    if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > kMostGrowth * rms + kNegligible) continue;
+    if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > most) return false;
     labels = std::move(smoothed);
     primitives = std::move(refined);
-    return factor;
-  }
-  return 0;
+    used = weight;
+    return true;
+  };
+  int halvings = kFirstHalvings;
+  while (!advance(std::ldexp(options.smooth, -halvings)) && halvings < kMostHalvings) ++halvings;
+  if (used == 0) return 0;
+  while (halvings > 0 && advance(std::ldexp(options.smooth, -(halvings - 1)))) --halvings;
+  if (halvings > 0) advance(std::numbers::sqrt2 * used);
+  return used;
 }
 
 SegmentRegion measure_region(const SegmentDomain& domain, const Primitive& primitive, const Index* begin,

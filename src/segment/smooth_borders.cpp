@@ -22,6 +22,7 @@ using Cost = std::int64_t;
 constexpr double kUnit = 0x1p40;  // of Cost, to the energy at the start
 
 constexpr double kFar = 1e100;    // squared distances from here on are no numbers to add up
+constexpr int kSplits = 4;         // of connected changes that the topology forbids
 constexpr int kFirstRings = 4;  // width of a strip that is widened where its cut asks for more
 
 // Triangles along a region's borders, and the energy of a labelling x of them: 0 for the region, 1 for another one that
@@ -136,7 +137,7 @@ class BorderSmoother {
     }
     const std::vector<Triangles> groups = connected_changes(region, strip, x);
     std::size_t moved = 0;
-    for (const Triangles& group : groups) moved += move(group);
+    for (const Triangles& group : groups) moved += move(group, true, kSplits);
     for (const Index t : strip.triangles) before_[t] = kNone;
     return moved > 0 ? Outcome::cut : groups.empty() ? Outcome::same : Outcome::refused;
   }
@@ -281,15 +282,15 @@ class BorderSmoother {
   }
 
   // Moves connected triangles to the other side, less what would leave crumbs, where that lowers the energy and keeps
-  // the topology. False: they stay.
-  bool move(Triangles changed) {
-    const std::size_t wanted = changed.size();
+  // the topology; otherwise tries either half, so many times over. `lowers`: all of them together are known to lower
+  // the energy. False: all stay.
+  bool move(const Triangles& wanted, bool lowers, int splits) {
+    Triangles changed = wanted;
     apply(changed);
     while (give_back(changed)) {
     }
-    if (changed.empty()) return false;
-    // All of them together lower the energy, or the cut would be without them.
-    if ((changed.size() == wanted || lowers_energy(changed)) && keeps_topology(changed)) {
+    const bool better = !changed.empty() && ((lowers && changed.size() == wanted.size()) || lowers_energy(changed));
+    if (better && keeps_topology(changed)) {
       for (const Index t : changed) {
         members_[next_[t]].push_back(t);
         touched_.insert({before_[t], next_[t]});
@@ -297,7 +298,11 @@ class BorderSmoother {
       return true;
     }
     undo(changed);
-    return false;
+    if (splits == 0 || wanted.size() < 2) return false;
+    const auto middle = wanted.begin() + static_cast<std::ptrdiff_t>(wanted.size() / 2);
+    const bool first = move({wanted.begin(), middle}, false, splits - 1);
+    const bool second = move({middle, wanted.end()}, false, splits - 1);
+    return first || second;
   }
 
   bool lowers_energy(const Triangles& changed) {
