@@ -135,11 +135,23 @@ class BorderSmoother {
       before_[t] = labels_[t];
       next_[t] = labels_[t] == region ? strip.others[i] : region;
     }
-    const std::vector<Triangles> groups = connected_changes(region, strip, x);
-    std::size_t moved = 0;
+    std::vector<Triangles> groups = connected_changes(region, strip, x);
+    const bool same = groups.empty();
+    // What the topology forbids it may allow once others have moved, or together with others.
+    std::size_t moved = 0, last;
+    do {
+      last = groups.size();
+      moved += std::erase_if(groups, [&](const Triangles& group) { return move(group, true, 0); });
+    } while (!groups.empty() && groups.size() < last);
+    Triangles left;
+    for (const Triangles& group : groups) left.insert(left.end(), group.begin(), group.end());
+    if (groups.size() > 1 && move(left, true, 0)) {
+      ++moved;
+      groups.clear();
+    }
     for (const Triangles& group : groups) moved += move(group, true, kSplits);
     for (const Index t : strip.triangles) before_[t] = kNone;
-    return moved > 0 ? Outcome::cut : groups.empty() ? Outcome::same : Outcome::refused;
+    return moved > 0 ? Outcome::cut : same ? Outcome::same : Outcome::refused;
   }
 
   // Whether a labelling moves one of the strip's triangles from a position on: at the strip's end more might move.
