@@ -33,8 +33,8 @@ struct Sums {
 
 }  // namespace
 
-std::vector<double> border_weights(const SegmentDomain& domain, const std::vector<Index>& labels,
-                                   const std::vector<Proxy>& proxies) {
+std::vector<RegionNoise> region_noise(const SegmentDomain& domain, const std::vector<Index>& labels,
+                                      const std::vector<Proxy>& proxies) {
   std::vector<Sums> sums(proxies.size());
   for (Index t = 0; t < labels.size(); ++t) {
     const Proxy& proxy = proxies[labels[t]];
@@ -52,20 +52,25 @@ std::vector<double> border_weights(const SegmentDomain& domain, const std::vecto
       ++s.edges;
     }
   }
-  std::vector<double> weights;
+  std::vector<RegionNoise> noise;
   for (const Sums& s : sums) {
-    if (!(s.area > 0)) {
-      weights.push_back(0);
-      continue;
-    }
+    noise.push_back({s.area});
+    if (!(s.area > 0)) continue;
     // For correlations exp(-h^2 / (2 l^2)) of distances h apart the area that counts once is their integral, 2 pi l^2.
-    const double vertex_area = 2 * s.area / (s.edges / 3);
+    const double vertex_area = 2 * s.area / (s.edges / 3), square = s.lengths / s.edges;
     const double correlation = s.ends > 0 ? 1 - s.differences / s.ends : 0;
-    const double square = s.edges > 0 ? s.lengths / s.edges : 0;
-    const double area =
-        correlation > 0 ? std::max(vertex_area, std::numbers::pi * square / -std::log(correlation)) : vertex_area;
-    const double square_distance = std::max(s.distance / s.area, kNegligible * kNegligible);
-    weights.push_back(2 * kBorderCost * square_distance * std::sqrt(std::min(area, s.area)) / domain.scale);
+    const double correlated = correlation > 0 ? std::numbers::pi * square / -std::log(correlation) : 0;
+    noise.back().mean_square = s.distance / s.area;
+    noise.back().alike_area = std::min(std::max(vertex_area, correlated), s.area);
+  }
+  return noise;
+}
+
+std::vector<double> border_weights(const SegmentDomain& domain, const std::vector<RegionNoise>& noise) {
+  std::vector<double> weights;
+  for (const RegionNoise& n : noise) {
+    const double mean_square = std::max(n.mean_square, kNegligible * kNegligible);
+    weights.push_back(2 * kBorderCost * mean_square * std::sqrt(n.alike_area) / domain.scale);
   }
   return weights;
 }

@@ -21,6 +21,7 @@
 #include "segment/merge_regions.h"
 #include "segment/primitive.h"
 #include "segment/region_primitives.h"
+#include "segment/regularize.h"
 #include "segment/segment_domain.h"
 #include "segment/smooth_borders.h"
 
@@ -228,7 +229,7 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
                      double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
   const auto distance = [&](Index t, Index r) { return distance_to(domain, t, proxies[r]); };
-  const std::vector<double> weights = border_weights(domain, labels, proxies);
+  const std::vector<double> weights = border_weights(domain, region_noise(domain, labels, proxies));
   const double most = kMostGrowth * rms + kNegligible;
   const std::vector<Primitive> unsmoothed = primitives;
   double used = 0;
@@ -309,6 +310,7 @@ struct Classified {
   std::vector<Primitive> primitives;
   double rms_before = 0, rms = 0;  // before and after smoothing, in the unit-sized model
   double border_before = 0, border_after = 0, smooth = 0;
+  std::vector<SegmentRelation> relations;
 };
 
 Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition& partition, SegmentSeconds& seconds) {
@@ -333,6 +335,7 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
     result.border_after = border_length(domain.graph, result.labels);
   }
   sort_regions(domain, result.labels, result.primitives);
+  if (options.regularize) result.relations = regularize(domain, result.labels, result.primitives);
   result.rms = std::sqrt(mean_square(domain, result.labels, proxies_of(result.primitives)));
   seconds.smooth += clock.lap();
   return result;
@@ -378,6 +381,7 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   result.rms = domain.scale * classified.rms;
   result.rms_before = domain.scale * classified.rms_before;
   result.smooth = classified.smooth;
+  result.relations = std::move(classified.relations);
   result.border_before = classified.border_before;
   result.border_after = classified.border_after;
   result.labels = std::move(classified.labels);
