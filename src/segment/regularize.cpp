@@ -146,7 +146,7 @@ Vec3 rotated(const Vec3& p, const Vec3& w) {
 
 // A region's surface while it is regularized.
 struct Member {
-  Index region = 0;
+  std::vector<Index> regions;  // several are of one plane
   Shape shape;
   Samples samples;
   double count = 0;     // of independent samples
@@ -154,6 +154,7 @@ struct Member {
   double best = 0;      // mean square distance without constraints
   Held held{};
   int constraints = 0;  // parameters given up
+  bool place = true;    // may share its axis' place
 
   std::vector<Column> free() const {
     std::vector<Column> result;
@@ -475,6 +476,10 @@ class Regularizer {
     return worst;
   }
 
+  bool shares_place(std::size_t member) const {
+    return has_axis(members_[member].shape) && members_[member].held[along_u];
+  }
+
  private:
   void refit_all() {
     for (Member& m : members_)
@@ -489,7 +494,8 @@ class Regularizer {
 
   std::vector<Index> regions_of(const std::vector<std::size_t>& items) const {
     std::vector<Index> regions;
-    for (const std::size_t i : items) regions.push_back(members_[i].region);
+    for (const std::size_t i : items)
+      regions.insert(regions.end(), members_[i].regions.begin(), members_[i].regions.end());
     std::sort(regions.begin(), regions.end());
     return regions;
   }
@@ -524,8 +530,8 @@ class Regularizer {
     std::vector<char> right(directions.size(), 0);
     for (const RightAngle& angle : kept) right[angle.a] = right[angle.b] = 1;
     for (std::size_t k = 0; k < directions.size(); ++k) {
-      if (directions[k].items.size() > 1)
-        relations_.push_back({RelationKind::parallel, regions_of(directions[k].items), {}, 0});
+      if (std::vector<Index> regions = regions_of(directions[k].items); regions.size() > 1)
+        relations_.push_back({RelationKind::parallel, std::move(regions), {}, 0});
       if (directions[k].items.size() < 2 && !right[k]) continue;
       for (const std::size_t i : directions[k].items) {
         Member& m = members_[i];
@@ -536,7 +542,7 @@ class Regularizer {
         std::tie(m.shape.u, m.shape.v) = frame_across(axes[k]);
         hold(m, {turn_u, turn_v});
       }
-      groups_.push_back({axes[k], directions[k].items});
+      groups_.push_back({axes[k], directions[k].covariance, directions[k].items});
     }
     for (const RightAngle& angle : kept)
       relations_.push_back({RelationKind::perpendicular, regions_of(directions[angle.a].items),
@@ -545,36 +551,34 @@ class Regularizer {
 
   void share_places() {
     for (const Group& group : groups_) {
-      std::vector<Value> axes, planes;
+      std::vector<Value> axes;
+      const auto f = frame(group.axis);
       const auto [u, v] = frame_across(group.axis);
       for (const std::size_t i : group.items) {
         const Member& m = members_[i];
-        if (has_axis(m.shape)) {
-          axes.push_back({Vector2d(dot(m.shape.point, u), dot(m.shape.point, v)),
-                          covariance(m, {along_u, along_v}),
-                          {i}});
-        } else {
-          planes.push_back({VectorXd::Constant(1, dot(m.shape.point, group.axis)), covariance(m, {along_axis}), {i}});
-        }
+        if (!has_axis(m.shape) || !m.place) continue;
+        axes.push_back({Vector2d(dot(m.shape.point, u), dot(m.shape.point, v)), covariance(m, {along_u, along_v}), {i}});
       }
-      join_equal(axes, 1);
-      join_equal(planes, 1);
+      // How far an axis is off where another surface is depends on its direction, too.
+      const Matrix2d tilt = f.transpose() * group.covariance * f;
+      const auto height = [&](const Value& value) {
+        return dot(members_[value.items.front()].samples.centroid, group.axis);
+      };
+      join_equal(
+          axes,
+          [&](const Value& a, const Value& b) {
+            const double apart = height(a) - height(b);
+            return log_factor(b.mean - a.mean, a.covariance + b.covariance + apart * apart * tilt, 1);
+          },
+          weighted_mean);
       for (const Value& value : axes) {
         if (value.items.size() < 2) continue;
         for (const std::size_t i : value.items) {
-          Shape& s = members_[i].shape;
-          s.point = value.mean(0) * u + value.mean(1) * v + dot(s.point, group.axis) * group.axis;
+          Shape& shape = members_[i].shape;
+          shape.point = value.mean(0) * u + value.mean(1) * v + dot(shape.point, group.axis) * group.axis;
           hold(members_[i], {along_u, along_v});
         }
         relations_.push_back({RelationKind::coaxial, regions_of(value.items), {}, 0});
-      }
-      for (const Value& value : planes) {
-        if (value.items.size() < 2) continue;
-        for (const std::size_t i : value.items) {
-          members_[i].shape.point = value.mean(0) * group.axis;
-          hold(members_[i], {along_axis});
-        }
-        relations_.push_back({RelationKind::coplanar, regions_of(value.items), {}, 0});
       }
     }
   }
@@ -619,6 +623,7 @@ class Regularizer {
 
   struct Group {
     Vec3 axis;
+    MatrixXd covariance;
     std::vector<std::size_t> items;
   };
   std::vector<Group> groups_;  // members of one direction that is held
@@ -679,10 +684,11 @@ std::vector<Member> make_members(const SegmentDomain& domain, const std::vector<
   for (Index r = 0; r < primitives.size(); ++r) {
     const std::optional<Shape> shape = shape_of(primitives[r]);
     if (!shape || !(noise[r].alike_area > 0)) continue;
-    Member m{r, *shape, samples_of(domain, triangles.begin(r), triangles.end(r), on_border), 0, 0, 0, {}, 0};
+    Member m{{r}, *shape, samples_of(domain, triangles.begin(r), triangles.end(r), on_border), 0, 0, 0, {}, 0};
     m.best = refit(m);
     const double unknowns = static_cast<double>(m.free().size());
-    m.count = std::min(static_cast<double>(m.samples.points.size()), noise[r].area / noise[r].alike_area);
+    m.count = static_cast<double>(m.samples.points.size());
+    if (m.best > kLeastNoise * kLeastNoise) m.count = std::min(m.count, noise[r].area / noise[r].alike_area);
     if (m.count <= unknowns) continue;
     m.variance = std::max(m.best * m.count / (m.count - unknowns), kLeastNoise * kLeastNoise);
     members.push_back(std::move(m));
@@ -690,23 +696,79 @@ std::vector<Member> make_members(const SegmentDomain& domain, const std::vector<
   return members;
 }
 
+// Two planes' data as one's, each point weighted by what it tells.
+Member united(const Member& a, const Member& b) {
+  Member both = a;
+  both.regions.insert(both.regions.end(), b.regions.begin(), b.regions.end());
+  const double of_a = a.count / a.variance, of_b = b.count / b.variance, sum = of_a + of_b;
+  for (double& w : both.samples.weights) w *= of_a / sum;
+  for (std::size_t i = 0; i < b.samples.points.size(); ++i) {
+    both.samples.points.push_back(b.samples.points[i]);
+    both.samples.weights.push_back(of_b / sum * b.samples.weights[i]);
+  }
+  both.samples.centroid = (of_a / sum) * a.samples.centroid + (of_b / sum) * b.samples.centroid;
+  both.count = a.count + b.count;
+  both.variance = both.count / sum;
+  both.best = refit(both);
+  return both;
+}
+
+// Makes one of planes whose data a common plane fits as well, up to the three parameters it saves (Schwarz 1978).
+void unite_planes(std::vector<Member>& members, std::vector<SegmentRelation>& relations) {
+  for (std::size_t i = 0; i < members.size(); ++i)
+    for (std::size_t j = i + 1; j < members.size();) {
+      const Member &a = members[i], &b = members[j];
+      if (a.shape.type == SurfaceType::plane && b.shape.type == SurfaceType::plane) {
+        Member both = united(a, b);
+        const double growth = both.best * both.count / both.variance - a.best * a.count / a.variance -
+                              b.best * b.count / b.variance;
+        if (growth <= 3 * std::log(both.count)) {
+          members[i] = std::move(both);
+          members.erase(members.begin() + static_cast<std::ptrdiff_t>(j));
+          j = i + 1;
+          continue;
+        }
+      }
+      ++j;
+    }
+  for (Member& m : members) {
+    if (m.regions.size() < 2) continue;
+    std::sort(m.regions.begin(), m.regions.end());
+    relations.push_back({RelationKind::coplanar, m.regions, {}, 0});
+  }
+}
+
+// Sets what a member shares; surfaces that share nothing stay as they are.
+void write(const Member& member, std::vector<Primitive>& primitives) {
+  if (member.constraints > 0 || member.regions.size() > 1)
+    for (const Index r : member.regions) primitives[r] = primitive_of(member.shape);
+}
+
 }  // namespace
 
 std::vector<SegmentRelation> regularize(const SegmentDomain& domain, const std::vector<Index>& labels,
                                         std::vector<Primitive>& primitives) {
   std::vector<Member> members = make_members(domain, labels, primitives);
+  std::vector<SegmentRelation> relations;
+  unite_planes(members, relations);
   while (true) {
     Regularizer regularizer(members);
     regularizer.run();
     if (const std::optional<std::size_t> worst = regularizer.strained()) {
-      members.erase(members.begin() + static_cast<std::ptrdiff_t>(*worst));
+      // A place held on an axis of slightly wrong direction may be what strains it.
+      if (regularizer.shares_place(*worst)) {
+        members[*worst].place = false;
+      } else {
+        write(members[*worst], primitives);
+        members.erase(members.begin() + static_cast<std::ptrdiff_t>(*worst));
+      }
       continue;
     }
-    for (const Member& m : regularizer.members_)
-      if (m.constraints > 0) primitives[m.region] = primitive_of(m.shape);
-    for (SegmentRelation& relation : regularizer.relations_)
+    for (const Member& m : regularizer.members_) write(m, primitives);
+    relations.insert(relations.end(), regularizer.relations_.begin(), regularizer.relations_.end());
+    for (SegmentRelation& relation : relations)
       if (relation.kind == RelationKind::equal_radius) relation.value *= domain.scale;
-    return std::move(regularizer.relations_);
+    return relations;
   }
 }
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <numbers>
 #include <variant>
 #include <vector>
 
@@ -10,11 +10,12 @@
 #include "segment/regularize.h"
 #include "segment/segment_domain.h"
 #include "support/csg.h"
+#include "support/models.h"
 
 namespace bisector::test {
 namespace {
 
-// Rows of points on a graph over a grid, noise along z, a region of its own each.
+// Patches of surfaces with noise along their normals, a region each.
 struct Scene {
   TriangleMesh mesh;
   std::vector<Index> labels;
@@ -22,7 +23,7 @@ struct Scene {
   SplitMix64 random{7};
   double noise = 0;
 
-  double gauss() { return std::sqrt(-2 * std::log(1 - random.unit())) * std::cos(6.283185307179586 * random.unit()); }
+  double gauss() { return std::sqrt(-2 * std::log(1 - random.unit())) * std::cos(2 * std::numbers::pi * random.unit()); }
 
   // A patch of n x n vertices at place(s, t), moved along normal(s, t).
   template <class Place, class Normal>
@@ -61,11 +62,12 @@ struct Scene {
         [=](double, double) { return n; });
   }
 
-  // Relations and surfaces, in the domain's coordinates, from slightly wrong ones.
+  // Relations, and the surfaces in the domain's coordinates.
   std::vector<SegmentRelation> regularized(std::vector<Primitive>& found) const {
     const SegmentDomain domain = make_segment_domain(mesh);
     found.clear();
-    for (const Primitive& p : primitives) found.push_back(from_local(p, (-1 / domain.scale) * domain.origin, 1 / domain.scale));
+    for (const Primitive& p : primitives)
+      found.push_back(from_local(p, (-1 / domain.scale) * domain.origin, 1 / domain.scale));
     return regularize(domain, labels, found);
   }
 };
@@ -91,7 +93,7 @@ TEST(Regularize, EqualParametersBecomeEqual) {
     scene.add_cylinder({4, 0, 0}, axis, 1);
     scene.add_cylinder({0, 5, 0}, across, 0.5);
     scene.add_plane({-4, 0, 0}, axis);
-    scene.add_cylinder(Vec3{0, 0, 0} + 1.0 * axis, axis, 0.7);
+    scene.add_cylinder(axis, axis, 0.7);
     std::vector<Primitive> found;
     const auto relations = scene.regularized(found);
     for (const auto& [a, b] : {std::pair<Index, Index>{0, 1}, {0, 3}, {1, 4}})
@@ -122,7 +124,7 @@ TEST(Regularize, DifferentParametersStayApart) {
     scene.add_cylinder({0, 0, 0}, axis, 1);
     scene.add_cylinder({4, 0, 0}, axis + difference * Vec3{-6, 3, 0}, 1 + difference);
     scene.add_plane({-4, 0, 0}, {0.2, -0.3, 1});
-    scene.add_plane(Vec3{-4, 3, 0.9 + 3 * difference} , {0.2, -0.3, 1});
+    scene.add_plane(Vec3{-4, 3, 0.9 + 3 * difference}, {0.2, -0.3, 1});
     std::vector<Primitive> found;
     const auto relations = scene.regularized(found);
     EXPECT_FALSE(holds(relations, RelationKind::equal_radius, 0, 1));
@@ -151,7 +153,9 @@ TEST(Regularize, FindsNothingInRandomSurfaces) {
     scene.noise = 1e-3;
     scene.random = SplitMix64(seed);
     for (int i = 0; i < 8; ++i) {
-      const auto draw = [&] { return Vec3{scene.random.unit() - 0.5, scene.random.unit() - 0.5, scene.random.unit() - 0.5}; };
+      const auto draw = [&] {
+        return Vec3{scene.random.unit() - 0.5, scene.random.unit() - 0.5, scene.random.unit() - 0.5};
+      };
       const Vec3 point = 20.0 * draw(), axis = draw();
       scene.add_cylinder(point, axis, 0.5 + scene.random.unit());
     }
