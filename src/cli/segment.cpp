@@ -286,7 +286,8 @@ void print_summary(Console& console, const SegmentCommand& command, const Segmen
     console.print(
         fmt::format("borders    {:.6g} long, {:.6g} before smoothing", result.border_after, result.border_before));
   if (command.options.regularize)
-    console.print(fmt::format("shared     {} of parameters", counted(result.relations.size(), "relation", "relations")));
+    console.print(
+        fmt::format("shared     {} of parameters", counted(result.relations.size(), "relation", "relations")));
   console.print(fmt::format("steps      {}, {}, {}, {}", counted(result.iterations, "iteration", "iterations"),
                             counted(result.insertions, "insertion", "insertions"),
                             counted(result.merges, "merge", "merges"),

@@ -9,8 +9,8 @@
 namespace bisector {
 namespace {
 
-// Units that a length l of border costs. The likelihood leaves it open; on generated parts with noise 4 of 1/4, 1/2, 1 to
-// 16 leaves the most triangles with their surfaces.
+// Units that a length l of border costs. The likelihood leaves it open; on generated parts with noise 4 of 1/4, 1/2, 1
+// to 16 leaves the most triangles with their surfaces.
 constexpr double kBorderCost = 4;
 constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
@@ -26,9 +26,9 @@ double signed_distance(const Proxy& proxy, const Vec3& p) {
 
 // Sums over a region.
 struct Sums {
-  double distance = 0, area = 0;              // squared distance times area
-  double ends = 0, differences = 0;           // over edges: mean of both ends' squares, half the squared difference
-  double lengths = 0, edges = 0;              // squared lengths; number
+  double distance = 0, area = 0;     // squared distance times area
+  double ends = 0, differences = 0;  // over edges: mean of both ends' squares, half the squared difference
+  double lengths = 0, edges = 0;     // squared lengths; number
 };
 
 }  // namespace

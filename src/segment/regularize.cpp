@@ -17,13 +17,13 @@
 namespace bisector {
 namespace {
 
-using std::numbers::pi;
 using Eigen::Matrix2d;
 using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
+using std::numbers::pi;
 
-constexpr double kLeastNoise = 1e-7;  // of distances in the unit-sized model: single precision's
+constexpr double kLeastNoise = 1e-7;       // of distances in the unit-sized model: single precision's
 constexpr std::size_t kEnoughInside = 24;  // vertices inside a region, without which those on its border count too
 constexpr int kSteps = 30;                 // of Levenberg and Marquardt
 constexpr int kRounds = 30;                // of Newton, for right angles
@@ -365,7 +365,7 @@ Value joined_direction(const Value& a, const Value& b) {
 // --- Right angles ---
 
 struct RightAngle {
-  std::size_t a, b;  // directions
+  std::size_t a, b;           // directions
   double log_likelier, most;  // most: that the squares may grow by
 };
 
@@ -376,8 +376,8 @@ std::vector<RightAngle> right_angles(const std::vector<Value>& directions) {
     for (std::size_t j = i + 1; j < directions.size(); ++j) {
       const Value &a = directions[i], &b = directions[j];
       const VectorXd cosine = VectorXd::Constant(1, a.mean.dot(b.mean));
-      const MatrixXd variance = MatrixXd::Constant(
-          1, 1, b.mean.dot(a.covariance * b.mean) + a.mean.dot(b.covariance * a.mean));
+      const MatrixXd variance =
+          MatrixXd::Constant(1, 1, b.mean.dot(a.covariance * b.mean) + a.mean.dot(b.covariance * a.mean));
       const double l = log_factor(cosine, variance, 2);  // cosines between random directions are spread evenly
       const double none = log_factor(VectorXd::Zero(1), variance, 2);
       if (l > least) found.push_back({i, j, l, 2 * (none - least)});
@@ -557,7 +557,8 @@ class Regularizer {
       for (const std::size_t i : group.items) {
         const Member& m = members_[i];
         if (!has_axis(m.shape) || !m.place) continue;
-        axes.push_back({Vector2d(dot(m.shape.point, u), dot(m.shape.point, v)), covariance(m, {along_u, along_v}), {i}});
+        axes.push_back(
+            {Vector2d(dot(m.shape.point, u), dot(m.shape.point, v)), covariance(m, {along_u, along_v}), {i}});
       }
       // How far an axis is off where another surface is depends on its direction, too.
       const Matrix2d tilt = f.transpose() * group.covariance * f;
@@ -720,8 +721,8 @@ void unite_planes(std::vector<Member>& members, std::vector<SegmentRelation>& re
       const Member &a = members[i], &b = members[j];
       if (a.shape.type == SurfaceType::plane && b.shape.type == SurfaceType::plane) {
         Member both = united(a, b);
-        const double growth = both.best * both.count / both.variance - a.best * a.count / a.variance -
-                              b.best * b.count / b.variance;
+        const double growth =
+            both.best * both.count / both.variance - a.best * a.count / a.variance - b.best * b.count / b.variance;
         if (growth <= 3 * std::log(both.count)) {
           members[i] = std::move(both);
           members.erase(members.begin() + static_cast<std::ptrdiff_t>(j));

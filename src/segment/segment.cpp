@@ -224,8 +224,8 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
 }
 
 // Smooths the borders and fits the primitives anew, with weights that grow up to the one asked for, so long as the
-// distance does not grow too far; borders go on from where the last weight left them. Returns the last weight, 0 if even
-// the least raised the distance too far.
+// distance does not grow too far; borders go on from where the last weight left them. Returns the last weight, 0 if
+// even the least raised the distance too far.
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
                      double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
   const auto distance = [&](Index t, Index r) { return distance_to(domain, t, proxies[r]); };

@@ -21,8 +21,8 @@ namespace {
 using Cost = std::int64_t;
 constexpr double kUnit = 0x1p40;  // of Cost, to the energy at the start
 
-constexpr double kFar = 1e100;    // squared distances from here on are no numbers to add up
-constexpr int kSplits = 4;         // of connected changes that the topology forbids
+constexpr double kFar = 1e100;  // squared distances from here on are no numbers to add up
+constexpr int kSplits = 4;      // of connected changes that the topology forbids
 constexpr int kFirstRings = 4;  // width of a strip that is widened where its cut asks for more
 
 // Triangles along a region's borders, and the energy of a labelling x of them: 0 for the region, 1 for another one that
@@ -430,8 +430,7 @@ SmoothBordersResult smooth_borders(const DualGraph& graph, const std::vector<Tri
                   std::to_string(label) + ": give one for each region");
   for (const double weight : options.weights)
     if (!(weight >= 0) || !std::isfinite(weight))
-      throw Error("a weight of the borders' length is " + std::to_string(weight) +
-                  "; it has to be a number from 0 on");
+      throw Error("a weight of the borders' length is " + std::to_string(weight) + "; it has to be a number from 0 on");
   return BorderSmoother(graph, triangles, distance, options, labels).run();
 }
 

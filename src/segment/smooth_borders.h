@@ -23,12 +23,12 @@ struct SmoothBordersResult {
               refused = 0;  // regions whose borders changed; cuts that would have changed the topology
 };
 
-// Lowers the sum of the triangles' distances and the borders' costs. Each region in turn, in ascending order, takes from
-// all regions that it meets and gives to them at once, by the cut of least energy, until none changes. `distance(t, r)`
-// is triangle t's squared distance to region r's proxy, times its area. Of a cut that would take a region apart, empty
-// it, or change its Euler characteristic, its borders' number of loops or which regions it meets, the triangles that do
-// so stay where they are, or parts of it are made, or nothing. Regions have to be connected. Throws Error for weights
-// that are negative or not finite, or are not one for each region.
+// Lowers the sum of the triangles' distances and the borders' costs. Each region in turn, in ascending order, takes
+// from all regions that it meets and gives to them at once, by the cut of least energy, until none changes.
+// `distance(t, r)` is triangle t's squared distance to region r's proxy, times its area. Of a cut that would take a
+// region apart, empty it, or change its Euler characteristic, its borders' number of loops or which regions it meets,
+// the triangles that do so stay where they are, or parts of it are made, or nothing. Regions have to be connected.
+// Throws Error for weights that are negative or not finite, or are not one for each region.
 SmoothBordersResult smooth_borders(const DualGraph& graph, const std::vector<Triangle>& triangles,
                                    const std::function<double(Index, Index)>& distance,
                                    const SmoothBordersOptions& options, std::vector<Index>& labels);

@@ -23,7 +23,9 @@ struct Scene {
   SplitMix64 random{7};
   double noise = 0;
 
-  double gauss() { return std::sqrt(-2 * std::log(1 - random.unit())) * std::cos(2 * std::numbers::pi * random.unit()); }
+  double gauss() {
+    return std::sqrt(-2 * std::log(1 - random.unit())) * std::cos(2 * std::numbers::pi * random.unit());
+  }
 
   // A patch of n x n vertices at place(s, t), moved along normal(s, t).
   template <class Place, class Normal>
