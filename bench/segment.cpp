@@ -283,7 +283,8 @@ int main(int argc, char** argv) {
   cli::add_words(&app, "--start", options.segment.start, cli::kStartWords, cli::kStartWords.list().c_str());
   app.add_option("--iterations", options.segment.iterations, "Lloyd steps at most")->check(CLI::Range(0, 100'000));
   app.add_option("--smooth", options.segment.smooth, "weight of the borders' length")->check(CLI::Range(0.0, 1e6));
-  app.add_option("--fuzzy-rings", options.segment.fuzzy_rings, "width of the strip")->check(CLI::Range(1, 1000));
+  app.add_option("--fuzzy-rings", options.segment.fuzzy_rings, "width of the strip; 0: as it takes")
+      ->check(CLI::Range(0, 1000));
   app.add_option("--repeat", options.repeat, "runs of each; times are medians")->check(CLI::Range(1, 1000));
   app.add_flag("--peers", options.peers, "also CGAL's planar regions, L2 and L2,1; for edge-manifold meshes");
   app.add_flag("--polygons", options.polygons, "instead: coarse meshes of planar regions, CGAL's beside them");

@@ -121,11 +121,13 @@ struct SegmentOptions {
                        // of the vertices' bounding box
   SegmentSurfaces surfaces = SegmentSurfaces::all;
   SegmentStart start = SegmentStart::merging;
-  int iterations = 30;   // Lloyd steps at most, each time
-  double smooth = 1;     // weight of the borders' length; 0: borders are left as they are. Halved where the root mean
-                         // square distance would grow by more than 5 percent
-  int fuzzy_rings = 1;   // triangles so many steps from a border may change sides
-  bool project = false;  // move the vertices onto the proxies
+  int iterations = 30;      // Lloyd steps at most, each time
+  double smooth = 1;        // weight of the borders' length, over that which the distances left suggest; 0: borders are
+                            // left as they are. Halved where the root mean square distance would grow by more than 5
+                            // percent
+  int fuzzy_rings = 0;      // triangles so many steps from a border may change sides; 0: as many as it takes
+  bool regularize = false;  // let planes, spheres, cylinders, cones and tori share parameters where the data allow
+  bool project = false;     // move the vertices onto the proxies
   std::uint64_t random_seed = 1;  // of the random start
 };
 
@@ -135,6 +137,25 @@ struct SegmentRegion {
   double area = 0;
   double rms = 0;  // root mean square distance from vertices and barycentres to the proxy, a length
   double max = 0;  // the largest of these distances, triangles of no area left out
+};
+
+// What SegmentOptions::regularize made equal.
+enum class RelationKind {
+  parallel,       // normals of planes and axes
+  perpendicular,  // those of `regions` to those of `others`
+  coaxial,        // axes in one line
+  coplanar,
+  equal_radius,  // of spheres and cylinders, and the radius or minor radius of tori
+  equal_angle    // of cones
+};
+
+// In lower case, words joined by '_', as in reports.
+BISECTOR_API const char* name_of(RelationKind kind);
+
+struct SegmentRelation {
+  RelationKind kind = RelationKind::parallel;
+  std::vector<Index> regions, others;  // ascending; a torus whose two radii are equal to others' counts twice
+  double value = 0;                    // the radius, a length, or the angle, radians
 };
 
 struct SegmentSeconds {
@@ -154,6 +175,7 @@ struct SegmentResult {
   double border_before = 0, border_after = 0;  // length of the borders between regions before and after smoothing
   double rms_before = 0;                       // before smoothing, a length
   double smooth = 0;                           // the weight that borders were smoothed with
+  std::vector<SegmentRelation> relations;      // with SegmentOptions::regularize
   std::vector<Vec3> projected;  // the vertices on the proxies, with SegmentOptions::project; shared ones averaged
   SegmentSeconds seconds;
 };

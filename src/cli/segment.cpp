@@ -94,16 +94,20 @@ void add_options(CLI::App* app, SegmentCommand& command) {
       ->type_name("N")
       ->check(whole_number(0, 100'000))
       ->group("Regions");
+  app->add_flag("--regularize", options.regularize,
+                "parallel and perpendicular axes, coincident axes and\n"
+                "planes, equal radii and angles, where the data allow")
+      ->group("Regions");
   app->add_option("--smooth", options.smooth,
-                  "weight of the borders' length against distances; 0:\n"
-                  "borders are left as they are; default 1, up to 10 for\n"
-                  "free forms")
+                  "weight of the borders' length, over that which the\n"
+                  "distances left suggest; 0: borders are left as they are;\n"
+                  "default 1")
       ->type_name("LAMBDA")
       ->check(number_below(1e6))
       ->group("Borders");
   app->add_option("--fuzzy-rings", options.fuzzy_rings,
                   "triangles up to so many steps from a border may change\n"
-                  "sides; default 1, 2 or 3 for free forms")
+                  "sides; default as many as it takes")
       ->type_name("K")
       ->check(whole_number(1, 1000))
       ->group("Borders");
@@ -227,6 +231,14 @@ std::string describe_regions(const SegmentResult& result) {
   return text;
 }
 
+Json relation_json(const SegmentRelation& relation) {
+  Json json{{"kind", name_of(relation.kind)}, {"regions", relation.regions}};
+  if (relation.kind == RelationKind::perpendicular) json["others"] = relation.others;
+  if (relation.kind == RelationKind::equal_radius) json["radius"] = relation.value;
+  if (relation.kind == RelationKind::equal_angle) json["angle"] = 180 / std::numbers::pi * relation.value;
+  return json;
+}
+
 Json segmentation_json(const SegmentResult& result, double diagonal) {
   Json json{{"rms", result.rms},
             {"rms_percent", 100 * result.rms / diagonal},
@@ -243,6 +255,8 @@ Json segmentation_json(const SegmentResult& result, double diagonal) {
             {"energies", result.energies}};
   json["regions"] = Json::array();
   for (const SegmentRegion& region : result.regions) json["regions"].push_back(region_json(region));
+  json["relations"] = Json::array();
+  for (const SegmentRelation& relation : result.relations) json["relations"].push_back(relation_json(relation));
   return json;
 }
 
@@ -289,6 +303,9 @@ void print_summary(Console& console, const SegmentCommand& command, const Segmen
     console.print(
         fmt::format("borders    {:.6g} long, {:.6g} before smoothing", result.border_after, result.border_before));
   if (polygons) console.print(fmt::format("polygons   {}", size_of(polygons_json(*polygons))));
+  if (command.options.regularize)
+    console.print(
+        fmt::format("shared     {} of parameters", counted(result.relations.size(), "relation", "relations")));
   console.print(fmt::format("steps      {}, {}, {}, {}", counted(result.iterations, "iteration", "iterations"),
                             counted(result.insertions, "insertion", "insertions"),
                             counted(result.merges, "merge", "merges"),
@@ -372,7 +389,8 @@ Command add_segment(CLI::App& program) {
                               "Examples:\n"
                               "  bisector segment part.stl -o regions.ply --proxies 22 --preview regions.png\n"
                               "  bisector segment part.stl -o regions.obj --error 0.05 --report regions.json\n"
-                              "  bisector segment bunny.off -o regions.ply --proxies 28 --smooth 5 --fuzzy-rings 2\n\n"
+                              "  bisector segment part.stl -o regions.ply --proxies 22 --regularize\n"
+                              "  bisector segment bunny.off -o regions.ply --proxies 28\n\n"
                               ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C "
                               "stops the run; nothing is\n"
                               "written.");

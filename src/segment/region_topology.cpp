@@ -172,6 +172,7 @@ std::size_t RegionTopology::loops(Index region, const std::vector<Index>& vertic
   std::vector<Fan> fans;
   for (const Index v : vertices)
     for (const Index* t = at_vertex_.begin(v); t != at_vertex_.end(v); ++t) add_border_edges(v, region, *t, starts);
+  if (starts.empty() || is_one_chain(region, vertices, starts)) return starts.empty() ? 0 : 1;
   std::size_t count = 0;
   for (const std::size_t start : starts) {
     if (seen_[start]) continue;
@@ -194,6 +195,29 @@ std::size_t RegionTopology::loops(Index region, const std::vector<Index>& vertic
   }
   for (const std::size_t edge : followed) seen_[edge] = 0;
   return count;
+}
+
+// Whether border edges hang together at the given vertices, so that they are of one loop without a look at its rest.
+bool RegionTopology::is_one_chain(Index region, const std::vector<Index>& vertices,
+                                  std::vector<std::size_t> edges) const {
+  sort_once(edges);
+  DisjointSets chains(edges.size());
+  std::vector<Fan> fans;
+  std::vector<std::size_t> of_triangle;
+  for (const Index v : vertices) {
+    find_fans(v, region, fans);
+    std::vector<std::size_t> first(fans.size(), edges.size());  // a border edge of each fan
+    for (const Fan& fan : fans) {
+      of_triangle.clear();
+      add_border_edges(v, region, fan.triangle, of_triangle);
+      for (const std::size_t edge : of_triangle) {
+        const auto at = static_cast<std::size_t>(std::lower_bound(edges.begin(), edges.end(), edge) - edges.begin());
+        if (first[fan.root] == edges.size()) first[fan.root] = at;
+        else chains.join(first[fan.root], at);
+      }
+    }
+  }
+  return chains.count() == 1;
 }
 
 // The region's triangles about a vertex, ascending, joined across the edges that end there; the number of fans.

@@ -46,6 +46,7 @@ class RegionTopology {
 
   long long euler(Index region, const std::vector<Index>& changed, const std::vector<Index>& vertices) const;
   std::size_t loops(Index region, const std::vector<Index>& vertices);
+  bool is_one_chain(Index region, const std::vector<Index>& vertices, std::vector<std::size_t> edges) const;
   std::size_t find_fans(Index vertex, Index region, std::vector<Fan>& fans) const;
   void add_border_edges(Index vertex, Index region, Index triangle, std::vector<std::size_t>& edges) const;
   std::size_t triangles_at(std::size_t edge, Index region) const;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -13,12 +14,14 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/stopwatch.h"
+#include "segment/border_weights.h"
 #include "segment/flood.h"
 #include "segment/improve_partition.h"
 #include "segment/lloyd.h"
 #include "segment/merge_regions.h"
 #include "segment/primitive.h"
 #include "segment/region_primitives.h"
+#include "segment/regularize.h"
 #include "segment/segment_domain.h"
 #include "segment/smooth_borders.h"
 
@@ -33,9 +36,10 @@ constexpr int kPlanarSteps = 4;  // of Lloyd's iteration, for the pieces
 constexpr std::size_t kSpareShare =
     5;  // one region in so many is added: which can be spared shows after Lloyd's iteration
 
-// Smoothing: the weight is halved while the root mean square distance grows by more than this ratio.
+// Smoothing: the root mean square distance may grow by this ratio, and the weights tried first and least are that asked
+// for, halved so many times.
 constexpr double kMostGrowth = 1.05;
-constexpr int kHalvings = 6;
+constexpr int kFirstHalvings = 3, kMostHalvings = 8;
 constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
 // Types and smooth borders cost some of the error; where they take more than was left, a smaller error is aimed at.
@@ -52,8 +56,8 @@ void check_options(const SegmentOptions& options) {
     throw Error(fmt::format("{} iterations are asked for; ask for 0 or more", options.iterations));
   if (!(options.smooth >= 0) || !std::isfinite(options.smooth))
     throw Error(fmt::format("the smoothing weight is {}; it must be 0 or positive", options.smooth));
-  if (options.fuzzy_rings < 1)
-    throw Error(fmt::format("{} fuzzy rings are asked for; ask for 1 or more", options.fuzzy_rings));
+  if (options.fuzzy_rings < 0)
+    throw Error(fmt::format("{} fuzzy rings are asked for; ask for 0 or more", options.fuzzy_rings));
 }
 
 // How many regions there can be nearest to the number asked for: each component needs one, and each a triangle.
@@ -219,27 +223,36 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
   relax_borders(domain, proxies, std::move(all), labels, distances, evaluations);
 }
 
-// Smooths the borders and fits the primitives anew. Returns the weight, 0 if every one raised the distance too far.
+// Smooths the borders and fits the primitives anew, with weights that grow up to the one asked for, so long as the
+// distance does not grow too far; borders go on from where the last weight left them. Returns the last weight, 0 if
+// even the least raised the distance too far.
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
                      double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
-  // Distances that differ by rounding only say nothing about where a border belongs.
-  const auto distance = [&](Index t, Index r) {
-    return distance_to(domain, t, proxies[r]) + kNegligible * kNegligible * domain.areas[t];
-  };
-  SmoothBordersOptions smoothing;
-  smoothing.lambda = options.smooth;
-  smoothing.rings = options.fuzzy_rings;
-  for (int k = 0; k < kHalvings; ++k, smoothing.lambda /= 2) {
+  const auto distance = [&](Index t, Index r) { return distance_to(domain, t, proxies[r]); };
+  const std::vector<double> weights = border_weights(domain, region_noise(domain, labels, proxies));
+  const double most = kMostGrowth * rms + kNegligible;
+  const std::vector<Primitive> unsmoothed = primitives;
+  double used = 0;
+  const auto advance = [&](double weight) {
+    SmoothBordersOptions smoothing;
+    smoothing.rings = options.fuzzy_rings;
+    for (const double w : weights) smoothing.weights.push_back(weight * w);
     std::vector<Index> smoothed = labels;
-    std::vector<Primitive> refined = primitives;
+    std::vector<Primitive> refined = unsmoothed;
     smooth_borders(domain.graph, domain.triangles, distance, smoothing, smoothed);
     refine_primitives(domain, smoothed, refined);
-    if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > kMostGrowth * rms + kNegligible) continue;
+    if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > most) return false;
     labels = std::move(smoothed);
     primitives = std::move(refined);
-    return smoothing.lambda;
-  }
-  return 0;
+    used = weight;
+    return true;
+  };
+  int halvings = kFirstHalvings;
+  while (!advance(std::ldexp(options.smooth, -halvings)) && halvings < kMostHalvings) ++halvings;
+  if (used == 0) return 0;
+  while (halvings > 0 && advance(std::ldexp(options.smooth, -(halvings - 1)))) --halvings;
+  if (halvings > 0) advance(std::numbers::sqrt2 * used);
+  return used;
 }
 
 SegmentRegion measure_region(const SegmentDomain& domain, const Primitive& primitive, const Index* begin,
@@ -297,6 +310,7 @@ struct Classified {
   std::vector<Primitive> primitives;
   double rms_before = 0, rms = 0;  // before and after smoothing, in the unit-sized model
   double border_before = 0, border_after = 0, smooth = 0;
+  std::vector<SegmentRelation> relations;
 };
 
 Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition& partition, SegmentSeconds& seconds) {
@@ -321,6 +335,7 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
     result.border_after = border_length(domain.graph, result.labels);
   }
   sort_regions(domain, result.labels, result.primitives);
+  if (options.regularize) result.relations = regularize(domain, result.labels, result.primitives);
   result.rms = std::sqrt(mean_square(domain, result.labels, proxies_of(result.primitives)));
   seconds.smooth += clock.lap();
   return result;
@@ -366,6 +381,7 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   result.rms = domain.scale * classified.rms;
   result.rms_before = domain.scale * classified.rms_before;
   result.smooth = classified.smooth;
+  result.relations = std::move(classified.relations);
   result.border_before = classified.border_before;
   result.border_after = classified.border_after;
   result.labels = std::move(classified.labels);

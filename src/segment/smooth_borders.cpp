@@ -5,7 +5,9 @@
 #include <boost/graph/compressed_sparse_row_graph.hpp>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "bisector/error.h"
@@ -17,25 +19,22 @@ namespace {
 
 // Energies are fixed-point numbers: sums and flows are exact, and no residue of rounding keeps a path open.
 using Cost = std::int64_t;
-constexpr double kUnit = 0x1p40;  // of Cost, to an energy of 1
+constexpr double kUnit = 0x1p40;  // of Cost, to the energy at the start
 
-// The triangles that may change sides, and the energy of a labelling x of them with 0 and 1.
+constexpr double kFar = 1e100;  // squared distances from here on are no numbers to add up
+constexpr int kSplits = 4;      // of connected changes that the topology forbids
+constexpr int kFirstRings = 4;  // width of a strip that is widened where its cut asks for more
+
+// Triangles along a region's borders, and the energy of a labelling x of them: 0 for the region, 1 for another one that
+// each triangle has for itself.
 struct Strip {
   struct Link {
-    Index i, j;  // positions in `triangles`
-    Cost cost;   // if x_i != x_j
+    Index i, j;        // positions in `triangles`
+    Cost forth, back;  // if x_i = 0 and x_j = 1, and the other way round
   };
-  std::vector<Index> triangles;
-  std::vector<std::array<Cost, 2>> costs;  // of x_i = 0 and x_i = 1, links to triangles beside the strip included
+  std::vector<Index> triangles, others;
+  std::vector<Cost> costs;  // of x_i = 1 over x_i = 0, links to triangles beside the strip included
   std::vector<Link> links;
-
-  Cost energy(const std::vector<char>& x) const {
-    Cost sum = 0;
-    for (std::size_t i = 0; i < triangles.size(); ++i) sum += costs[i][static_cast<std::size_t>(x[i])];
-    for (const Link& link : links)
-      if (x[link.i] != x[link.j]) sum += link.cost;
-    return sum;
-  }
 };
 
 // The labelling of least energy, by maximum flow from label 0 to label 1 (Boykov and Kolmogorov 2004).
@@ -48,11 +47,10 @@ std::vector<char> minimum_cut(const Strip& strip) {
     capacities.insert(capacities.end(), {forth, back});
   };
   for (std::size_t i = 0; i < n; ++i) {
-    const Cost surplus = strip.costs[i][1] - strip.costs[i][0];
-    if (surplus > 0) connect(source, i, surplus, 0);
-    if (surplus < 0) connect(i, sink, -surplus, 0);
+    if (strip.costs[i] > 0) connect(source, i, strip.costs[i], 0);
+    if (strip.costs[i] < 0) connect(i, sink, -strip.costs[i], 0);
   }
-  for (const Strip::Link& link : strip.links) connect(link.i, link.j, link.cost, link.cost);
+  for (const Strip::Link& link : strip.links) connect(link.i, link.j, link.forth, link.back);
 
   using Network = boost::compressed_sparse_row_graph<boost::directedS, boost::no_property, std::size_t>;
   std::vector<std::size_t> numbers(arcs.size());
@@ -82,25 +80,36 @@ class BorderSmoother {
                  const std::function<double(Index, Index)>& distance, const SmoothBordersOptions& options,
                  std::vector<Index>& labels)
       : graph_(graph), distance_(distance), options_(options), labels_(labels), topology_(graph, triangles, labels),
-        members_(topology_.regions()), meets_(topology_.regions()), position_(labels.size(), kNone) {
+        members_(topology_.regions()), meets_(topology_.regions()), position_(labels.size(), kNone),
+        before_(labels.size(), kNone), next_(labels.size(), kNone) {
     for (std::size_t t = 0; t < labels.size(); ++t) members_[labels[t]].push_back(static_cast<Index>(t));
     for (Index r = 0; r < topology_.regions(); ++r)
       for (const auto& [other, count] : topology_.contacts(r)) meets_[r].push_back(other);
+    measure_energy();
   }
 
   SmoothBordersResult run() {
     SmoothBordersResult result;
+    // Regions are tried again where they or one beside them changed since.
+    const std::size_t regions = topology_.regions();
+    std::vector<std::size_t> changed(regions, 1), tried(regions, 0);
+    std::size_t now = 1;
     for (int sweep = 0; sweep < options_.sweeps; ++sweep) {
-      bool changed = false;
-      for (Index a = 0; a < meets_.size(); ++a)
-        for (const Index b : meets_[a]) {
-          if (b < a) continue;
-          const Outcome outcome = smooth_pair(a, b);
-          result.cuts += outcome == Outcome::cut;
-          result.refused += outcome == Outcome::refused;
-          changed |= outcome == Outcome::cut;
-        }
-      if (!changed) break;
+      bool any = false;
+      for (Index region = 0; region < regions; ++region) {
+        std::size_t latest = changed[region];
+        for (const Index other : meets_[region]) latest = std::max(latest, changed[other]);
+        if (latest <= tried[region]) continue;
+        tried[region] = now;
+        const Outcome outcome = improve(region);
+        result.refused += outcome == Outcome::refused;
+        if (outcome != Outcome::cut) continue;
+        ++result.cuts;
+        ++now;
+        for (const Index r : touched_) changed[r] = now;
+        any = true;
+      }
+      if (!any) break;
     }
     return result;
   }
@@ -109,89 +118,167 @@ class BorderSmoother {
   enum class Outcome { same, cut, refused };
   using Triangles = std::vector<Index>;
 
-  Outcome smooth_pair(Index a, Index b) {
-    const Strip strip = make_strip(a, b);
-    const std::vector<char> x = minimum_cut(strip);
-    if (strip.energy(x) >= strip.energy(sides(strip, b))) return Outcome::same;
-    const std::vector<Triangles> groups = connected_changes(strip, x, b);
-    return move(strip, groups, 0, groups.size(), a, b) ? Outcome::cut : Outcome::refused;
-  }
-
-  std::vector<char> sides(const Strip& strip, Index b) const {
-    std::vector<char> x(strip.triangles.size());
-    for (std::size_t i = 0; i < x.size(); ++i) x[i] = labels_[strip.triangles[i]] == b;
-    return x;
-  }
-
-  // --- The strip and its energy (thesis 2.3.3) ---
-
-  Strip make_strip(Index a, Index b) {
+  // Moves triangles between a region and those it meets, all at once, so that the energy falls the most.
+  Outcome improve(Index region) {
+    int rings = options_.rings > 0 ? options_.rings : kFirstRings;
     Strip strip;
-    gather(a, b, strip.triangles);
-    for (std::size_t i = 0; i < strip.triangles.size(); ++i) position_[strip.triangles[i]] = static_cast<Index>(i);
-    const double unit = kUnit / std::max(1.0, options_.lambda);
-    const auto fixed = [&](double cost) { return static_cast<Cost>(std::llround(unit * cost)); };
-    for (std::size_t i = 0; i < strip.triangles.size(); ++i) {
+    std::vector<char> x;
+    for (;; rings *= 2) {
+      const std::size_t last = gather(region, rings, strip);
+      fill(region, strip);
+      x = minimum_cut(strip);
+      if (options_.rings > 0 || !changes_from(last, region, strip, x)) break;
+    }
+    touched_.clear();
+    for (std::size_t i = 0; i < x.size(); ++i) {
       const Index t = strip.triangles[i];
-      const double d0 = distance_(t, a), d1 = distance_(t, b), sum = d0 + d1;
-      const double share = sum > 0 && std::isfinite(sum) ? d0 / sum : 0.5;
-      std::array<Cost, 2> costs{fixed(share), fixed(1 - share)};
-      ++costs[labels_[t] == a ? 1 : 0];  // of equally good labellings the one with the fewest changes
+      before_[t] = labels_[t];
+      next_[t] = labels_[t] == region ? strip.others[i] : region;
+    }
+    std::vector<Triangles> groups = connected_changes(region, strip, x);
+    const bool same = groups.empty();
+    // What the topology forbids it may allow once others have moved, or together with others.
+    std::size_t moved = 0, last;
+    do {
+      last = groups.size();
+      moved += std::erase_if(groups, [&](const Triangles& group) { return move(group, true, 0); });
+    } while (!groups.empty() && groups.size() < last);
+    Triangles left;
+    for (const Triangles& group : groups) left.insert(left.end(), group.begin(), group.end());
+    if (groups.size() > 1 && move(left, true, 0)) {
+      ++moved;
+      groups.clear();
+    }
+    for (const Triangles& group : groups) moved += move(group, true, kSplits);
+    for (const Index t : strip.triangles) before_[t] = kNone;
+    return moved > 0 ? Outcome::cut : same ? Outcome::same : Outcome::refused;
+  }
+
+  // Whether a labelling moves one of the strip's triangles from a position on: at the strip's end more might move.
+  bool changes_from(std::size_t position, Index region, const Strip& strip, const std::vector<char>& x) const {
+    for (std::size_t i = position; i < x.size(); ++i)
+      if ((labels_[strip.triangles[i]] == region) != (x[i] == 0)) return true;
+    return false;
+  }
+
+  // --- The strip and its energy ---
+
+  void measure_energy() {
+    for (Index t = 0; t < labels_.size(); ++t) {
+      const double d = distance_(t, labels_[t]);
+      if (d < kFar) energy_ += d;
       for (std::size_t k = graph_.neighbours.offsets[t]; k < graph_.neighbours.offsets[t + 1]; ++k) {
         const Index u = graph_.neighbours.values[k];
-        if (labels_[u] != a && labels_[u] != b) continue;
-        const double length = graph_.edge_length[k], scale = length + graph_.mean_edge_length;
-        const Cost cost = scale > 0 ? fixed(options_.lambda * (length / scale)) : 0;
-        if (position_[u] == kNone) costs[labels_[u] == a ? 1 : 0] += cost;
-        else if (t < u) strip.links.push_back({static_cast<Index>(i), position_[u], cost});
+        if (t < u && labels_[u] != labels_[t])
+          energy_ += graph_.edge_length[k] * (options_.weights[labels_[t]] + options_.weights[labels_[u]]) / 2;
       }
-      strip.costs.push_back(costs);
     }
-    for (const Index t : strip.triangles) position_[t] = kNone;
-    return strip;
+    unit_ = energy_ > 0 ? kUnit / energy_ : 0;
   }
 
-  // The triangles of a and b within `rings` steps from their border, ascending.
-  void gather(Index a, Index b, std::vector<Index>& out) {
-    const auto touches = [&](Index t, Index region) {
-      return std::any_of(graph_.neighbours.begin(t), graph_.neighbours.end(t),
-                         [&](Index u) { return labels_[u] == region; });
-    };
+  // The triangles within so many steps from the region's borders, in the order of steps, with the region that each may
+  // be of instead: its own, or of this region's that which is nearest among those across the border. Returns the
+  // position where those of the last step begin.
+  std::size_t gather(Index region, int rings, Strip& strip) {
+    Triangles& out = strip.triangles;
+    out.clear();
+    strip.others.clear();
+    const std::vector<Index>& met = meets_[region];
     const auto add = [&](Index t) {
       if (position_[t] != kNone) return;
-      position_[t] = 0;
+      position_[t] = static_cast<Index>(out.size());
       out.push_back(t);
     };
-    const bool a_is_small = topology_.triangle_count(a) <= topology_.triangle_count(b);
-    const Index small = a_is_small ? a : b, large = a_is_small ? b : a;
-    std::erase_if(members_[small], [&](Index t) { return labels_[t] != small; });
-    if (options_.rings > 0)
-      for (const Index t : members_[small]) {
-        if (!touches(t, large)) continue;
-        add(t);
-        for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u)
-          if (labels_[*u] == large) add(*u);
-      }
+    std::erase_if(members_[region], [&](Index t) { return labels_[t] != region; });
+    for (const Index t : members_[region])
+      for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u)
+        if (labels_[*u] != region) {
+          add(t);
+          add(*u);
+        }
     std::size_t begin = 0;
-    for (int ring = 1; ring < options_.rings; ++ring) {
+    for (int ring = 1;; ++ring) {
       const std::size_t end = out.size();
-      for (std::size_t i = begin; i < end; ++i) {
-        const Index t = out[i];
-        for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u)
-          if (labels_[*u] == a || labels_[*u] == b) add(*u);
-      }
+      for (std::size_t i = begin; i < end; ++i) strip.others.push_back(other_region(out[i], region, strip));
+      if (ring == rings || begin == end) break;
+      for (std::size_t i = begin; i < end; ++i)
+        for (const Index* u = graph_.neighbours.begin(out[i]); u != graph_.neighbours.end(out[i]); ++u)
+          if (labels_[*u] == region || std::binary_search(met.begin(), met.end(), labels_[*u])) add(*u);
       begin = end;
     }
-    std::sort(out.begin(), out.end());
+    for (const Index t : out) position_[t] = kNone;
+    return begin;
+  }
+
+  Index other_region(Index t, Index region, const Strip& strip) const {
+    if (labels_[t] != region) return labels_[t];
+    Index nearest = kNone;
+    double least = 0;
+    for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u) {
+      Index other = labels_[*u];
+      if (other == region) {
+        if (position_[*u] >= strip.others.size()) continue;
+        other = strip.others[position_[*u]];
+      }
+      if (other == nearest) continue;
+      const double d = distance_(t, other);
+      if (nearest != kNone && !(d < least || (d == least && other < nearest))) continue;
+      nearest = other;
+      least = d;
+    }
+    return nearest;
+  }
+
+  void fill(Index region, Strip& strip) {
+    const std::size_t n = strip.triangles.size();
+    for (std::size_t i = 0; i < n; ++i) position_[strip.triangles[i]] = static_cast<Index>(i);
+    strip.costs.assign(n, 0);
+    strip.links.clear();
+    for (std::size_t i = 0; i < n; ++i) {
+      const Index t = strip.triangles[i], own = strip.others[i];
+      strip.costs[i] += cost_of(t, own) - cost_of(t, region);
+      strip.costs[i] += labels_[t] == region ? 1 : -1;  // of equally good labellings that of fewest changes
+      for (std::size_t k = graph_.neighbours.offsets[t]; k < graph_.neighbours.offsets[t + 1]; ++k) {
+        const Index u = graph_.neighbours.values[k], j = position_[u];
+        const Index other = j == kNone ? labels_[u] : strip.others[j];
+        const double length = graph_.edge_length[k];
+        const Cost of_region = half_cost(length, region), of_own = half_cost(length, own);
+        if (j == kNone) {
+          if (other == region) strip.costs[i] += of_region + of_own;
+          else strip.costs[i] -= other == own ? of_region + of_own : of_region - of_own;
+        } else if (i < j) {
+          if (other == own) {
+            strip.links.push_back({static_cast<Index>(i), j, of_region + of_own, of_region + of_own});
+          } else {
+            // A border on each side of the region costs no less than one between the two others.
+            strip.costs[i] += of_region + of_own;
+            strip.costs[j] += half_cost(length, other) - of_region;
+            strip.links.push_back({static_cast<Index>(i), j, 2 * of_region, 0});
+          }
+        }
+      }
+    }
+    for (const Index t : strip.triangles) position_[t] = kNone;
+  }
+
+  // What is no number, or more than all there is, is as much as all there is: no cut pays for it.
+  Cost cost_of(Index t, Index region) const {
+    const double d = distance_(t, region);
+    return static_cast<Cost>(std::llround(unit_ * (d < energy_ ? d : energy_)));
+  }
+
+  // A region's share in the cost of a piece of its border, so that costs obey the triangle inequality exactly.
+  Cost half_cost(double length, Index region) const {
+    return static_cast<Cost>(std::llround(unit_ * length * options_.weights[region] / 2));
   }
 
   // --- Changes that keep the topology ---
 
   // The triangles that change sides, those that are connected together.
-  std::vector<Triangles> connected_changes(const Strip& strip, const std::vector<char>& x, Index b) {
+  std::vector<Triangles> connected_changes(Index region, const Strip& strip, const std::vector<char>& x) {
     Triangles pending;
     for (std::size_t i = 0; i < x.size(); ++i)
-      if ((labels_[strip.triangles[i]] == b) != (x[i] != 0)) pending.push_back(strip.triangles[i]);
+      if ((labels_[strip.triangles[i]] == region) != (x[i] == 0)) pending.push_back(strip.triangles[i]);
     for (const Index t : pending) position_[t] = 0;
     std::vector<Triangles> groups;
     for (const Index first : pending) {
@@ -206,69 +293,116 @@ class BorderSmoother {
     return groups;
   }
 
-  // Moves groups [begin, end) to the other side, less what would leave crumbs, where that lowers the energy and keeps
-  // the topology; otherwise tries either half. True if anything changed.
-  bool move(const Strip& strip, const std::vector<Triangles>& groups, std::size_t begin, std::size_t end, Index a,
-            Index b) {
-    const Cost energy_before = strip.energy(sides(strip, b));
-    Triangles changed;
-    for (std::size_t g = begin; g < end; ++g) changed.insert(changed.end(), groups[g].begin(), groups[g].end());
-    change_sides(changed, a, b);
-    while (give_back(changed, a, b)) {
+  // Moves connected triangles to the other side, less what would leave crumbs, where that lowers the energy and keeps
+  // the topology; otherwise tries either half, so many times over. `lowers`: all of them together are known to lower
+  // the energy. False: all stay.
+  bool move(const Triangles& wanted, bool lowers, int splits) {
+    Triangles changed = wanted;
+    apply(changed);
+    while (give_back(changed)) {
     }
-    if (!changed.empty() && strip.energy(sides(strip, b)) < energy_before && keeps_topology(changed, a, b)) {
-      for (const Index t : changed) members_[labels_[t]].push_back(t);
+    const bool better = !changed.empty() && ((lowers && changed.size() == wanted.size()) || lowers_energy(changed));
+    if (better && keeps_topology(changed)) {
+      for (const Index t : changed) {
+        members_[next_[t]].push_back(t);
+        touched_.insert({before_[t], next_[t]});
+      }
       return true;
     }
-    change_sides(changed, a, b);
-    if (end - begin <= 1) return false;
-    const std::size_t middle = begin + (end - begin) / 2;
-    const bool first = move(strip, groups, begin, middle, a, b);
-    const bool second = move(strip, groups, middle, end, a, b);
+    undo(changed);
+    if (splits == 0 || wanted.size() < 2) return false;
+    const auto middle = wanted.begin() + static_cast<std::ptrdiff_t>(wanted.size() / 2);
+    const bool first = move({wanted.begin(), middle}, false, splits - 1);
+    const bool second = move({middle, wanted.end()}, false, splits - 1);
     return first || second;
   }
 
-  void change_sides(const Triangles& changed, Index a, Index b) {
-    for (const Index t : changed) topology_.relabel(t, labels_[t] == a ? b : a);
+  bool lowers_energy(const Triangles& changed) {
+    const Cost after = energy_about(changed);
+    undo(changed);
+    const Cost before = energy_about(changed);
+    apply(changed);
+    return after < before;
   }
 
-  // Takes back the changes that leave crumbs, or meet or leave third regions anew; true if there were any and some are
-  // left. Each call makes the changes fewer, so calls come to an end.
-  bool give_back(Triangles& changed, Index a, Index b) {
-    Triangles crumbs = topology_.crumbs(a, changed);
-    const Triangles of_b = topology_.crumbs(b, changed);
-    crumbs.insert(crumbs.end(), of_b.begin(), of_b.end());
+  // What triangles and their borders cost.
+  Cost energy_about(const Triangles& triangles) {
+    for (const Index t : triangles) position_[t] = 0;
+    Cost sum = 0;
+    for (const Index t : triangles) {
+      sum += cost_of(t, labels_[t]);
+      for (std::size_t k = graph_.neighbours.offsets[t]; k < graph_.neighbours.offsets[t + 1]; ++k) {
+        const Index u = graph_.neighbours.values[k];
+        if (labels_[u] == labels_[t] || (position_[u] != kNone && u < t)) continue;
+        sum += half_cost(graph_.edge_length[k], labels_[t]) + half_cost(graph_.edge_length[k], labels_[u]);
+      }
+    }
+    for (const Index t : triangles) position_[t] = kNone;
+    return sum;
+  }
+
+  void apply(const Triangles& changed) {
+    for (const Index t : changed) topology_.relabel(t, next_[t]);
+  }
+  void undo(const Triangles& changed) {
+    for (const Index t : changed) topology_.relabel(t, before_[t]);
+  }
+
+  // The changed triangles of each region that they left or joined.
+  std::map<Index, Triangles> by_region(const Triangles& changed) const {
+    std::map<Index, Triangles> result;
+    for (const Index t : changed) {
+      result[before_[t]].push_back(t);
+      result[next_[t]].push_back(t);
+    }
+    return result;
+  }
+
+  bool meet(Index a, Index b) const { return std::binary_search(meets_[a].begin(), meets_[a].end(), b); }
+
+  // Takes back the changes that leave crumbs, or make regions meet or part; true if there were any and some are left.
+  // Each call makes the changes fewer, so calls come to an end.
+  bool give_back(Triangles& changed) {
+    Triangles crumbs;
+    for (const auto& [r, triangles] : by_region(changed)) {
+      const Triangles of_region = topology_.crumbs(r, triangles);
+      crumbs.insert(crumbs.end(), of_region.begin(), of_region.end());
+    }
     for (const Index t : crumbs) position_[t] = 0;
     const auto breaks = [&](Index t) {
-      const Index now = labels_[t], before = now == a ? b : a;
+      const Index before = before_[t], now = labels_[t];
+      const auto parted = [&](Index other) {
+        return other != kNone && other != before && meet(before, other) && !topology_.contacts(before).contains(other);
+      };
       if (position_[t] != kNone) return true;
       return std::any_of(graph_.neighbours.begin(t), graph_.neighbours.end(t), [&](Index u) {
         const Index other = labels_[u];
-        if (other == a || other == b) return other == before && position_[u] != kNone;
-        return !std::binary_search(meets_[now].begin(), meets_[now].end(), other) ||
-               !topology_.contacts(before).contains(other);
+        if (other == before && position_[u] != kNone) return true;
+        return (other != now && !meet(now, other)) || parted(other) || parted(before_[u]);
       });
     };
     Triangles kept, undone;
     for (const Index t : changed) (breaks(t) ? undone : kept).push_back(t);
     for (const Index t : crumbs) position_[t] = kNone;
-    change_sides(undone, a, b);
+    undo(undone);
     changed = std::move(kept);
     return !undone.empty() && !changed.empty();
   }
 
-  bool keeps_topology(const Triangles& changed, Index a, Index b) {
-    for (const Index r : {a, b}) {
+  bool keeps_topology(const Triangles& changed) {
+    const std::map<Index, Triangles> of_regions = by_region(changed);
+    for (const auto& [r, triangles] : of_regions) {
       const auto& contacts = topology_.contacts(r);
       const bool same = std::equal(meets_[r].begin(), meets_[r].end(), contacts.begin(), contacts.end(),
                                    [](Index other, const auto& contact) { return other == contact.first; });
       if (topology_.triangle_count(r) == 0 || !same) return false;
     }
-    const RegionTopology::Local after[] = {topology_.local(a, changed), topology_.local(b, changed)};
-    change_sides(changed, a, b);
-    const RegionTopology::Local before[] = {topology_.local(a, changed), topology_.local(b, changed)};
-    change_sides(changed, a, b);
-    return after[0] == before[0] && after[1] == before[1];
+    std::vector<RegionTopology::Local> after, before;
+    for (const auto& [r, triangles] : of_regions) after.push_back(topology_.local(r, triangles));
+    undo(changed);
+    for (const auto& [r, triangles] : of_regions) before.push_back(topology_.local(r, triangles));
+    apply(changed);
+    return after == before;
   }
 
   const DualGraph& graph_;
@@ -279,6 +413,10 @@ class BorderSmoother {
   std::vector<Triangles> members_;         // of each region, and some that have left it
   std::vector<std::vector<Index>> meets_;  // the regions that each met at first, ascending
   std::vector<Index> position_;            // of a triangle in the strip, or any mark; else kNone
+  std::vector<Index> before_;              // region of a triangle of the strip when that was made; else kNone
+  std::vector<Index> next_;                // region that it has once it changes sides
+  std::set<Index> touched_;                // regions that the last strip changed
+  double energy_ = 0, unit_ = 0;           // at the start; Cost in it
 };
 
 }  // namespace
@@ -286,9 +424,13 @@ class BorderSmoother {
 SmoothBordersResult smooth_borders(const DualGraph& graph, const std::vector<Triangle>& triangles,
                                    const std::function<double(Index, Index)>& distance,
                                    const SmoothBordersOptions& options, std::vector<Index>& labels) {
-  if (!(options.lambda >= 0) || !std::isfinite(options.lambda))
-    throw Error("the weight of the borders' length is " + std::to_string(options.lambda) +
-                "; it has to be a number from 0 on");
+  for (const Index label : labels)
+    if (label >= options.weights.size())
+      throw Error("there are " + std::to_string(options.weights.size()) + " weights of borders, but a region " +
+                  std::to_string(label) + ": give one for each region");
+  for (const double weight : options.weights)
+    if (!(weight >= 0) || !std::isfinite(weight))
+      throw Error("a weight of the borders' length is " + std::to_string(weight) + "; it has to be a number from 0 on");
   return BorderSmoother(graph, triangles, distance, options, labels).run();
 }
 

@@ -239,7 +239,7 @@ TEST(Segment, RefusesWhatCannotBe) {
   refused([](SegmentOptions& o) { o.error = 0; }, "error");
   refused([](SegmentOptions& o) { o.error = std::nan(""); }, "error");
   refused([](SegmentOptions& o) { o.smooth = -1; }, "smoothing");
-  refused([](SegmentOptions& o) { o.fuzzy_rings = 0; }, "rings");
+  refused([](SegmentOptions& o) { o.fuzzy_rings = -1; }, "rings");
   refused([](SegmentOptions& o) { o.iterations = -1; }, "iterations");
   TriangleMesh point;
   point.vertices = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
