@@ -200,7 +200,8 @@ std::vector<Index> Lloyd::move_borders(Partition& partition, bool flooding, Part
     flood(regions, triangles, partition);
     relax();
     better = undo.growth(partition) <= 0;
-    if (better) moved = std::move(active);
+    if (better)
+      for (const Index r : regions) moved[r] = 1;
     else undo.restore_labels(partition);
   }
   if (!better) {

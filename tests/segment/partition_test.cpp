@@ -43,8 +43,8 @@ void expect_consistent(const SegmentDomain& domain, const Partition& partition) 
   }
 }
 
-struct Run {
-  explicit Run(std::size_t regions)
+struct Example {
+  explicit Example(std::size_t regions)
       : domain(make_segment_domain(csg_part(2000, 1e-3, 1).mesh)),
         lloyd(domain, SegmentSurfaces::all, context),
         editor(lloyd, 30),
@@ -58,7 +58,7 @@ struct Run {
 };
 
 TEST(Partition, StaysConsistentWhileItIsChanged) {
-  Run run(12);
+  Example run(12);
   expect_consistent(run.domain, run.partition);
   run.lloyd.iterate(run.partition, 30);
   expect_consistent(run.domain, run.partition);
@@ -76,7 +76,7 @@ TEST(Partition, StaysConsistentWhileItIsChanged) {
 }
 
 TEST(Partition, UndoTakesEverythingBack) {
-  Run run(12);
+  Example run(12);
   run.lloyd.iterate(run.partition, 30);
   const Partition before = run.partition;
   // Removals that would let the energy grow are refused after they were tried.
