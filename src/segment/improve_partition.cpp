@@ -166,12 +166,13 @@ void PartitionEditor::improve_division(const Partition& partition, Index region,
 
 PartitionEditor::Division PartitionEditor::find_division(const Partition& partition, Index region, Trial& trial) const {
   Division best;
+  best.gain = -std::numeric_limits<double>::infinity();
   const std::vector<Index>& triangles = partition.triangles[region];
   if (triangles.size() < 2) return best;
   const SegmentDomain& domain = lloyd_.domain();
   // A few steps from each start, and more from where the best has come to.
   const auto start = [&](const std::array<Proxy, 2>& proxies, const std::array<Index, 2>& seeds) {
-    Division division{0, {}, proxies, seeds};
+    Division division{-std::numeric_limits<double>::infinity(), {}, proxies, seeds};
     improve_division(partition, region, kFirstSteps, division, trial);
     if (division.gain > best.gain) best = std::move(division);
   };
@@ -190,7 +191,7 @@ PartitionEditor::Division PartitionEditor::find_division(const Partition& partit
     }
     start(proxies, seeds);
   }
-  if (best.gain > 0) improve_division(partition, region, kMoreSteps, best, trial);
+  if (!best.part.empty()) improve_division(partition, region, kMoreSteps, best, trial);
   for (const Index t : triangles) trial.labels[t] = Trial::kBlocked;
   return best;
 }
@@ -443,8 +444,15 @@ bool PartitionEditor::merge_redundant(Partition& partition) {
 }
 
 bool PartitionEditor::divide_best(Partition& partition, std::size_t most, double enough) {
-  const std::vector<std::pair<double, Index>> gains = best_divisions(partition, 0);
-  if (gains.empty()) return false;
+  std::vector<std::pair<double, Index>> gains = best_divisions(partition, 0);
+  if (gains.empty()) {
+    // Halves that are too small for quadrics may be farther off than the whole, and their halves nearer again.
+    for (Index r = 0; r < partition.count(); ++r)
+      if (partition.fits[r].energy > 0 && !division(partition, r).part.empty())
+        gains.emplace_back(partition.fits[r].energy, r);
+    if (gains.empty()) return false;
+    std::stable_sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  }
   std::vector<char> taken(partition.count(), 0);
   std::vector<Index> chosen;
   double energy = partition.energy();

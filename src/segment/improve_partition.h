@@ -27,7 +27,8 @@ class PartitionEditor {
   // has a valid proxy (thesis, "Proxy merging"), and iterates.
   bool merge_redundant(Partition& partition);
   // Divides the region that gains most by it, and others that gain nearly as much and are no neighbours of one that is
-  // divided: at most `most`, and only until the energy is likely to be `enough`. Then iterates. False: none gains.
+  // divided: at most `most`, and only until the energy is likely to be `enough`. Where none gains, those of most energy.
+  // Then iterates. False: every region is a single triangle or exact.
   bool divide_best(Partition& partition, std::size_t most, double enough);
   // Removes the region that costs least, and others elsewhere that cost hardly more: at most `most`, while the energy
   // stays at most so large. Iterates a little. False: none can go.
@@ -37,7 +38,7 @@ class PartitionEditor {
 
  private:
   struct Division {
-    double gain = 0;
+    double gain = 0;          // not positive where each division raises the energy
     std::vector<Index> part;  // the triangles of the new region
     std::array<Proxy, 2> proxies;
     std::array<Index, 2> seeds{};

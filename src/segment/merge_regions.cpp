@@ -121,8 +121,10 @@ struct Region {
 
 class SurfaceMerging {
  public:
-  SurfaceMerging(const SegmentDomain& domain, const std::vector<Index>& labels, SegmentSurfaces surfaces)
-      : domain_(domain), surfaces_(surfaces) {
+  // `measured`: costs are from distances of all triangles, not from moments alone, which see only the first order of
+  // a quadric's distance.
+  SurfaceMerging(const SegmentDomain& domain, const std::vector<Index>& labels, SegmentSurfaces surfaces, bool measured)
+      : domain_(domain), surfaces_(surfaces), measured_(measured) {
     const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
     const Csr<Index> rows = items_of_labels<Index>(labels, count);
     regions_.resize(count);
@@ -130,7 +132,7 @@ class SurfaceMerging {
       Region& region = regions_[r];
       region.triangles.assign(rows.begin(r), rows.end(r));
       region.moments = sum_of_moments(domain, {rows.begin(r), rows.end(r)});
-      region.squared_distance = fitted(region.moments, region.triangles.size());
+      region.squared_distance = fitted(region.moments, region.triangles, {});
       total_ += region.squared_distance;
     }
   }
@@ -154,14 +156,21 @@ class SurfaceMerging {
   }
 
  private:
-  double fitted(const SurfaceMoments& moments, std::size_t triangles) const {
-    return fit_proxy(moments, triangles < kLeastForQuadric ? SegmentSurfaces::planes : surfaces_).squared_distance;
+  // Of the triangles of two lists.
+  double fitted(const SurfaceMoments& moments, const std::vector<Index>& a, const std::vector<Index>& b) const {
+    const bool few = a.size() + b.size() < kLeastForQuadric;
+    const ProxyFit fit = fit_proxy(moments, few ? SegmentSurfaces::planes : surfaces_);
+    if (!measured_ || fit.plane) return fit.squared_distance;
+    double sum = 0;
+    for (const auto* triangles : {&a, &b})
+      for (const Index t : *triangles) sum += distance_to(domain_, t, fit.proxy);
+    return std::min(std::max(sum, fit.squared_distance), fit_plane(moments).squared_distance);
   }
   double union_distance(Index a, Index b) const {
     const Region &first = regions_[a], &second = regions_[b];
     const SurfaceMoments both = merged(first.moments, second.moments);
     const std::size_t count = first.triangles.size() + second.triangles.size();
-    double least = fitted(both, count);
+    double least = fitted(both, first.triangles, second.triangles);
     if (!tori_) return least;
     // Only where the pair does not fit otherwise.
     const double apart = first.squared_distance + second.squared_distance;
@@ -181,6 +190,7 @@ class SurfaceMerging {
 
   const SegmentDomain& domain_;
   SegmentSurfaces surfaces_;
+  bool measured_;
   std::vector<Region> regions_;
   double total_ = 0;
   bool tori_ = false;
@@ -226,7 +236,7 @@ std::vector<Index> merge_into_planes(const SegmentDomain& domain, std::size_t co
 
 std::vector<Index> merge_regions(const SegmentDomain& domain, std::vector<Index> labels, const RegionMerging& options,
                                  const Context& context) {
-  SurfaceMerging regions(domain, labels, options.surfaces);
+  SurfaceMerging regions(domain, labels, options.surfaces, options.count == 0);
   const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
   Merger merger(domain.graph, labels, count);
   // Of each pair of neighbours, the lower first: its cost, or a lower bound.

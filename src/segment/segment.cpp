@@ -44,8 +44,9 @@ constexpr int kHalvings = 6;
 constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
 // Types and smooth borders cost some of the error; where they take more than was left, a smaller error is aimed at.
-constexpr int kAttempts = 4;
-constexpr double kAim = 0.97;  // of the error that would just do if all grew in proportion
+constexpr int kAttempts = 2;
+constexpr double kAim = 0.97;      // of the error that would just do if all grew in proportion
+constexpr double kLeastAim = 0.9;  // where more would be needed, less simple surfaces do
 
 constexpr double kFarFoot =
     2;  // a vertex is not projected farther than so many times the largest distance in its region
@@ -342,12 +343,13 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
   result.primitives =
       region_primitives(domain, partition.labels, partition.count(), partition.proxies, options.surfaces);
   result.labels = partition.labels;
+  const bool exact = at_any_cost && take_proxies(domain, result.labels, partition.proxies, most * most * domain.area,
+                                                 result.primitives);
   polish_borders(domain, proxies_of(result.primitives), result.labels, lloyd.counts.evaluations);
-  simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
-  refine_primitives(domain, result.labels, result.primitives);
-  const double energy = most * most * domain.area;
-  if (at_any_cost && take_proxies(domain, result.labels, partition.proxies, energy, result.primitives))
-    polish_borders(domain, proxies_of(result.primitives), result.labels, lloyd.counts.evaluations);
+  if (!exact) {
+    simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
+    refine_primitives(domain, result.labels, result.primitives);
+  }
   const std::vector<Proxy> proxies = proxies_of(result.primitives);
   seconds.classify += clock.lap();
   result.border_before = result.border_after = border_length(domain.graph, result.labels);
@@ -387,7 +389,7 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
     improve(lloyd, editor, aimed, k == 0 && fresh, partition, result.seconds);
     classified = classify(lloyd, aimed, partition, most, k + 1 == kAttempts, result.seconds);
     if (classified.rms <= most) break;
-    aimed.error *= kAim * most / classified.rms;
+    aimed.error *= std::max(kLeastAim, kAim * most / classified.rms);
   }
   if (classified.rms > most)
     context.warn(
