@@ -42,9 +42,8 @@ std::vector<Join> pairs_to_join(const Csr<Index>& neighbours, const std::vector<
     join.cost = bent <= kFlat * spread ? bent / kFlat + spread : std::numeric_limits<double>::infinity();
   });
   std::erase_if(joins, [](const Join& join) { return !std::isfinite(join.cost); });
-  sort_in_parallel(joins, [](const Join& x, const Join& y) {
-    return std::tuple(x.cost, x.a, x.b) < std::tuple(y.cost, y.a, y.b);
-  });
+  sort_in_parallel(
+      joins, [](const Join& x, const Join& y) { return std::tuple(x.cost, x.a, x.b) < std::tuple(y.cost, y.a, y.b); });
   std::vector<char> taken(neighbours.rows(), 0);
   std::erase_if(joins, [&](const Join& join) {
     if (taken[join.a] || taken[join.b]) return true;

@@ -10,7 +10,7 @@
 namespace bisector {
 
 struct CoarseDomain {
-  SegmentDomain domain;             // its triangles are each the one in the middle of a cluster
+  SegmentDomain domain;           // its triangles are each the one in the middle of a cluster
   std::vector<Index> cluster_of;  // of each triangle of the finer domain
 };
 

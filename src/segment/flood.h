@@ -52,9 +52,10 @@ class BorderMoves {
   // Moves triangles to the region across where they are nearer to its proxy and no region comes apart, until there are
   // none; of the given triangles and what is around those that move. Calls before_move(triangle, region, distance)
   // ahead of each move, the latter two being those it gets. Returns how many it moved.
-  std::size_t relax(const std::vector<Proxy>& proxies, std::vector<Index> triangles, std::vector<Index>& labels,
-                    std::vector<double>& distances, std::size_t& evaluations,
-                    const std::function<void(Index, Index, double)>& before_move = [](Index, Index, double) {});
+  std::size_t relax(
+      const std::vector<Proxy>& proxies, std::vector<Index> triangles, std::vector<Index>& labels,
+      std::vector<double>& distances, std::size_t& evaluations,
+      const std::function<void(Index, Index, double)>& before_move = [](Index, Index, double) {});
 
  private:
   // Whether a region stays connected without one of its triangles; searched for among few triangles around it only, so

@@ -183,10 +183,9 @@ PartitionEditor::Division PartitionEditor::find_division(const Partition& partit
     std::array<Proxy, 2> proxies;
     std::array<Index, 2> seeds;
     for (std::size_t i = 0; i < 2; ++i) {
-      proxies[i] = lloyd_
-                       .refit(parts[i], sum_of_moments(domain, parts[i]), nullptr, trial.distances, trial.evaluations,
-                              false)
-                       .proxy;
+      proxies[i] =
+          lloyd_.refit(parts[i], sum_of_moments(domain, parts[i]), nullptr, trial.distances, trial.evaluations, false)
+              .proxy;
       seeds[i] = nearest_triangle(domain, parts[i], proxies[i]);
     }
     start(proxies, seeds);
@@ -480,9 +479,7 @@ bool PartitionEditor::remove_cheapest(Partition& partition, std::size_t most, do
   std::vector<char> taken(partition.count(), 0);
   std::vector<Removal> chosen;
   for (const Removal& r : all) {
-    if (!chosen.empty() &&
-        (chosen.size() == most || r.cost > dearest || energy + r.cost > most_energy))
-      break;
+    if (!chosen.empty() && (chosen.size() == most || r.cost > dearest || energy + r.cost > most_energy)) break;
     std::vector<Index> touched{r.region};
     if (r.into != kNone) touched.push_back(r.into);
     else touched.insert(touched.end(), partition.neighbours[r.region].begin(), partition.neighbours[r.region].end());

@@ -27,8 +27,8 @@ class PartitionEditor {
   // has a valid proxy (thesis, "Proxy merging"), and iterates.
   bool merge_redundant(Partition& partition);
   // Divides the region that gains most by it, and others that gain nearly as much and are no neighbours of one that is
-  // divided: at most `most`, and only until the energy is likely to be `enough`. Where none gains, those of most energy.
-  // Then iterates. False: every region is a single triangle or exact.
+  // divided: at most `most`, and only until the energy is likely to be `enough`. Where none gains, those of most
+  // energy. Then iterates. False: every region is a single triangle or exact.
   bool divide_best(Partition& partition, std::size_t most, double enough);
   // Removes the region that costs least, and others elsewhere that cost hardly more: at most `most`, while the energy
   // stays at most so large. Iterates a little. False: none can go.
@@ -91,8 +91,8 @@ class PartitionEditor {
   Lloyd& lloyd_;
   int iterations_;
   ThreadLocal<Trial> trials_;
-  std::unordered_map<std::uint64_t, Division> divisions_;  // by version
-  std::unordered_map<std::uint64_t, Deletion> deletions_;  // by version
+  std::unordered_map<std::uint64_t, Division> divisions_;        // by version
+  std::unordered_map<std::uint64_t, Deletion> deletions_;        // by version
   std::unordered_map<Versions, double, VersionsHash> mergings_;  // by versions, the lower first
 };
 

@@ -229,8 +229,7 @@ bool Lloyd::step(Partition& partition, bool flooding, PartitionUndo* undo) {
   const bool tori = counts.iterations % kToriEvery == 0;
   refit_all(changed, partition, [&](Index r, std::size_t& evaluations) {
     const std::vector<Index>& triangles = partition.triangles[r];
-    const SurfaceMoments moments =
-        changed_moments(domain_, partition.fits[r].moments, own.triangles(r), triangles);
+    const SurfaceMoments moments = changed_moments(domain_, partition.fits[r].moments, own.triangles(r), triangles);
     const Proxy old = partition.proxies[r];
     return refit(triangles, moments, &old, partition.distances, evaluations, tori || old.torus.has_value());
   });

@@ -37,8 +37,7 @@ PlaneMoments plane_moments(const SegmentDomain& domain, Index triangle) {
   m.first = (m.area / 3) * s;
   std::size_t k = 0;
   for (int i = 0; i < 3; ++i)
-    for (int j = i; j < 3; ++j)
-      m.second[k++] = m.area / 12 * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j]);
+    for (int j = i; j < 3; ++j) m.second[k++] = m.area / 12 * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j]);
   return m;
 }
 

@@ -176,7 +176,7 @@ class RegionSurface {
   std::size_t vertices() const { return vertices_.points.size(); }  // those that tell the surface
   // Whether they can speak against a surface: there is one through as many points as it has parameters.
   bool can_tell(int parameters) const { return vertices_.points.size() > static_cast<std::size_t>(parameters); }
-  std::size_t corners() const { return corners_; }                  // all, those on the border too
+  std::size_t corners() const { return corners_; }  // all, those on the border too
   double area() const { return area_; }
   // Of the vertices that types are tried on.
   double weight() const { return std::accumulate(few_vertices_.weights.begin(), few_vertices_.weights.end(), 0.0); }
@@ -324,12 +324,8 @@ class Labelling {
  public:
   Labelling(const SegmentDomain& domain, std::vector<Index> start, const std::vector<Primitive>& primitives,
             std::size_t& evaluations)
-      : labels(std::move(start)),
-        triangles(primitives.size()),
-        depths(vertex_depths(domain, labels)),
-        domain_(domain),
-        evaluations_(evaluations),
-        moves_(domain),
+      : labels(std::move(start)), triangles(primitives.size()), depths(vertex_depths(domain, labels)), domain_(domain),
+        evaluations_(evaluations), moves_(domain),
         around_(items_at_vertices<Index>(domain.triangles, domain.vertices.size())) {
     for (const Primitive& p : primitives) proxies_.push_back(Proxy::of(p));
     for (Index t = 0; t < labels.size(); ++t) {
@@ -412,7 +408,8 @@ void Labelling::update(const std::vector<Before>& moved) {
   for (const Index t : all) triangles[labels[t]].push_back(t);
   for (const Index t : all)
     for (const Index v : domain_.triangles[t]) {
-      const bool inside = std::all_of(around_.begin(v), around_.end(v), [&](Index u) { return labels[u] == labels[t]; });
+      const bool inside =
+          std::all_of(around_.begin(v), around_.end(v), [&](Index u) { return labels[u] == labels[t]; });
       depths[v] = inside ? kDeep : 0;
     }
   spread_depths(domain_, all, depths);
@@ -464,7 +461,7 @@ void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, 
   labels = std::move(labelling.labels);
 }
 
-bool take_proxies(const SegmentDomain& domain, const std::vector<Index>& labels, const std::vector<Proxy>& proxies,
+void take_proxies(const SegmentDomain& domain, const std::vector<Index>& labels, const std::vector<Proxy>& proxies,
                   double most, std::vector<Primitive>& primitives) {
   const Csr<Index> triangles = items_of_labels<Index>(labels, primitives.size());
   std::vector<Primitive> exact(primitives.size());
@@ -486,14 +483,11 @@ bool take_proxies(const SegmentDomain& domain, const std::vector<Index>& labels,
       1);
   double energy = std::accumulate(energies.begin(), energies.end(), 0.0);
   std::stable_sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  bool any = false;
   for (const auto& [gain, r] : gains) {
     if (energy <= most || !(gain > 0)) break;
     primitives[r] = exact[r];
     energy -= gain;
-    any = true;
   }
-  return any;
 }
 
 void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels,

@@ -95,8 +95,8 @@ Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double a
       std::max(kPiecesPerProxy * options.proxies, std::clamp(n / kTrianglesPerPiece, kFewestPieces, kMostPieces));
   const std::size_t pieces = std::min(n, std::max(enough, domain.component_count));
   Lloyd planar(domain, SegmentSurfaces::planes, lloyd.context());
-  Partition small = fit_all(
-      planar, merge_into_planes(domain, pieces, options.proxies > 0 ? kInfinity : allowed, lloyd.context()));
+  Partition small =
+      fit_all(planar, merge_into_planes(domain, pieces, options.proxies > 0 ? kInfinity : allowed, lloyd.context()));
   planar.iterate(small, std::min(kPlanarSteps, options.iterations));
   lloyd.counts.evaluations += planar.counts.evaluations;
   lloyd.counts.iterations += planar.counts.iterations;
@@ -162,9 +162,7 @@ void improve(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& option
   const bool merging = options.start == SegmentStart::merging;
   const std::size_t wanted = options.proxies;
   const double allowed = allowed_energy(lloyd.domain(), options);
-  const auto enough = [&](const Partition& p) {
-    return wanted > 0 ? p.count() >= wanted : p.energy() <= allowed;
-  };
+  const auto enough = [&](const Partition& p) { return wanted > 0 ? p.count() >= wanted : p.energy() <= allowed; };
   Stopwatch clock;
   report(context, "Lloyd", 0.2, partition.energy());
   lloyd.iterate(partition, options.iterations);
@@ -343,10 +341,9 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
   result.primitives =
       region_primitives(domain, partition.labels, partition.count(), partition.proxies, options.surfaces);
   result.labels = partition.labels;
-  const bool exact = at_any_cost && take_proxies(domain, result.labels, partition.proxies, most * most * domain.area,
-                                                 result.primitives);
+  if (at_any_cost) take_proxies(domain, result.labels, partition.proxies, most * most * domain.area, result.primitives);
   polish_borders(domain, proxies_of(result.primitives), result.labels, lloyd.counts.evaluations);
-  if (!exact) {
+  if (!at_any_cost) {
     simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
     refine_primitives(domain, result.labels, result.primitives);
   }
