@@ -7,9 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/grouping.h"
 #include "core/parallel.h"
-#include "segment/flood.h"
 #include "segment/primitive_fit.h"
 
 namespace bisector {
@@ -26,21 +24,20 @@ constexpr double kOneSided = 0.99;                // share of the area with norm
 
 // Whether the triangles' normals are on one side of a surface. Noise is fitted best by two sheets with the data
 // between.
-bool is_one_sided(const SegmentDomain& domain, const Index* begin, const Index* end, const Proxy& proxy) {
+bool is_one_sided(const SegmentDomain& domain, const std::vector<Index>& triangles, const Proxy& proxy) {
   double along = 0, against = 0;
-  for (const Index* t = begin; t != end; ++t)
-    (dot(proxy.gradient(domain.barycentres[*t]), domain.normals[*t]) < 0 ? against : along) += domain.areas[*t];
+  for (const Index t : triangles)
+    (dot(proxy.gradient(domain.barycentres[t]), domain.normals[t]) < 0 ? against : along) += domain.areas[t];
   return std::max(along, against) >= kOneSided * (along + against);
 }
 
 // Moments of triangles that are not many more or others than those that `known` is of.
-SurfaceMoments changed_moments(const SegmentDomain& domain, const SurfaceMoments& known, const Index* old_begin,
-                               const Index* old_end, const Index* begin, const Index* end) {
+SurfaceMoments changed_moments(const SegmentDomain& domain, const SurfaceMoments& known, const std::vector<Index>& old,
+                               const std::vector<Index>& now) {
   std::vector<Index> added, removed;
-  std::set_difference(begin, end, old_begin, old_end, std::back_inserter(added));
-  std::set_difference(old_begin, old_end, begin, end, std::back_inserter(removed));
-  if (4 * (added.size() + removed.size()) > static_cast<std::size_t>(end - begin))
-    return sum_of_moments(domain, begin, end);
+  std::set_difference(now.begin(), now.end(), old.begin(), old.end(), std::back_inserter(added));
+  std::set_difference(old.begin(), old.end(), now.begin(), now.end(), std::back_inserter(removed));
+  if (4 * (added.size() + removed.size()) > now.size()) return sum_of_moments(domain, now);
   SurfaceMoments sum = known;
   const auto add = [&](const std::vector<Index>& triangles, double sign) {
     for (const Index t : triangles) {
@@ -56,61 +53,64 @@ SurfaceMoments changed_moments(const SegmentDomain& domain, const SurfaceMoments
 
 }  // namespace
 
-double Partition::energy() const {
-  double sum = 0;
-  for (const RegionProxy& region : regions) sum += region.energy;
-  return sum;
+void SegmentCounts::add(const SegmentCounts& others) {
+  iterations += others.iterations;
+  evaluations += others.evaluations;
+  insertions += others.insertions;
+  merges += others.merges;
+  deletions += others.deletions;
+  teleportations += others.teleportations;
+  energies.insert(energies.end(), others.energies.begin(), others.energies.end());
 }
 
-RegionProxy Lloyd::refit(const Index* begin, const Index* end, const SurfaceMoments& moments, const RegionProxy* old,
+FittedProxy Lloyd::refit(const std::vector<Index>& triangles, const SurfaceMoments& moments, const Proxy* old,
                          std::vector<double>& distances, std::size_t& evaluations, bool tori) const {
-  const auto count = static_cast<std::size_t>(end - begin);
-  RegionProxy best;
-  best.energy = std::numeric_limits<double>::infinity();
+  const std::size_t count = triangles.size();
+  FittedProxy best;
+  best.fit.moments = moments;
+  double& least = best.fit.energy;
+  least = std::numeric_limits<double>::infinity();
   if (old) {
-    best = *old;
-    best.energy = 0;
-    for (const Index* t = begin; t != end; ++t) best.energy += distances[*t];
+    best.proxy = *old;
+    least = 0;
+    for (const Index t : triangles) least += distances[t];
   }
   std::vector<double> trial(count);
   const auto consider = [&](const Proxy& proxy) {
     double energy = 0;
-    for (std::size_t k = 0; k < count; ++k) energy += trial[k] = distance_to(domain_, begin[k], proxy);
+    for (std::size_t k = 0; k < count; ++k) energy += trial[k] = distance_to(domain_, triangles[k], proxy);
     evaluations += count;
-    if (!(energy < best.energy)) return;
+    if (!(energy < least)) return;
     best.proxy = proxy;
-    best.energy = energy;
-    for (std::size_t k = 0; k < count; ++k) distances[begin[k]] = trial[k];
+    least = energy;
+    for (std::size_t k = 0; k < count; ++k) distances[triangles[k]] = trial[k];
   };
   const double enough = kExact * moments.area();
   // The samples' mean square is never below the integral for a plane.
   const PlaneFit plane = fit_plane(moments);
-  if (plane.squared_distance < best.energy) consider(Proxy::of(plane_quadric(plane.normal, plane.offset)));
-  best.invalid = false;
-  if (best.energy > enough && surfaces_ != SegmentSurfaces::planes) {
-    const ProxyFit fit = fit_proxy(moments, surfaces_);
-    best.invalid = fit.invalid;
-    if (!fit.plane && is_one_sided(domain_, begin, end, fit.proxy)) {
-      consider(fit.proxy);
-    } else if (!fit.plane) {
-      best.invalid = true;
-      const QuadricFit oriented = fit_oriented_quadric(moments);
-      const Proxy proxy = Proxy::of(oriented.quadric);
-      if (oriented.valid && !is_invalid(oriented.quadric, moments) && is_one_sided(domain_, begin, end, proxy))
-        consider(proxy);
-    }
-    if (tori && best.energy > enough && surfaces_ == SegmentSurfaces::all && count >= kLeastForTorus) {
-      const SurfaceSamples samples = sample_triangles(domain_, {begin, end}, kTorusSamples);
-      const double weight = std::accumulate(samples.weights.begin(), samples.weights.end(), 0.0);
-      const auto torus = fit_primitive(SurfaceType::torus, samples);
-      // Not where the samples say that it will not do.
-      if (torus && torus->squared_distance * moments.area() < 2 * best.energy * weight) {
-        const Proxy proxy = Proxy::of(torus->primitive);
-        if (is_one_sided(domain_, begin, end, proxy)) consider(proxy);
-      }
+  if (plane.squared_distance < least) consider(Proxy::of(plane_quadric(plane.normal, plane.offset)));
+  if (least <= enough || surfaces_ == SegmentSurfaces::planes || count < kLeastForQuadric) return best;
+  const ProxyFit fit = fit_proxy(moments, surfaces_);
+  best.fit.invalid = fit.invalid;
+  if (!fit.plane && is_one_sided(domain_, triangles, fit.proxy)) {
+    consider(fit.proxy);
+  } else if (!fit.plane) {
+    best.fit.invalid = true;
+    const QuadricFit oriented = fit_oriented_quadric(moments);
+    const Proxy proxy = Proxy::of(oriented.quadric);
+    if (oriented.valid && !is_invalid(oriented.quadric, moments) && is_one_sided(domain_, triangles, proxy))
+      consider(proxy);
+  }
+  if (tori && least > enough && surfaces_ == SegmentSurfaces::all && count >= kLeastForTorus) {
+    const SurfaceSamples samples = sample_triangles(domain_, triangles, kTorusSamples);
+    const double weight = std::accumulate(samples.weights.begin(), samples.weights.end(), 0.0);
+    // Not where the samples say that it will not do.
+    const double most = 2 * least * weight / moments.area();
+    if (const auto torus = fit_primitive(SurfaceType::torus, samples, most)) {
+      const Proxy proxy = Proxy::of(torus->primitive);
+      if (is_one_sided(domain_, triangles, proxy)) consider(proxy);
     }
   }
-  best.moments = moments;
   return best;
 }
 
@@ -118,113 +118,127 @@ template <class Refit>
 void Lloyd::refit_all(const std::vector<Index>& regions, Partition& partition, const Refit& refit_one) {
   std::vector<std::size_t> evaluations(regions.size(), 0);
   parallel_each(
-      regions.size(), [&](std::size_t k) { partition.regions[regions[k]] = refit_one(regions[k], evaluations[k]); }, 1);
+      regions.size(),
+      [&](std::size_t k) {
+        FittedProxy fitted = refit_one(regions[k], evaluations[k]);
+        partition.proxies[regions[k]] = fitted.proxy;
+        partition.fits[regions[k]] = fitted.fit;
+      },
+      1);
   for (std::size_t k = 0; k < regions.size(); ++k) {
     counts.evaluations += evaluations[k];
-    partition.regions[regions[k]].version = ++counts.versions;
+    partition.fits[regions[k]].version = ++counts.versions;
+    partition.changed[regions[k]] = 1;
   }
 }
 
-Partition Lloyd::fit(std::vector<Index> labels, std::size_t count, const Partition* known) {
+void Lloyd::fit(const std::vector<Index>& regions, Partition& partition) {
+  refit_all(regions, partition, [&](Index r, std::size_t& evaluations) {
+    const std::vector<Index>& triangles = partition.triangles[r];
+    return refit(triangles, sum_of_moments(domain_, triangles), nullptr, partition.distances, evaluations);
+  });
+}
+
+Partition Lloyd::fit(std::vector<Index> labels, std::size_t count) {
   Partition partition;
   partition.labels = std::move(labels);
-  partition.triangles = items_of_labels<Index>(partition.labels, count);
-  partition.distances = known ? known->distances : std::vector<double>(partition.labels.size());
-  partition.regions.resize(count);
-  partition.changed.assign(count, 1);
-  std::vector<Index> fresh;
-  for (std::size_t r = 0; r < count; ++r) {
-    const Index *begin = partition.triangles.begin(r), *end = partition.triangles.end(r);
-    const Index like = known ? known->labels[*begin] : kNone;
-    if (known && std::equal(begin, end, known->triangles.begin(like), known->triangles.end(like))) {
-      partition.regions[r] = known->regions[like];
-      partition.changed[r] = known->changed[like];
-    } else {
-      fresh.push_back(static_cast<Index>(r));
-    }
-  }
-  refit_all(fresh, partition, [&](Index r, std::size_t& evaluations) {
-    const Index *begin = partition.triangles.begin(r), *end = partition.triangles.end(r);
-    return refit(begin, end, sum_of_moments(domain_, begin, end), nullptr, partition.distances, evaluations);
-  });
+  partition.distances.resize(partition.labels.size());
+  partition.resize(count);
+  for (Index t = 0; t < partition.labels.size(); ++t) partition.triangles[partition.labels[t]].push_back(t);
+  std::vector<Index> all(count);
+  std::iota(all.begin(), all.end(), 0u);
+  partition.connect(domain_, all);
+  fit(all, partition);
   return partition;
 }
 
 Index Lloyd::seed(const Partition& partition, Index region) const {
-  Index best = *partition.triangles.begin(region);
+  Index best = partition.triangles[region][0];
   double least = std::numeric_limits<double>::infinity();
-  for (const Index* t = partition.triangles.begin(region); t != partition.triangles.end(region); ++t) {
-    if (!(domain_.areas[*t] > 0)) continue;
+  for (const Index t : partition.triangles[region]) {
+    if (!(domain_.areas[t] > 0)) continue;
     // What differs by rounding only is as near.
-    const double d = std::max(kExact, partition.distances[*t] / domain_.areas[*t]);
+    const double d = std::max(kExact, partition.distances[t] / domain_.areas[t]);
     if (d < least) {
       least = d;
-      best = *t;
+      best = t;
     }
   }
   return best;
 }
 
-std::vector<Proxy> Lloyd::proxies(const Partition& partition) const {
-  std::vector<Proxy> proxies;
-  proxies.reserve(partition.regions.size());
-  for (const RegionProxy& region : partition.regions) proxies.push_back(region.proxy);
-  return proxies;
+void Lloyd::flood(const std::vector<Index>& regions, const std::vector<Index>& triangles, Partition& partition) {
+  std::vector<FloodSeed> seeds;
+  for (const Index r : regions) seeds.push_back({seed(partition, r), r});
+  for (const Index t : triangles) partition.labels[t] = kNone;
+  flooding_.fill(partition.proxies, seeds, partition.labels, partition.distances, counts.evaluations);
 }
 
-bool Lloyd::step(Partition& partition, bool flooding) {
-  const std::size_t count = partition.regions.size();
+std::vector<Index> Lloyd::move_borders(Partition& partition, bool flooding, PartitionUndo& undo) {
   std::vector<char> active = partition.changed;
-  const auto& neighbours = domain_.graph.neighbours;
-  for (std::size_t t = 0; t < partition.labels.size(); ++t)
-    for (const Index* n = neighbours.begin(t); n != neighbours.end(t); ++n)
-      if (partition.changed[partition.labels[*n]]) active[partition.labels[t]] = 1;
-  std::vector<Index> triangles;
-  std::vector<FloodSeed> seeds;
-  for (Index r = 0; r < count; ++r) {
-    if (!active[r]) continue;
-    if (flooding) seeds.push_back({seed(partition, r), r});
-    triangles.insert(triangles.end(), partition.triangles.begin(r), partition.triangles.end(r));
-  }
-  if (triangles.empty()) return false;
-  std::sort(triangles.begin(), triangles.end());
+  for (Index r = 0; r < partition.count(); ++r)
+    if (partition.changed[r])
+      for (const Index n : partition.neighbours[r]) active[n] = 1;
+  std::vector<Index> regions;
+  for (Index r = 0; r < partition.count(); ++r)
+    if (active[r]) regions.push_back(r);
+  const std::vector<Index> triangles = partition.triangles_of(regions);
 
-  const std::vector<Proxy> all = proxies(partition);
-  const double before = partition.energy();
-  Partition next = partition;
+  std::vector<char> moved(partition.count(), 0);
+  const auto relax = [&] {
+    return moves_.relax(partition.proxies, triangles, partition.labels, partition.distances, counts.evaluations,
+                        [&](Index t, Index to, double) {
+                          for (const Index r : {partition.labels[t], to}) {
+                            undo.keep(partition, r);
+                            moved[r] = 1;
+                          }
+                        });
+  };
   bool better = false;
   if (flooding) {
-    for (const Index t : triangles) next.labels[t] = kNone;
-    flood(domain_, all, seeds, next.labels, next.distances, counts.evaluations);
-    relax_borders(domain_, all, triangles, next.labels, next.distances, counts.evaluations);
-    const auto total = [](const std::vector<double>& d) {
-      return fixed_sum(d.size(), [&](std::size_t t) { return d[t]; });
-    };
-    better = total(next.distances) <= total(partition.distances);
+    undo.keep(partition, regions);
+    flood(regions, triangles, partition);
+    relax();
+    better = undo.growth(partition) <= 0;
+    if (better)
+      for (const Index r : regions) moved[r] = 1;
+    else undo.restore_labels(partition);
   }
   if (!better) {
-    next.labels = partition.labels;
-    next.distances = partition.distances;
-    if (relax_borders(domain_, all, triangles, next.labels, next.distances, counts.evaluations) == 0) return false;
+    std::fill(moved.begin(), moved.end(), 0);
+    if (relax() == 0) return {};
   }
-  next.triangles = items_of_labels<Index>(next.labels, count);
-  const bool tori = counts.iterations % kToriEvery == 0;
+  regions.clear();
+  for (Index r = 0; r < partition.count(); ++r)
+    if (moved[r]) regions.push_back(r);
+  return regions;
+}
+
+bool Lloyd::step(Partition& partition, bool flooding, PartitionUndo* undo) {
+  PartitionUndo own(partition);
+  const double before = partition.energy();
+  const std::vector<Index> regions = move_borders(partition, flooding, own);
+  if (regions.empty()) return false;
+  partition.relist(regions, partition.triangles_of(regions));
   std::vector<Index> changed;
-  for (Index r = 0; r < count; ++r) {
-    next.changed[r] = !std::equal(next.triangles.begin(r), next.triangles.end(r), partition.triangles.begin(r),
-                                  partition.triangles.end(r));
-    if (next.changed[r]) changed.push_back(r);
-  }
-  refit_all(changed, next, [&](Index r, std::size_t& evaluations) {
-    const Index *begin = next.triangles.begin(r), *end = next.triangles.end(r);
-    const RegionProxy& old = partition.regions[r];
-    const SurfaceMoments moments =
-        changed_moments(domain_, old.moments, partition.triangles.begin(r), partition.triangles.end(r), begin, end);
-    return refit(begin, end, moments, &old, next.distances, evaluations, tori || old.proxy.torus.has_value());
+  for (const Index r : regions)
+    if (partition.triangles[r] != own.triangles(r)) changed.push_back(r);
+  partition.disconnect(changed);
+  partition.connect(domain_, changed);
+  std::fill(partition.changed.begin(), partition.changed.end(), 0);
+  const bool tori = counts.iterations % kToriEvery == 0;
+  refit_all(changed, partition, [&](Index r, std::size_t& evaluations) {
+    const std::vector<Index>& triangles = partition.triangles[r];
+    const SurfaceMoments moments = changed_moments(domain_, partition.fits[r].moments, own.triangles(r), triangles);
+    const Proxy old = partition.proxies[r];
+    return refit(triangles, moments, &old, partition.distances, evaluations, tori || old.torus.has_value());
   });
-  const double after = next.energy();
-  if (!(after < before)) return false;
-  partition = std::move(next);
+  const double after = partition.energy();
+  if (!(after < before)) {
+    own.restore(domain_, partition);
+    return false;
+  }
+  if (undo) undo->add(std::move(own));
   ++counts.iterations;
   return after < (1 - kEnough) * before;
 }
@@ -243,11 +257,11 @@ void Lloyd::iterate(Partition& partition, int iterations) {
   counts.energies.push_back(std::move(energies));
 }
 
-void Lloyd::try_out(Partition& partition, int iterations, double goal) {
+void Lloyd::try_out(Partition& partition, int iterations, double goal, PartitionUndo& undo) {
   for (int k = 0; k < iterations; ++k) {
     context_.check();
     const double before = partition.energy();
-    if (!step(partition, k == 0)) break;
+    if (!step(partition, k == 0, &undo)) break;
     const double now = partition.energy();
     if (now - kStepsToCome * (before - now) > goal) break;
   }

@@ -1,13 +1,14 @@
 #include "segment/merge_regions.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <queue>
 #include <utility>
 
 #include "core/grouping.h"
+#include "segment/plane_moments.h"
 #include "segment/primitive_fit.h"
 #include "segment/proxy.h"
 
@@ -21,46 +22,11 @@ constexpr std::size_t kFewForTori =
     60;  // regions from which on tori are tried: they are dear, and on small regions quadrics do
 constexpr double kPoorFit = 1.5;  // growth of the squared distance from which on a torus is worth trying
 
-// Area, first and second moments, about the origin of the unit-sized model.
-struct PlaneMoments {
-  double area = 0;
-  Vec3 first;
-  std::array<double, 6> second{};  // xx xy xz yy yz zz
-
-  void add(const PlaneMoments& b) {
-    area += b.area;
-    first += b.first;
-    for (std::size_t k = 0; k < 6; ++k) second[k] += b.second[k];
-  }
-  // Integral of the squared distance to the best plane.
-  double squared_distance() const {
-    if (!(area > 0)) return 0;
-    const Vec3 c = (1 / area) * first;
-    Eigen::Matrix3d m;
-    const double xx = second[0] - first.x * c.x, xy = second[1] - first.x * c.y, xz = second[2] - first.x * c.z,
-                 yy = second[3] - first.y * c.y, yz = second[4] - first.y * c.z, zz = second[5] - first.z * c.z;
-    m << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-    solver.computeDirect(m, Eigen::EigenvaluesOnly);
-    return std::max(0.0, solver.eigenvalues()(0));
-  }
-};
-
-PlaneMoments plane_moments(const Vec3& a, const Vec3& b, const Vec3& c, double area) {
-  PlaneMoments m;
-  const Vec3 s = a + b + c;
-  m.area = area;
-  m.first = (area / 3) * s;
-  std::size_t k = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = i; j < 3; ++j) m.second[k++] = area / 12 * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j]);
-  return m;
-}
-
 struct Pair {
-  double cost;
+  double cost;  // or no more than the cost
   Index a, b;
   std::uint32_t version_a, version_b;
+  bool exact;
 };
 
 struct Dearer {
@@ -84,9 +50,9 @@ class Merger {
 
   std::size_t left() const { return left_; }
   const std::vector<Index>& neighbours(Index r) const { return neighbours_[r]; }
-  void offer(Index a, Index b, double cost) {
+  void offer(Index a, Index b, double cost, bool exact = true) {
     if (a > b) std::swap(a, b);
-    if (cost < std::numeric_limits<double>::infinity()) queue_.push({cost, a, b, version_[a], version_[b]});
+    if (cost < std::numeric_limits<double>::infinity()) queue_.push({cost, a, b, version_[a], version_[b], exact});
   }
   // Takes all offers back.
   void forget() { queue_ = {}; }
@@ -155,16 +121,18 @@ struct Region {
 
 class SurfaceMerging {
  public:
-  SurfaceMerging(const SegmentDomain& domain, const std::vector<Index>& labels, SegmentSurfaces surfaces)
-      : domain_(domain), surfaces_(surfaces) {
+  // `measured`: costs are from distances of all triangles, not from moments alone, which see only the first order of
+  // a quadric's distance.
+  SurfaceMerging(const SegmentDomain& domain, const std::vector<Index>& labels, SegmentSurfaces surfaces, bool measured)
+      : domain_(domain), surfaces_(surfaces), measured_(measured) {
     const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
     const Csr<Index> rows = items_of_labels<Index>(labels, count);
     regions_.resize(count);
     for (std::size_t r = 0; r < count; ++r) {
       Region& region = regions_[r];
       region.triangles.assign(rows.begin(r), rows.end(r));
-      region.moments = sum_of_moments(domain, rows.begin(r), rows.end(r));
-      region.squared_distance = fit_proxy(region.moments, surfaces).squared_distance;
+      region.moments = sum_of_moments(domain, {rows.begin(r), rows.end(r)});
+      region.squared_distance = fitted(region.moments, region.triangles, {});
       total_ += region.squared_distance;
     }
   }
@@ -188,14 +156,24 @@ class SurfaceMerging {
   }
 
  private:
+  // Of the triangles of two lists.
+  double fitted(const SurfaceMoments& moments, const std::vector<Index>& a, const std::vector<Index>& b) const {
+    const bool few = a.size() + b.size() < kLeastForQuadric;
+    const ProxyFit fit = fit_proxy(moments, few ? SegmentSurfaces::planes : surfaces_);
+    if (!measured_ || fit.plane) return fit.squared_distance;
+    double sum = 0;
+    for (const auto* triangles : {&a, &b})
+      for (const Index t : *triangles) sum += distance_to(domain_, t, fit.proxy);
+    return std::min(std::max(sum, fit.squared_distance), fit_plane(moments).squared_distance);
+  }
   double union_distance(Index a, Index b) const {
     const Region &first = regions_[a], &second = regions_[b];
     const SurfaceMoments both = merged(first.moments, second.moments);
-    double least = fit_proxy(both, surfaces_).squared_distance;
+    const std::size_t count = first.triangles.size() + second.triangles.size();
+    double least = fitted(both, first.triangles, second.triangles);
     if (!tori_) return least;
     // Only where the pair does not fit otherwise.
     const double apart = first.squared_distance + second.squared_distance;
-    const std::size_t count = first.triangles.size() + second.triangles.size();
     if (least <= kPoorFit * apart + 1e-12 * both.area() || count < kLeastForTorus) return least;
     std::vector<Index> triangles;
     triangles.reserve(count);
@@ -204,13 +182,15 @@ class SurfaceMerging {
     const SurfaceSamples samples = sample_triangles(domain_, triangles, kTorusSamples);
     double weight = 0;
     for (const double w : samples.weights) weight += w;
-    if (const auto torus = fit_primitive(SurfaceType::torus, samples); torus && weight > 0)
+    if (!(weight > 0)) return least;
+    if (const auto torus = fit_primitive(SurfaceType::torus, samples, least / both.area() * weight))
       least = std::min(least, torus->squared_distance / weight * both.area());
     return least;
   }
 
   const SegmentDomain& domain_;
   SegmentSurfaces surfaces_;
+  bool measured_;
   std::vector<Region> regions_;
   double total_ = 0;
   bool tori_ = false;
@@ -218,14 +198,15 @@ class SurfaceMerging {
 
 }  // namespace
 
-std::vector<Index> merge_into_planes(const SegmentDomain& domain, std::size_t count, const Context& context) {
+std::vector<Index> merge_into_planes(const SegmentDomain& domain, std::size_t count, double most,
+                                     const Context& context) {
   const std::size_t n = domain.triangles.size();
   std::vector<PlaneMoments> moments(n);
   std::vector<double> distance(n, 0);
   std::vector<Index> labels(n);
   for (std::size_t t = 0; t < n; ++t) {
-    const Triangle& v = domain.triangles[t];
-    moments[t] = plane_moments(domain.vertices[v[0]], domain.vertices[v[1]], domain.vertices[v[2]], domain.areas[t]);
+    moments[t] = plane_moments(domain, static_cast<Index>(t));
+    distance[t] = moments[t].squared_distance();
     labels[t] = static_cast<Index>(t);
   }
   Merger merger(domain.graph, labels, n);
@@ -240,8 +221,11 @@ std::vector<Index> merge_into_planes(const SegmentDomain& domain, std::size_t co
       if (t < other) offer(t, other);
   Pair pair;
   int poll = 0;
+  double total = std::accumulate(distance.begin(), distance.end(), 0.0);
   while (merger.left() > count && merger.next(pair)) {
     if (++poll % kPollEvery == 0) context.check();
+    total += pair.cost;
+    if (total > most) break;
     distance[pair.a] += distance[pair.b] + pair.cost;
     moments[pair.a].add(moments[pair.b]);
     merger.merge(pair.a, pair.b);
@@ -252,13 +236,16 @@ std::vector<Index> merge_into_planes(const SegmentDomain& domain, std::size_t co
 
 std::vector<Index> merge_regions(const SegmentDomain& domain, std::vector<Index> labels, const RegionMerging& options,
                                  const Context& context) {
-  SurfaceMerging regions(domain, labels, options.surfaces);
+  SurfaceMerging regions(domain, labels, options.surfaces, options.count == 0);
   const std::size_t count = 1 + *std::max_element(labels.begin(), labels.end());
   Merger merger(domain.graph, labels, count);
+  // Of each pair of neighbours, the lower first: its cost, or a lower bound.
+  std::vector<std::map<Index, double>> known(count);
+  const auto known_cost = [&](Index a, Index b) -> double& { return known[std::min(a, b)][std::max(a, b)]; };
   const auto offer_all = [&] {
     for (Index r = 0; r < count; ++r)
       for (const Index other : merger.neighbours(r))
-        if (r < other) merger.offer(r, other, regions.cost(r, other));
+        if (r < other) merger.offer(r, other, known_cost(r, other) = regions.cost(r, other));
   };
   offer_all();
   // Tori are dear to fit, and while regions are small quadrics do as well.
@@ -267,6 +254,10 @@ std::vector<Index> merge_regions(const SegmentDomain& domain, std::vector<Index>
   Pair pair;
   while (merger.left() > std::max<std::size_t>(1, options.count) && merger.next(pair)) {
     context.check();
+    if (!pair.exact) {
+      merger.offer(pair.a, pair.b, known_cost(pair.a, pair.b) = regions.cost(pair.a, pair.b));
+      continue;
+    }
     const bool last = options.count == 0 && regions.total() + pair.cost > options.squared_distance;
     if (!tori && (last || merger.left() <= few)) {
       tori = true;
@@ -276,9 +267,24 @@ std::vector<Index> merge_regions(const SegmentDomain& domain, std::vector<Index>
       continue;
     }
     if (last) break;
+    // A surface for the union of a, b and c is no nearer to c and a than one for these two alone, and to b than b's
+    // own. So the union with c costs at least what c and a, or c and b, cost without what a and b cost: pairs are
+    // fitted once they are the cheapest by that.
+    std::map<Index, double> costs;
+    for (const Index from : {pair.a, pair.b})
+      for (const Index other : merger.neighbours(from)) {
+        if (other == pair.a || other == pair.b) continue;
+        double& cost = costs.try_emplace(other, 0).first->second;
+        cost = std::max(cost, known_cost(from, other) - pair.cost);
+      }
     regions.merge(pair.a, pair.b, pair.cost);
     merger.merge(pair.a, pair.b);
-    for (const Index other : merger.neighbours(pair.a)) merger.offer(pair.a, other, regions.cost(pair.a, other));
+    known[pair.b].clear();
+    for (const Index other : merger.neighbours(pair.a)) {
+      const double cost = costs.at(other);
+      known[std::min(pair.b, other)].erase(std::max(pair.b, other));
+      merger.offer(pair.a, other, known_cost(pair.a, other) = cost, false);
+    }
   }
   return merger.relabel(labels);
 }

@@ -12,8 +12,10 @@
 namespace bisector {
 
 // Planar regions by merging triangles (Garland, Willmott and Heckbert 2001; here the cost of a pair is by how much the
-// squared distance to planes grows), down to `count` of them or the number of components.
-std::vector<Index> merge_into_planes(const SegmentDomain& domain, std::size_t count, const Context& context);
+// squared distance to planes grows), down to `count` of them or the number of components, as long as the sum of squared
+// distances is at most `most`.
+std::vector<Index> merge_into_planes(const SegmentDomain& domain, std::size_t count, double most,
+                                     const Context& context);
 
 struct RegionMerging {
   std::size_t count = 1;        // regions wanted

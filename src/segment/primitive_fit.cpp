@@ -691,8 +691,10 @@ std::optional<Shape> to_shape(const Primitive& primitive, const Local& local) {
   return shape;
 }
 
-std::optional<PrimitiveFit> checked(const std::optional<Fitted>& fitted, const Local& local) {
+std::optional<PrimitiveFit> checked(const std::optional<Fitted>& fitted, const Local& local,
+                                    double most = std::numeric_limits<double>::infinity()) {
   if (!fitted || !acceptable(fitted->shape, local)) return std::nullopt;
+  if (fitted->equations.energy * local.total * local.scale * local.scale > most) return std::nullopt;
   if (!determined(fitted->equations) || has_simpler(*fitted, local)) return std::nullopt;
   const Primitive primitive = to_primitive(fitted->shape);
   double energy = fitted->equations.energy;
@@ -778,12 +780,12 @@ std::optional<Quadric> reweighted(const Quadric& last, const SurfaceSamples& loc
 
 }  // namespace
 
-std::optional<PrimitiveFit> fit_primitive(SurfaceType type, const SurfaceSamples& samples) {
+std::optional<PrimitiveFit> fit_primitive(SurfaceType type, const SurfaceSamples& samples, double most) {
   require_fitted(type);
   const Local local = to_local(samples);
   if (!enough(type, local)) return std::nullopt;
   if (type == SurfaceType::plane) return fit_plane_to(local);
-  return checked(best_of(type, local), local);
+  return checked(best_of(type, local), local, most);
 }
 
 std::optional<PrimitiveFit> refine_primitive(const Primitive& start, const SurfaceSamples& samples) {

@@ -2,6 +2,7 @@
 // distance (thesis 2.3.3 and 2.5).
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -26,9 +27,11 @@ struct PrimitiveFit {
 // alone: axes from the lines of the normals (Pottmann and Randrup 1998), then Levenberg-Marquardt. None if the points
 // do not determine one, or only one that is larger than 1e3 times their extent, or leaves as much variance as a special
 // case of it (a cylinder that is flat over the points, a cone that is a cylinder, a torus that is a sphere). Of cones
-// one nappe is fitted, continued beyond the apex. Throws Error for another type, negative weights and numbers that are
-// not finite.
-std::optional<PrimitiveFit> fit_primitive(SurfaceType type, const SurfaceSamples& samples);
+// one nappe is fitted, continued beyond the apex. None, too, if the squared distance is above `most`, which is quicker
+// to see than that it is a special case. Throws Error for another type, negative weights and numbers that are not
+// finite.
+std::optional<PrimitiveFit> fit_primitive(SurfaceType type, const SurfaceSamples& samples,
+                                          double most = std::numeric_limits<double>::infinity());
 
 // The same from a given start.
 std::optional<PrimitiveFit> refine_primitive(const Primitive& start, const SurfaceSamples& samples);

@@ -26,18 +26,18 @@ Proxy Proxy::of(const Primitive& primitive) {
   return {std::get<Torus>(primitive), {}, 0};
 }
 
-SurfaceMoments sum_of_moments(const SegmentDomain& domain, const Index* begin, const Index* end) {
+SurfaceMoments sum_of_moments(const SegmentDomain& domain, std::span<const Index> triangles) {
   SurfaceMoments sum;
   Vec3 first;
   double area = 0;
-  for (const Index* t = begin; t != end; ++t) {
-    first += domain.areas[*t] * domain.barycentres[*t];
-    area += domain.areas[*t];
+  for (const Index t : triangles) {
+    first += domain.areas[t] * domain.barycentres[t];
+    area += domain.areas[t];
   }
   if (!(area > 0)) return sum;
   sum.origin = (1 / area) * first;
-  for (const Index* t = begin; t != end; ++t) {
-    const SurfaceMoments one = domain.moments(*t, sum.origin);
+  for (const Index t : triangles) {
+    const SurfaceMoments one = domain.moments(t, sum.origin);
     for (std::size_t k = 0; k < sum.m.size(); ++k) sum.m[k] += one.m[k];
     for (std::size_t k = 0; k < sum.flux.size(); ++k) sum.flux[k] += one.flux[k];
   }

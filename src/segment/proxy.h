@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "bisector/segment.h"
@@ -63,7 +64,7 @@ inline double distance_to(const SegmentDomain& domain, Index triangle, const Pro
 }
 
 // Moments of several triangles, about their centroid.
-SurfaceMoments sum_of_moments(const SegmentDomain& domain, const Index* begin, const Index* end);
+SurfaceMoments sum_of_moments(const SegmentDomain& domain, std::span<const Index> triangles);
 
 // Points and normals of at most `limit` of the triangles, spread evenly over the list, for fits of tori.
 struct SurfaceSamples;
@@ -72,6 +73,10 @@ SurfaceSamples sample_triangles(const SegmentDomain& domain, const std::vector<I
 // A quadric that is no surface of its own for the piece it was fitted to: two planes, or two sheets with data on both
 // (thesis 2.3.2, "Proxy insertion").
 bool is_invalid(const Quadric& quadric, const SurfaceMoments& moments);
+
+// A quadric passes through any nine points, and so many connected triangles less one have no more corners: they tell
+// planes only.
+inline constexpr std::size_t kLeastForQuadric = 8;
 
 struct ProxyFit {
   Proxy proxy;

@@ -35,6 +35,16 @@ constexpr std::array kSpecialTypes{SurfaceType::plane, SurfaceType::sphere, Surf
                                    SurfaceType::torus};
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// From the vertices of some triangles that are on borders, at depth 0, to the others, at kDeep.
+void spread_depths(const SegmentDomain& domain, const std::vector<Index>& triangles, std::vector<std::uint8_t>& depth) {
+  for (std::uint8_t level = 0; level + 1 < kDeep; ++level)
+    for (const Index t : triangles) {
+      const Triangle& corners = domain.triangles[t];
+      if (std::none_of(corners.begin(), corners.end(), [&](Index v) { return depth[v] == level; })) continue;
+      for (const Index v : corners) depth[v] = std::min<std::uint8_t>(depth[v], static_cast<std::uint8_t>(level + 1));
+    }
+}
+
 // How many edges each vertex is away from the borders between regions: 0 on them, at most kDeep.
 std::vector<std::uint8_t> vertex_depths(const SegmentDomain& domain, const std::vector<Index>& labels) {
   std::vector<Index> region(domain.vertices.size(), kNone);
@@ -44,10 +54,9 @@ std::vector<std::uint8_t> vertex_depths(const SegmentDomain& domain, const std::
       if (region[v] != kNone && region[v] != labels[t]) depth[v] = 0;
       region[v] = labels[t];
     }
-  for (std::uint8_t level = 0; level + 1 < kDeep; ++level)
-    for (const Triangle& t : domain.triangles)
-      if (std::any_of(t.begin(), t.end(), [&](Index v) { return depth[v] == level; }))
-        for (const Index v : t) depth[v] = std::min<std::uint8_t>(depth[v], static_cast<std::uint8_t>(level + 1));
+  std::vector<Index> all(domain.triangles.size());
+  std::iota(all.begin(), all.end(), 0u);
+  spread_depths(domain, all, depth);
   return depth;
 }
 
@@ -165,7 +174,9 @@ class RegionSurface {
   }
 
   std::size_t vertices() const { return vertices_.points.size(); }  // those that tell the surface
-  std::size_t corners() const { return corners_; }                  // all, those on the border too
+  // Whether they can speak against a surface: there is one through as many points as it has parameters.
+  bool can_tell(int parameters) const { return vertices_.points.size() > static_cast<std::size_t>(parameters); }
+  std::size_t corners() const { return corners_; }  // all, those on the border too
   double area() const { return area_; }
   // Of the vertices that types are tried on.
   double weight() const { return std::accumulate(few_vertices_.weights.begin(), few_vertices_.weights.end(), 0.0); }
@@ -228,21 +239,27 @@ class RegionSurface {
   SurfaceSamples vertices_, all_, few_vertices_, few_;
 };
 
+Primitive primitive_of(const Proxy& proxy, const SurfaceMoments& moments) {
+  if (const std::optional<Torus>& torus = proxy.torus)
+    return make_torus(torus->centre, torus->axis, torus->radius, torus->minor_radius);
+  return classify(proxy.quadric, moments.centroid(), std::sqrt(moments.area()), kExact);
+}
+
 // All types fitted to the region, from the simplest on: the plane, the special types, then general quadrics.
 std::vector<Candidate> fit_candidates(const RegionSurface& region, const SurfaceMoments& moments, const Plane& plane,
                                       const Proxy& proxy, SegmentSurfaces surfaces) {
   std::vector<Candidate> candidates{region.measured(plane)};
   for (const SurfaceType type : kSpecialTypes) {
     if (type == SurfaceType::torus && surfaces != SegmentSurfaces::all) continue;
+    if (!region.can_tell(free_parameters(type))) continue;
     const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
     if (candidate) candidates.push_back(*candidate);
   }
-  if (const std::optional<Torus>& torus = proxy.torus)
-    candidates.push_back(region.measured(make_torus(torus->centre, torus->axis, torus->radius, torus->minor_radius)));
+  if (proxy.torus) candidates.push_back(region.measured(primitive_of(proxy, moments)));
   // The proxy, or the quadric nearest to what it covers.
-  const Quadric quadric = proxy.torus ? fit_proxy(moments, surfaces).proxy.quadric : proxy.quadric;
-  const Primitive start = classify(quadric, moments.centroid(), std::sqrt(moments.area()), kExact);
+  const Primitive start = primitive_of(proxy.torus ? fit_proxy(moments, surfaces).proxy : proxy, moments);
   candidates.push_back(region.measured(start));
+  if (!region.can_tell(kQuadricParameters)) return candidates;
   const auto refined =
       region.best([&](const SurfaceSamples& samples) { return std::optional(refine_quadric(start, samples)); });
   if (refined) candidates.push_back(*refined);
@@ -291,7 +308,7 @@ const Candidate& simplest_adequate(const RegionSurface& region, const std::vecto
 
 Primitive primitive_of(const SegmentDomain& domain, const Index* begin, const Index* end,
                        const std::vector<std::uint8_t>& depths, const Proxy& proxy, SegmentSurfaces surfaces) {
-  const SurfaceMoments moments = sum_of_moments(domain, begin, end);
+  const SurfaceMoments moments = sum_of_moments(domain, {begin, end});
   const PlaneFit flat = fit_plane(moments);
   const Plane plane = make_plane(flat.normal, flat.offset);
   const RegionSurface region(domain, begin, end, depths);
@@ -303,45 +320,120 @@ Primitive primitive_of(const SegmentDomain& domain, const Index* begin, const In
 }
 
 // Regions with their surfaces, while simpler ones are tried.
-struct Labelling {
+class Labelling {
+ public:
+  Labelling(const SegmentDomain& domain, std::vector<Index> start, const std::vector<Primitive>& primitives,
+            std::size_t& evaluations)
+      : labels(std::move(start)), triangles(primitives.size()), depths(vertex_depths(domain, labels)), domain_(domain),
+        evaluations_(evaluations), moves_(domain),
+        around_(items_at_vertices<Index>(domain.triangles, domain.vertices.size())) {
+    for (const Primitive& p : primitives) proxies_.push_back(Proxy::of(p));
+    for (Index t = 0; t < labels.size(); ++t) {
+      triangles[labels[t]].push_back(t);
+      distances_.push_back(distance_to(domain, t, proxies_[labels[t]]));
+    }
+    evaluations += labels.size();
+  }
+
+  double energy(Index region) const {
+    double sum = 0;
+    for (const Index t : triangles[region]) sum += distances_[t];
+    return sum;
+  }
+  // Exchanges a region's surface and moves the borders to where they then belong, unless the sum of distances grows by
+  // more than `most`. The work is done on triangles of the region and on those that move. False: all is as it was.
+  bool exchange(Index region, const Primitive& primitive, double most);
+
   std::vector<Index> labels;
-  std::vector<Proxy> proxies;
-  std::vector<double> distances;  // of each triangle to the proxy of its region
+  std::vector<std::vector<Index>> triangles;  // of each region, ascending
+  std::vector<std::uint8_t> depths;           // vertex_depths
+
+ private:
+  struct Before {
+    Index triangle, label;
+    double distance;
+  };
+  void update(const std::vector<Before>& moved);
+
+  const SegmentDomain& domain_;
+  std::size_t& evaluations_;
+  BorderMoves moves_;
+  Csr<Index> around_;  // the triangles at each vertex
+  std::vector<Proxy> proxies_;
+  std::vector<double> distances_;  // of each triangle to the proxy of its region
 };
 
-// The labelling with a region's surface exchanged and the borders moved to where they then belong.
-Labelling exchanged(const SegmentDomain& domain, const Labelling& now, Index region, const Primitive& primitive,
-                    const Index* begin, const Index* end, std::size_t& evaluations) {
-  Labelling next = now;
-  next.proxies[region] = Proxy::of(primitive);
-  for (const Index* t = begin; t != end; ++t) next.distances[*t] = distance_to(domain, *t, next.proxies[region]);
-  evaluations += static_cast<std::size_t>(end - begin);
-  relax_borders(domain, next.proxies, {begin, end}, next.labels, next.distances, evaluations);
-  return next;
+bool Labelling::exchange(Index region, const Primitive& primitive, double most) {
+  const Proxy old = proxies_[region];
+  proxies_[region] = Proxy::of(primitive);
+  std::vector<Before> before;
+  double growth = 0;
+  for (const Index t : triangles[region]) {
+    before.push_back({t, region, distances_[t]});
+    distances_[t] = distance_to(domain_, t, proxies_[region]);
+    growth += distances_[t] - before.back().distance;
+  }
+  evaluations_ += before.size();
+  const auto own = static_cast<std::ptrdiff_t>(before.size());
+  moves_.relax(proxies_, triangles[region], labels, distances_, evaluations_, [&](Index t, Index, double distance) {
+    before.push_back({t, labels[t], distances_[t]});
+    growth += distance - distances_[t];
+  });
+  if (growth <= most) {
+    update({before.begin() + own, before.end()});
+    return true;
+  }
+  for (std::size_t k = before.size(); k-- > 0;) {
+    labels[before[k].triangle] = before[k].label;
+    distances_[before[k].triangle] = before[k].distance;
+  }
+  proxies_[region] = old;
+  return false;
+}
+
+// Lists and depths of the regions that triangles have moved from and to.
+void Labelling::update(const std::vector<Before>& moved) {
+  std::vector<Index> regions, all;
+  for (const Before& b : moved) {
+    regions.push_back(b.label);
+    regions.push_back(labels[b.triangle]);
+  }
+  std::sort(regions.begin(), regions.end());
+  regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
+  for (const Index r : regions) {
+    all.insert(all.end(), triangles[r].begin(), triangles[r].end());
+    triangles[r].clear();
+  }
+  std::sort(all.begin(), all.end());
+  for (const Index t : all) triangles[labels[t]].push_back(t);
+  for (const Index t : all)
+    for (const Index v : domain_.triangles[t]) {
+      const bool inside =
+          std::all_of(around_.begin(v), around_.end(v), [&](Index u) { return labels[u] == labels[t]; });
+      depths[v] = inside ? kDeep : 0;
+    }
+  spread_depths(domain_, all, depths);
 }
 
 // Exchanges a region's surface for the simplest type that costs little. False: it stays.
-bool simplify(const SegmentDomain& domain, SegmentSurfaces surfaces, Index r, const RegionSurface& region,
-              const Index* begin, const Index* end, Labelling& labelling, Primitive& primitive,
-              std::size_t& evaluations) {
-  double energy = 0;
-  for (const Index* t = begin; t != end; ++t) energy += labelling.distances[*t];
+void simplify(const SegmentDomain& domain, SegmentSurfaces surfaces, Index r, Labelling& labelling,
+              Primitive& primitive) {
+  const std::vector<Index>& triangles = labelling.triangles[r];
+  const RegionSurface region(domain, triangles.data(), triangles.data() + triangles.size(), labelling.depths);
+  const double energy = labelling.energy(r);
   for (const SurfaceType type : kSpecialTypes) {
     if (type == type_of(primitive)) break;
     if (type == SurfaceType::torus && surfaces != SegmentSurfaces::all) continue;
+    if (!region.can_tell(free_parameters(type))) continue;
     const auto candidate = region.best([&](const SurfaceSamples& samples) { return fit_primitive(type, samples); });
     if (!candidate || !RegionSurface::is_sound(*candidate)) continue;
-    Labelling next = exchanged(domain, labelling, r, candidate->primitive, begin, end, evaluations);
-    double rise = 0;
-    for (std::size_t t = 0; t < next.distances.size(); ++t) rise += next.distances[t] - labelling.distances[t];
     const int fewer = free_parameters(primitive) - free_parameters(type);
     const double allowance = std::max(kHardlyWorse, simplicity_allowance(region.corners(), fewer));
-    if (rise > (allowance - 1) * energy + region.area() * kExact * kExact) continue;
+    const double most = (allowance - 1) * energy + region.area() * kExact * kExact;
+    if (!labelling.exchange(r, candidate->primitive, most)) continue;
     primitive = candidate->primitive;
-    labelling = std::move(next);
-    return true;
+    return;
   }
-  return false;
 }
 
 }  // namespace
@@ -364,22 +456,38 @@ std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std:
 void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, std::vector<Index>& labels,
                          std::vector<Primitive>& primitives, std::size_t& evaluations) {
   if (surfaces == SegmentSurfaces::planes) return;
-  Labelling labelling{std::move(labels), {}, {}};
-  for (const Primitive& p : primitives) labelling.proxies.push_back(Proxy::of(p));
-  labelling.distances.resize(labelling.labels.size());
-  for (Index t = 0; t < labelling.labels.size(); ++t)
-    labelling.distances[t] = distance_to(domain, t, labelling.proxies[labelling.labels[t]]);
-  evaluations += labelling.labels.size();
-  Csr<Index> triangles = items_of_labels<Index>(labelling.labels, primitives.size());
-  std::vector<std::uint8_t> depths = vertex_depths(domain, labelling.labels);
-  for (Index r = 0; r < primitives.size(); ++r) {
-    const Index *begin = triangles.begin(r), *end = triangles.end(r);
-    const RegionSurface region(domain, begin, end, depths);
-    if (!simplify(domain, surfaces, r, region, begin, end, labelling, primitives[r], evaluations)) continue;
-    triangles = items_of_labels<Index>(labelling.labels, primitives.size());
-    depths = vertex_depths(domain, labelling.labels);
-  }
+  Labelling labelling(domain, std::move(labels), primitives, evaluations);
+  for (Index r = 0; r < primitives.size(); ++r) simplify(domain, surfaces, r, labelling, primitives[r]);
   labels = std::move(labelling.labels);
+}
+
+void take_proxies(const SegmentDomain& domain, const std::vector<Index>& labels, const std::vector<Proxy>& proxies,
+                  double most, std::vector<Primitive>& primitives) {
+  const Csr<Index> triangles = items_of_labels<Index>(labels, primitives.size());
+  std::vector<Primitive> exact(primitives.size());
+  std::vector<std::pair<double, std::size_t>> gains(primitives.size());
+  std::vector<double> energies(primitives.size(), 0);
+  parallel_each(
+      primitives.size(),
+      [&](std::size_t r) {
+        const Index *begin = triangles.begin(r), *end = triangles.end(r);
+        exact[r] = primitive_of(proxies[r], sum_of_moments(domain, {begin, end}));
+        const Proxy now = Proxy::of(primitives[r]), other = Proxy::of(exact[r]);
+        gains[r].second = r;
+        for (const Index* t = begin; t != end; ++t) {
+          const double d = distance_to(domain, *t, now);
+          energies[r] += d;
+          gains[r].first += d - distance_to(domain, *t, other);
+        }
+      },
+      1);
+  double energy = std::accumulate(energies.begin(), energies.end(), 0.0);
+  std::stable_sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (const auto& [gain, r] : gains) {
+    if (energy <= most || !(gain > 0)) break;
+    primitives[r] = exact[r];
+    energy -= gain;
+  }
 }
 
 void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels,

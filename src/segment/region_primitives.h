@@ -23,6 +23,11 @@ std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std:
 void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, std::vector<Index>& labels,
                          std::vector<Primitive>& primitives, std::size_t& evaluations);
 
+// Exchanges primitives for the proxies they came from, those first that gain most by it, until the sum of squared
+// distances is at most `most`.
+void take_proxies(const SegmentDomain& domain, const std::vector<Index>& labels, const std::vector<Proxy>& proxies,
+                  double most, std::vector<Primitive>& primitives);
+
 // The same surfaces fitted anew to regions that have changed a little.
 void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels,
                        std::vector<Primitive>& primitives);

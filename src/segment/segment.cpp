@@ -15,6 +15,7 @@
 #include "core/random.h"
 #include "core/stopwatch.h"
 #include "segment/border_weights.h"
+#include "segment/coarsen.h"
 #include "segment/flood.h"
 #include "segment/improve_partition.h"
 #include "segment/lloyd.h"
@@ -28,10 +29,14 @@
 namespace bisector {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 // Start by merging: so many planar pieces that none has to cover two surfaces, and yet few enough to fit quadrics to
 // all pairs.
 constexpr std::size_t kFewestPieces = 200, kMostPieces = 1000;
 constexpr std::size_t kPiecesPerProxy = 10, kTrianglesPerPiece = 40;
+// Clusters of triangles that regions are found on, where a mesh has more triangles: enough for regions of so many each.
+constexpr std::size_t kCoarse = 16'000, kClustersPerRegion = 50;
 constexpr int kPlanarSteps = 4;  // of Lloyd's iteration, for the pieces
 constexpr std::size_t kSpareShare =
     5;  // one region in so many is added: which can be spared shows after Lloyd's iteration
@@ -43,8 +48,9 @@ constexpr int kFirstHalvings = 3, kMostHalvings = 8;
 constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
 // Types and smooth borders cost some of the error; where they take more than was left, a smaller error is aimed at.
-constexpr int kAttempts = 4;
-constexpr double kAim = 0.97;  // of the error that would just do if all grew in proportion
+constexpr int kAttempts = 2;
+constexpr double kAim = 0.97;      // of the error that would just do if all grew in proportion
+constexpr double kLeastAim = 0.9;  // where more would be needed, less simple surfaces do
 
 constexpr double kFarFoot =
     2;  // a vertex is not projected farther than so many times the largest distance in its region
@@ -88,17 +94,18 @@ Partition start_by_merging(Lloyd& lloyd, const SegmentOptions& options, double a
   const SegmentDomain& domain = lloyd.domain();
   const std::size_t n = domain.triangles.size();
   if (options.surfaces == SegmentSurfaces::planes && options.proxies > 0)
-    return fit_all(lloyd, merge_into_planes(domain, options.proxies, lloyd.context()));
+    return fit_all(lloyd, merge_into_planes(domain, options.proxies, kInfinity, lloyd.context()));
   const std::size_t enough =
       std::max(kPiecesPerProxy * options.proxies, std::clamp(n / kTrianglesPerPiece, kFewestPieces, kMostPieces));
   const std::size_t pieces = std::min(n, std::max(enough, domain.component_count));
   Lloyd planar(domain, SegmentSurfaces::planes, lloyd.context());
-  Partition small = fit_all(planar, merge_into_planes(domain, pieces, lloyd.context()));
+  Partition small =
+      fit_all(planar, merge_into_planes(domain, pieces, options.proxies > 0 ? kInfinity : allowed, lloyd.context()));
   planar.iterate(small, std::min(kPlanarSteps, options.iterations));
   lloyd.counts.evaluations += planar.counts.evaluations;
   lloyd.counts.iterations += planar.counts.iterations;
   const std::size_t spare = options.proxies / kSpareShare + 1;
-  const std::size_t count = options.proxies > 0 ? std::min(options.proxies + spare, pieces) : 0;
+  const std::size_t count = options.proxies > 0 ? std::min(options.proxies + spare, small.count()) : 0;
   const RegionMerging merging{count, allowed, options.surfaces};
   return fit_all(lloyd, merge_regions(domain, std::move(small.labels), merging, lloyd.context()));
 }
@@ -121,7 +128,7 @@ Partition start_at_random(Lloyd& lloyd, std::size_t count, std::uint64_t random_
   while (seeds.size() < count) draw(parts.values.data(), parts.values.size());
   std::vector<Index> labels(domain.triangles.size(), kNone);
   std::vector<double> distances(labels.size());
-  flood(domain, proxies, seeds, labels, distances, lloyd.counts.evaluations);
+  Flooding(domain).fill(proxies, seeds, labels, distances, lloyd.counts.evaluations);
   return lloyd.fit(std::move(labels), seeds.size());
 }
 
@@ -140,12 +147,15 @@ double allowed_energy(const SegmentDomain& domain, const SegmentOptions& options
   return rms * rms * domain.area;
 }
 
-Partition start_partition(Lloyd& lloyd, const SegmentOptions& options) {
+Partition start_partition(Lloyd& lloyd, const SegmentOptions& options, SegmentSeconds& seconds) {
   report(lloyd.context(), "start", 0);
+  Stopwatch clock;
   const std::size_t at_random = options.start == SegmentStart::random ? options.proxies : 1;
-  return options.start == SegmentStart::merging
-             ? start_by_merging(lloyd, options, allowed_energy(lloyd.domain(), options))
-             : start_at_random(lloyd, at_random, options.random_seed);
+  Partition partition = options.start == SegmentStart::merging
+                            ? start_by_merging(lloyd, options, allowed_energy(lloyd.domain(), options))
+                            : start_at_random(lloyd, at_random, options.random_seed);
+  seconds.start += clock.lap();
+  return partition;
 }
 
 // Inserts regions until there are enough and takes away those that are not needed. `fresh`: of a partition that was
@@ -156,15 +166,13 @@ void improve(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& option
   const bool merging = options.start == SegmentStart::merging;
   const std::size_t wanted = options.proxies;
   const double allowed = allowed_energy(lloyd.domain(), options);
-  const auto enough = [&](const Partition& p) {
-    return wanted > 0 ? p.regions.size() >= wanted : p.energy() <= allowed;
-  };
+  const auto enough = [&](const Partition& p) { return wanted > 0 ? p.count() >= wanted : p.energy() <= allowed; };
   Stopwatch clock;
   report(context, "Lloyd", 0.2, partition.energy());
   lloyd.iterate(partition, options.iterations);
   while (!enough(partition)) {
     report(context, "inserting regions", 0.3, partition.energy());
-    const std::size_t most = wanted > 0 ? wanted - partition.regions.size() : partition.labels.size();
+    const std::size_t most = wanted > 0 ? wanted - partition.count() : partition.labels.size();
     if (!(merging ? editor.divide_best(partition, most, allowed) : editor.insert_farthest(partition))) break;
     // What was inserted first may be redundant by now; its region is of more use where the error is largest.
     if (!merging && enough(partition) && editor.merge_redundant(partition)) editor.insert_farthest(partition);
@@ -172,16 +180,38 @@ void improve(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& option
   seconds.lloyd += clock.lap();
 
   report(context, "moving regions", 0.6, partition.energy());
-  constexpr double kAnyEnergy = std::numeric_limits<double>::infinity();
-  while (wanted > 0 && partition.regions.size() > wanted &&
-         editor.remove_cheapest(partition, partition.regions.size() - wanted, kAnyEnergy))
+  while (wanted > 0 && partition.count() > wanted &&
+         editor.remove_cheapest(partition, partition.count() - wanted, kInfinity))
     context.check();
   if (fresh) editor.teleport(partition);
   if (wanted == 0)
-    while (editor.remove_cheapest(partition, partition.regions.size(), allowed))
+    while (editor.remove_cheapest(partition, partition.count(), allowed))
       report(context, "removing regions", 0.7, partition.energy());
   lloyd.iterate(partition, options.iterations);
   seconds.improve += clock.lap();
+}
+
+// The regions of a large mesh are found on clusters of its triangles; what is left to do is to move borders by single
+// triangles. Empty where the mesh is small, or the regions would be of too few clusters.
+Partition coarse_partition(Lloyd& lloyd, const SegmentOptions& options, SegmentSeconds& seconds) {
+  const std::size_t most = std::max(kCoarse, kClustersPerRegion * options.proxies);
+  if (lloyd.domain().triangles.size() <= most) return {};
+  const CoarseDomain coarse = coarsened(lloyd.domain(), most);
+  if (2 * coarse.domain.triangles.size() > lloyd.domain().triangles.size()) return {};
+  Lloyd on_clusters(coarse.domain, options.surfaces, lloyd.context());
+  PartitionEditor editor(on_clusters, options.iterations);
+  Partition partition = start_partition(on_clusters, options, seconds);
+  const bool fine_enough = partition.count() * kClustersPerRegion <= coarse.domain.triangles.size() ||
+                           partition.count() == lloyd.domain().component_count;
+  if (fine_enough) improve(on_clusters, editor, options, true, partition, seconds);
+  lloyd.counts.add(on_clusters.counts);
+  if (!fine_enough) return {};
+  Stopwatch clock;
+  std::vector<Index> labels(coarse.cluster_of.size());
+  for (std::size_t t = 0; t < labels.size(); ++t) labels[t] = partition.labels[coarse.cluster_of[t]];
+  partition = lloyd.fit(std::move(labels), partition.count());
+  seconds.lloyd += clock.lap();
+  return partition;
 }
 
 // Numbers the regions in descending order of area.
@@ -220,17 +250,16 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
   std::iota(all.begin(), all.end(), 0u);
   std::vector<double> distances(labels.size());
   for (const Index t : all) distances[t] = distance_to(domain, t, proxies[labels[t]]);
-  relax_borders(domain, proxies, std::move(all), labels, distances, evaluations);
+  BorderMoves(domain).relax(proxies, std::move(all), labels, distances, evaluations);
 }
 
 // Smooths the borders and fits the primitives anew, with weights that grow up to the one asked for, so long as the
-// distance does not grow too far; borders go on from where the last weight left them. Returns the last weight, 0 if
-// even the least raised the distance too far.
+// root mean square distance stays within `most`; borders go on from where the last weight left them. Returns the last
+// weight, 0 if even the least raised the distance too far.
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
-                     double rms, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
+                     double most, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
   const auto distance = [&](Index t, Index r) { return distance_to(domain, t, proxies[r]); };
   const std::vector<double> weights = border_weights(domain, region_noise(domain, labels, proxies));
-  const double most = kMostGrowth * rms + kNegligible;
   const std::vector<Primitive> unsmoothed = primitives;
   double used = 0;
   const auto advance = [&](double weight) {
@@ -241,7 +270,7 @@ double smooth_within(const SegmentDomain& domain, const SegmentOptions& options,
     std::vector<Primitive> refined = unsmoothed;
     smooth_borders(domain.graph, domain.triangles, distance, smoothing, smoothed);
     refine_primitives(domain, smoothed, refined);
-    if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > most) return false;
+    if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > most + kNegligible) return false;
     labels = std::move(smoothed);
     primitives = std::move(refined);
     used = weight;
@@ -313,25 +342,31 @@ struct Classified {
   std::vector<SegmentRelation> relations;
 };
 
-Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition& partition, SegmentSeconds& seconds) {
+// `most`: the root mean square distance to be met, with `at_any_cost` by less simple surfaces than would do otherwise.
+Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition& partition, double most,
+                    bool at_any_cost, SegmentSeconds& seconds) {
   const SegmentDomain& domain = lloyd.domain();
   const Context& context = lloyd.context();
   report(context, "classifying", 0.9, partition.energy());
   Stopwatch clock;
   Classified result;
   result.primitives =
-      region_primitives(domain, partition.labels, partition.regions.size(), lloyd.proxies(partition), options.surfaces);
+      region_primitives(domain, partition.labels, partition.count(), partition.proxies, options.surfaces);
   result.labels = partition.labels;
+  if (at_any_cost) take_proxies(domain, result.labels, partition.proxies, most * most * domain.area, result.primitives);
   polish_borders(domain, proxies_of(result.primitives), result.labels, lloyd.counts.evaluations);
-  simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
-  refine_primitives(domain, result.labels, result.primitives);
+  if (!at_any_cost) {
+    simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
+    refine_primitives(domain, result.labels, result.primitives);
+  }
   const std::vector<Proxy> proxies = proxies_of(result.primitives);
   seconds.classify += clock.lap();
   result.border_before = result.border_after = border_length(domain.graph, result.labels);
   result.rms_before = std::sqrt(mean_square(domain, result.labels, proxies));
   if (options.smooth > 0) {
     report(context, "smoothing borders", 0.95);
-    result.smooth = smooth_within(domain, options, proxies, result.rms_before, result.labels, result.primitives);
+    const double limit = std::max(result.rms_before, std::min(kMostGrowth * result.rms_before, most));
+    result.smooth = smooth_within(domain, options, proxies, limit, result.labels, result.primitives);
     result.border_after = border_length(domain.graph, result.labels);
   }
   sort_regions(domain, result.labels, result.primitives);
@@ -352,26 +387,29 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   SegmentResult result;
   Lloyd lloyd(domain, options.surfaces, context);
   PartitionEditor editor(lloyd, options.iterations);
-  Stopwatch clock;
-  Partition partition = start_partition(lloyd, aimed);
-  result.seconds.start = clock.lap();
-  const double most = allowed_rms(domain, options.error);
+  bool fresh = false;
+  Partition partition = coarse_partition(lloyd, aimed, result.seconds);
+  if (partition.count() == 0) {
+    partition = start_partition(lloyd, aimed, result.seconds);
+    fresh = true;
+  }
+  const double most = options.proxies > 0 ? kInfinity : allowed_rms(domain, options.error);
   Classified classified;
   for (int k = 0; k < kAttempts; ++k) {
-    improve(lloyd, editor, aimed, k == 0, partition, result.seconds);
-    classified = classify(lloyd, aimed, partition, result.seconds);
-    if (options.proxies > 0 || classified.rms <= most) break;
-    aimed.error *= kAim * most / classified.rms;
+    improve(lloyd, editor, aimed, k == 0 && fresh, partition, result.seconds);
+    classified = classify(lloyd, aimed, partition, most, k + 1 == kAttempts, result.seconds);
+    if (classified.rms <= most) break;
+    aimed.error *= std::max(kLeastAim, kAim * most / classified.rms);
   }
-  if (options.proxies == 0 && classified.rms > most)
+  if (classified.rms > most)
     context.warn(
         fmt::format("the root mean square distance is {:.4g}, not {:.4g} as asked for; ask for a smaller error or for "
                     "a number of proxies",
                     domain.scale * classified.rms, domain.scale * most));
 
-  clock.lap();
+  Stopwatch clock;
   const std::vector<Index>& labels = classified.labels;
-  const std::size_t count = partition.regions.size();
+  const std::size_t count = partition.count();
   const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   for (std::size_t r = 0; r < count; ++r)
     result.regions.push_back(measure_region(domain, classified.primitives[r], triangles.begin(r), triangles.end(r)));
@@ -388,10 +426,10 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   result.iterations = lloyd.counts.iterations;
   result.evaluations = lloyd.counts.evaluations;
   result.energies = std::move(lloyd.counts.energies);
-  result.insertions = editor.insertions;
-  result.merges = editor.merges;
-  result.deletions = editor.deletions;
-  result.teleportations = editor.teleportations;
+  result.insertions = lloyd.counts.insertions;
+  result.merges = lloyd.counts.merges;
+  result.deletions = lloyd.counts.deletions;
+  result.teleportations = lloyd.counts.teleportations;
   result.seconds.total = total.seconds();
   return result;
 }

@@ -22,6 +22,7 @@ struct SegmentDomain {
   std::vector<Vec3> normals, barycentres;  // of each triangle; a zero normal where there is no area
   std::vector<double> areas;
   std::vector<TriangleSamples> samples;
+  std::vector<SurfaceMoments> clusters;  // of a coarsened domain, in place of the triangles', each about its centroid
   double area = 0;
   DualGraph graph;
   std::vector<Index> components;  // of each triangle
@@ -30,6 +31,7 @@ struct SegmentDomain {
   double scale = 1;
 
   SurfaceMoments moments(Index triangle, const Vec3& about) const {
+    if (!clusters.empty()) return moved(clusters[triangle], about);
     const Triangle& t = triangles[triangle];
     return triangle_moments(vertices[t[0]], vertices[t[1]], vertices[t[2]], about);
   }
