@@ -29,29 +29,30 @@ struct Row {
   double branches = 0, found = 0, right = 0, spurious = 0, radius = 0, thick = 0, volume = 0;
   test::SurfaceScore surface;
   double thicker = 0, seconds = 0;
+  test::LeafScore leaves{1, 0};  // as if all were kept
 };
 
 const char* const kHead =
     "| scan | points | leaves | seed | branches | found | right parent | spurious | radius error | of thick ones | "
     "volume "
-    "| within 1 % | bare area | / allometric | thicker | s "
-    "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
+    "| within 1 % | bare area | / allometric | thicker | leaves: precision | recall | s "
+    "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
     "---|\n";
 
 void print_row(const std::string& path, const std::string& points, double leaves, const std::string& seed,
                const Row& r) {
   fmt::print(
       "| {} | {} | {:.0f} % | {} | {:.3g} | {:.1f} % | {:.1f} % | {:.3g} | {:.1f} % | {:.1f} % | {:+.1f} % | "
-      "{:.1f} % | {:.1f} % | {:.2f} | {:.3g} | {:.2f} |\n",
+      "{:.1f} % | {:.1f} % | {:.2f} | {:.3g} | {:.2f} | {:.2f} | {:.2f} |\n",
       path, points, 100 * leaves, seed, r.branches, 100 * r.found, 100 * r.right, r.spurious, 100 * r.radius,
       100 * r.thick, 100 * r.volume, 100 * r.surface.near_points, 100 * r.surface.bare_area, r.surface.allometric,
-      r.thicker, r.seconds);
+      r.thicker, r.leaves.precision, r.leaves.recall, r.seconds);
   std::fflush(stdout);
 }
 
-Row measure(const test::TreeScan& scan) {
+Row measure(const test::TreeScan& scan, const TreeOptions& options) {
   Stopwatch watch;
-  const TreeResult tree = reconstruct_tree(scan.points);
+  const TreeResult tree = reconstruct_tree(scan.points, options);
   Row row;
   row.seconds = watch.seconds();
   const test::ScanScore score = test::score_scan(scan, test::axes_of(tree));
@@ -68,6 +69,7 @@ Row measure(const test::TreeScan& scan) {
     if (scan.kinds[i] == test::PointKind::wood) wood.push_back(scan.points[i]);
   row.surface = test::score_surfaces(wood, tree);
   row.thicker = static_cast<double>(row.surface.thicker);
+  if (!tree.leaf.empty()) row.leaves = test::score_leaves(scan, tree.leaf);
   return row;
 }
 
@@ -87,6 +89,8 @@ Row mean(const std::vector<Row>& rows) {
   for (const auto value :
        {&test::SurfaceScore::near_points, &test::SurfaceScore::bare_area, &test::SurfaceScore::allometric})
     result.surface.*value = over([&](const Row& r) { return r.surface.*value; });
+  for (const auto value : {&test::LeafScore::precision, &test::LeafScore::recall})
+    result.leaves.*value = over([&](const Row& r) { return r.leaves.*value; });
   return result;
 }
 
@@ -101,7 +105,8 @@ test::TreeScanOptions options_of(test::ScanPath path, std::size_t points, double
 }
 
 void score_generated(const std::vector<std::string>& paths, const std::vector<std::size_t>& counts,
-                     const std::vector<double>& leaves, const std::array<std::uint64_t, 2>& seeds) {
+                     const std::vector<double>& leaves, const std::array<std::uint64_t, 2>& seeds,
+                     const TreeOptions& options) {
   fmt::print("{}", kHead);
   std::map<double, std::vector<Row>> all;  // by leaves
   for (const std::string& path : paths)
@@ -111,7 +116,7 @@ void score_generated(const std::vector<std::string>& paths, const std::vector<st
         for (std::uint64_t seed = seeds[0]; seed <= seeds[1]; ++seed) {
           const test::TreeScan scan = test::scan_tree(options_of(kPaths.at(path), points, share, seed));
           try {
-            rows.push_back(measure(scan));
+            rows.push_back(measure(scan, options));
           } catch (const Error& error) {
             fmt::print(stderr, "bench_tree_score: {} of {} points, seed {}: {}\n", path, points, seed, error.what());
             continue;
@@ -148,6 +153,7 @@ int main(int argc, char** argv) {
   std::vector<std::size_t> points{5'000, 20'000, 50'000};
   std::vector<double> leaves{0, 0.3};
   std::array<std::uint64_t, 2> seeds{1, 5};
+  TreeOptions options;
   double metre = 1;
   unsigned threads = 2;
   CLI::App app{"How well branches of trees are found in sparse scans: generated ones, or files."};
@@ -156,12 +162,14 @@ int main(int argc, char** argv) {
   app.add_option("--points", points, "of each scan")->delimiter(',');
   app.add_option("--leaves", leaves, "share of the points")->delimiter(',')->check(CLI::Range(0.0, 0.9));
   app.add_option("--seeds", seeds, "the first and the last one")->delimiter(',');
+  app.add_flag_callback(
+      "--leaves-apart", [&] { options.leaves = TreeLeaves::apart; }, "leaves are told from wood and left out");
   app.add_option("--metre", metre, "its length in the files' unit")->check(CLI::PositiveNumber);
   app.add_option("--threads", threads, "default 2");
   CLI11_PARSE(app, argc, argv);
   try {
     const ThreadLimit limit(threads);
-    if (files.empty()) score_generated(paths, points, leaves, seeds);
+    if (files.empty()) score_generated(paths, points, leaves, seeds, options);
     else score_files(files, metre);
   } catch (const std::exception& error) {
     fmt::print(stderr, "bench_tree_score: {}\n", error.what());

@@ -19,12 +19,18 @@ enum class TreeComponents {
   separate  // each becomes a tree of its own
 };
 
+enum class TreeLeaves {
+  keep,  // all points are taken for wood
+  apart  // points of no branch are told from wood and left out
+};
+
 struct TreeOptions {
   std::size_t clusters = 0;            // at most; 0: as many as it takes
   double delta = 0.004;                // a cluster is a cylinder if its points lie so near one, rms, in the unit cube
   std::size_t max_cluster_points = 0;  // larger clusters are split; 0: only those that are no cylinders
   double ground = -std::numeric_limits<double>::infinity();  // points below this height (z) are left out
   TreeComponents components = TreeComponents::bridge;
+  TreeLeaves leaves = TreeLeaves::keep;
   double tip_radius = 0;  // of the thinnest twigs, in the points' unit; 0: 0.0003 of the largest extent
 };
 
@@ -84,6 +90,7 @@ struct TreeSeconds {
 struct TreeResult {
   // Of each point; kNone: none. A duplicate has its twin's.
   std::vector<Index> cluster, branch;
+  std::vector<char> leaf;                        // whether each point is a leaf; empty: leaves were not looked for
   std::size_t clusters = 0, fixed_clusters = 0;  // in all; tight cylinders
   std::vector<TreeNode> skeleton;
   std::vector<TreeBranch> branches;        // parents before children
@@ -92,7 +99,8 @@ struct TreeResult {
   std::size_t ground_points = 0;           // below the ground, left out
   std::size_t duplicate_points = 0;        // at the place of another
   std::size_t small_component_points = 0;  // in components too small for a tree of their own, left out
-  std::size_t unexplained_points = 0;      // near no branch: leaves, for the most part, and strays
+  std::size_t leaf_points = 0;             // with TreeLeaves::apart, left out
+  std::size_t unexplained_points = 0;      // near no branch: strays, and leaves where they are not left out
   // p of the pipe model: at a fork r^p of what comes in is the sum over what goes out. `pipe_fitted`: from this tree's
   // radii that rest on points; else there were too few, and it is 2.3.
   double pipe_exponent = 0;
@@ -130,7 +138,7 @@ BISECTOR_API void write_skeleton(const std::string& path, const TreeResult& tree
 // TreeQSM's mad, SurfCov and UnmodRadius are left out. Numbers read back bit for bit. Throws Error.
 BISECTOR_API void write_cylinders(const std::string& path, const TreeResult& tree);
 
-// The points as binary PLY with `label`, their branch (-1: none), and its colour. Throws Error.
+// The points as binary PLY with `label`, their branch (-1: none, -2: a leaf), and its colour. Throws Error.
 BISECTOR_API void write_tree_labels(const std::string& path, const std::vector<Vec3>& points, const TreeResult& tree);
 
 // Points and surfaces side by side, seen from the side, as PNG; branches have the same colours in both. Throws Error.

@@ -60,6 +60,9 @@ void add_options(CLI::App* app, TreeCommand& command) {
             "parts of the scan that are apart: bridge (join them over\n"
             "their gaps; default) or separate (a tree each)")
       ->group("Scan");
+  add_words(app, "--leaves", command.options.leaves, kLeafWords,
+            "keep (all points are wood; default) or apart (told\nfrom wood by their surroundings and left out)")
+      ->group("Scan");
   app->add_option("--tip-radius", command.options.tip_radius,
                   "of the thinnest twigs, in the points' unit;\ndefault: 0.0003 of the largest extent")
       ->type_name("R")
@@ -116,7 +119,7 @@ struct Measures {
   double length = 0, fitted_length = 0, volume = 0, area = 0, height = 0;
   int order = 0;
   std::size_t trunks = 0, unassigned = 0;
-  std::vector<PointCoverage> coverage;  // of the points above the ground
+  std::vector<PointCoverage> coverage;  // of the points above the ground that are no leaves
   double bare = 0;                      // share of the surface farther than 2 % of the height from them
 };
 
@@ -135,7 +138,7 @@ Measures measure(const std::vector<Vec3>& points, const TreeOptions& options, co
   }
   std::vector<Vec3> above;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (points[i].z < options.ground) continue;
+    if (points[i].z < options.ground || (!tree.leaf.empty() && tree.leaf[i])) continue;
     above.push_back(points[i]);
     measures.unassigned += tree.branch[i] == kNone;
   }
@@ -168,6 +171,7 @@ Json tree_report(const PointCloud& cloud, const TreeResult& tree, const Measures
                      {"duplicate_points", tree.duplicate_points},
                      {"small_component_points", tree.small_component_points},
                      {"unassigned_points", measures.unassigned},
+                     {"leaf_points", tree.leaf_points},
                      {"unexplained_points", tree.unexplained_points},
                      {"components", tree.components},
                      {"bridges", tree.bridges},

@@ -35,6 +35,8 @@ inline constexpr auto kStartWords = word_table<SegmentStart>(
 inline constexpr auto kComponentWords =
     word_table<TreeComponents>({{TreeComponents::bridge, "bridge"}, {TreeComponents::separate, "separate"}});
 
+inline constexpr auto kLeafWords = word_table<TreeLeaves>({{TreeLeaves::keep, "keep"}, {TreeLeaves::apart, "apart"}});
+
 inline constexpr auto kUnitWords = word_table<IgesUnit>({{IgesUnit::millimetre, "mm"},
                                                          {IgesUnit::centimetre, "cm"},
                                                          {IgesUnit::metre, "m"},

@@ -7,6 +7,7 @@
 #include "tree/refit.h"
 #include "tree/support.h"
 #include "tree/trim.h"
+#include "tree/wood.h"
 
 namespace bisector {
 namespace {
@@ -35,6 +36,13 @@ void give_points(const std::vector<Index>& limb_of, std::vector<Limb>& limbs) {
     if (limb_of[i] != kNone) limbs[limb_of[i]].points.push_back(static_cast<Index>(i));
 }
 
+// Points of limbs are wood, the rest is asked.
+std::vector<char> find_wood(const std::vector<Vec3>& points, const std::vector<Index>& limb_of, double tolerance) {
+  std::vector<char> asked(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) asked[i] = limb_of[i] == kNone;
+  return points_on_lines(points, asked, tolerance);
+}
+
 // Of the branch at each point; 0 where there is none.
 std::vector<double> radii_at(const std::vector<Vec3>& points, const std::vector<Index>& limb_of,
                              const std::vector<Limb>& limbs) {
@@ -59,13 +67,15 @@ Completion complete_limbs(const std::vector<Vec3>& points, const CompletionOptio
   const double tolerance = std::min(kLargestTolerance, std::max(kNoises * noise, kSpacings * options.spacing));
   Completion result;
   std::vector<double> radius;
+  std::vector<char> wood;
   for (int round = 0; round < kRounds; ++round) {
     context.check();
     trim_limbs(limbs);
     result.limb_of = limbs_of_points(points, limbs, std::max(kSkin * noise, tolerance));
     for (std::size_t i = 0; i < options.group.size(); ++i)
       if (options.group[i] == kNone) result.limb_of[i] = kNone;
-    grow_limbs(points, {tolerance, radius, options.group}, limbs, result.limb_of, context);
+    if (options.leaves && wood.empty()) wood = find_wood(points, result.limb_of, tolerance);
+    grow_limbs(points, {tolerance, radius, options.group, wood}, limbs, result.limb_of, context);
     give_points(result.limb_of, limbs);
     fill_radii(limbs, options.tip_radius, kSlenderness);
     straighten_limbs(points, tolerance, limbs);
@@ -74,6 +84,7 @@ Completion complete_limbs(const std::vector<Vec3>& points, const CompletionOptio
     radius = radii_at(points, result.limb_of, limbs);
     refit_limbs(points, tolerance, noise, limbs);
   }
+  for (std::size_t i = 0; i < wood.size(); ++i) result.leaf.push_back(!wood[i] && result.limb_of[i] == kNone);
   return result;
 }
 

@@ -22,6 +22,7 @@ namespace {
 
 constexpr std::size_t kLeastGain = 2;  // points that a branch explains
 constexpr double kGap = 3;             // steps longer than so many tolerances, or median steps, cross a gap
+constexpr double kLeaf = 2;            // what a step to a leaf costs, in that of a step to wood
 constexpr double kTurn = 2;            // what a step across a gap costs more at a right angle, in its own cost
 constexpr double kMostGaps = 0.5;      // of a branch's length
 constexpr double kLeastLength = 2;     // of it, in tolerances
@@ -71,7 +72,7 @@ class Growth {
     std::vector<std::pair<double, Index>> starts;  // length, first point beyond the fork
     for (const Index i : ways_.order) {
       const Index from = ways_.previous[i];
-      if (from == i || ways_.next[from] == i) continue;
+      if (from == i || ways_.next[from] == i || !leads_to_wood(i)) continue;
       starts.emplace_back(ways_.beyond[i] + norm(points_[i] - points_[from]), i);
     }
     for (const Index i : ways_.order)  // the first of the ways that leave a source
@@ -126,7 +127,7 @@ class Growth {
         const Vec3 step = points_[*j] - points_[i];
         const double length = norm(step);
         const double turn = length > gap_ ? kTurn * (1 - dot(direction, step) / length) : 0;
-        queue.emplace(cost + length * length * (1 + turn), *j, i);
+        queue.emplace(cost + length * length * (1 + turn) * (is_wood(*j) ? 1 : kLeaf), *j, i);
       }
     }
   }
@@ -148,7 +149,7 @@ class Growth {
     ways_.next.assign(n, kNone);
     for (std::size_t k = ways_.order.size(); k-- > 0;) {
       const Index i = ways_.order[k], from = ways_.previous[i];
-      if (from == i) continue;
+      if (from == i || !leads_to_wood(i)) continue;
       const double length = ways_.beyond[i] + norm(points_[i] - points_[from]);
       if (ways_.next[from] == kNone || length > ways_.beyond[from]) {
         ways_.beyond[from] = length;
@@ -160,7 +161,7 @@ class Growth {
     std::vector<double> best(n, -2);
     for (const Index i : ways_.order) {
       const Index from = ways_.previous[i];
-      if (from == i) continue;
+      if (from == i || !leads_to_wood(i)) continue;
       const double length = ways_.beyond[i] + norm(points_[i] - points_[from]);
       if (length < kSimilar * ways_.beyond[from]) continue;
       const Vec3 ahead = points_[far_along(i, from)] - points_[from], back = points_[from] - points_[far_back(from)];
@@ -211,7 +212,7 @@ class Growth {
 
     const std::vector<Index> near = around(way);
     std::size_t gain = 0;
-    for (const Index i : near) gain += limb_of_[i] == kNone;
+    for (const Index i : near) gain += limb_of_[i] == kNone && is_wood(i);
     if ((gain < kLeastGain || gaps(way) > kMostGaps) && parent != kNone) return;
     if (parent != kNone && ends_at(limbs_[parent], axis.front())) {
       go_on(axis, limbs_[parent]);
@@ -273,6 +274,8 @@ class Growth {
     return result;
   }
 
+  bool is_wood(Index i) const { return options_.wood.empty() || options_.wood[i]; }
+  bool leads_to_wood(Index i) const { return ways_.next[i] != kNone || is_wood(i); }
   double radius_of(Index i) const { return options_.radius.empty() ? 0 : options_.radius[i]; }
   Index group_of(Index i) const { return options_.group.empty() ? 0 : options_.group[i]; }
 

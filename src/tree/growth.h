@@ -14,6 +14,8 @@ struct GrowthOptions {
   std::vector<double> radius;  // of the branch at each point, as far as it is known: it is explained up to twice that,
                                // for ways run along one side; empty: nothing is known
   std::vector<Index> group;    // of each point: ways stay within a group, and reach none of kNone; empty: all are one
+  std::vector<char> wood;      // whether each point is wood rather than a leaf: ways lead to wood, across leaves where
+                               // they must; empty: all are
 };
 
 // Points are reached by ways that sum up the squares of their steps (Hwang, Damelin and Hero, Shortest path through

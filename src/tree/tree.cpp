@@ -301,6 +301,7 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   CompletionOptions completion;
   completion.spacing = network.graph.spacing;
   completion.tip_radius = options.tip_radius > 0 ? options.tip_radius / scan.unit : kTipRadius;
+  completion.leaves = options.leaves == TreeLeaves::apart;
   if (options.components == TreeComponents::separate) completion.group = trees_of_points(network);
   const Completion completed = complete_limbs(scan.points, completion, limbs, context);
   result.pipe_exponent = completed.pipe.exponent;
@@ -317,12 +318,16 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   result.noise = scan.unit * noise;
   result.cluster.assign(points.size(), kNone);
   result.branch.assign(points.size(), kNone);
+  if (completion.leaves) result.leaf.assign(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i)
     if (const Index p = scan.of_input[i]; p != kNone) {
       result.cluster[i] = clusters.label[p];
       result.branch[i] = completed.limb_of[p];
       const bool in_tree = completion.group.empty() || completion.group[p] != kNone;
-      result.unexplained_points += in_tree && completed.limb_of[p] == kNone;
+      const bool is_leaf = in_tree && completion.leaves && completed.leaf[p];
+      if (is_leaf) result.leaf[i] = 1;
+      result.leaf_points += is_leaf;
+      result.unexplained_points += in_tree && !is_leaf && completed.limb_of[p] == kNone;
     }
   result.seconds.surfaces = watch.lap();
   result.seconds.total = watch.seconds();

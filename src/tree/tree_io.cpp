@@ -22,6 +22,8 @@ namespace {
 using Colour = std::array<unsigned char, 3>;
 
 constexpr Colour kNoBranch{150, 150, 150};
+constexpr Colour kLeafColour{120, 180, 90};
+constexpr std::int32_t kLeafLabel = -2;
 constexpr double kPointSize = 5e-4;  // half the edge of a drawn point, in the points' diagonal
 constexpr double kApart = 1.1;       // of the two views, in widths of the tree
 
@@ -119,8 +121,9 @@ void write_tree_labels(const std::string& path, const std::vector<Vec3>& points,
       points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (int k = 0; k < 3; ++k) io::append_bytes(out, points[i][k]);
-    for (const unsigned char c : branch_colour(tree, tree.branch[i])) io::append_bytes(out, c);
-    io::append_bytes(out, static_cast<std::int32_t>(tree.branch[i]));
+    const bool is_leaf = !tree.leaf.empty() && tree.leaf[i];
+    for (const unsigned char c : is_leaf ? kLeafColour : branch_colour(tree, tree.branch[i])) io::append_bytes(out, c);
+    io::append_bytes(out, is_leaf ? kLeafLabel : static_cast<std::int32_t>(tree.branch[i]));
   }
   write_file(path, out);
 }

@@ -16,12 +16,12 @@
 namespace bisector {
 namespace {
 
-constexpr double kReach = 9;           // of a line to both sides, in spacings of the points
-constexpr int kCells = 8;              // of the line
-constexpr double kLink = 3;            // spacings between neighbours on a branch, at most
-constexpr int kRounds = 2;             // the second asks only what the first has taken for wood
+constexpr double kReach = 9;          // of a line to both sides, in spacings of the points
+constexpr int kCells = 8;             // of the line
+constexpr double kLink = 2.5;         // spacings between neighbours on a branch, at most
+constexpr int kRounds = 2;            // the second asks only what the first has taken for wood
 constexpr double kFalseAlarms = 0.1;  // lines through a point that chance may bring, at most
-constexpr double kAway = 3;            // tolerances that a point is off another, at least, to tell a direction
+constexpr double kAway = 3;           // tolerances that a point is off another, at least, to tell a direction
 constexpr std::size_t kMostDirections = 256;
 
 // Median distance of points from their second neighbours.
@@ -39,12 +39,13 @@ double spacing_of(const std::vector<Vec3>& points) {
   return quantile(std::move(second), 0.5);
 }
 
-// The chance that at least `count` of the line's cells are occupied.
+// The chance that at least `count` of a line's cells are occupied, of which one is, since a point there gave the line.
 double chance_of(int count, double occupied) {
+  constexpr int kOthers = kCells - 1;
   double sum = 0, choose = 1;
-  for (int k = 0; k <= kCells; ++k) {
-    if (k >= count) sum += choose * std::pow(occupied, k) * std::pow(1 - occupied, kCells - k);
-    choose *= static_cast<double>(kCells - k) / (k + 1);
+  for (int k = 0; k <= kOthers; ++k) {
+    if (k + 1 >= count) sum += choose * std::pow(occupied, k) * std::pow(1 - occupied, kOthers - k);
+    choose *= static_cast<double>(kOthers - k) / (k + 1);
   }
   return sum;
 }
@@ -52,8 +53,8 @@ double chance_of(int count, double occupied) {
 class Lines {
  public:
   Lines(const std::vector<Vec3>& points, double spacing, double tolerance)
-      : points_(points), set_{points}, tree_(3, set_), link_(kLink * spacing),
-        reach_(kReach * spacing), tolerance_(tolerance), cell_(2 * tolerance) {
+      : points_(points), set_{points}, tree_(3, set_), link_(kLink * spacing), reach_(kReach * spacing),
+        tolerance_(tolerance), cell_(2 * tolerance) {
     DisjointSets<Index> sets(points.size());
     std::vector<std::pair<Index, double>> found;
     for (std::size_t i = 0; i < points.size(); ++i) {

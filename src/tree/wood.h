@@ -7,10 +7,11 @@
 
 namespace bisector {
 
-// Whether a line through each of `asked` has more points along it, within `tolerance`, than chance would put there (a
-// contrario detection, Desolneux, Moisan and Morel, Meaningful alignments, IJCV 2000): the chance that cells along a
-// line are occupied is the share of those that are, of all around the point. Surfaces much larger than the distance of
-// their points hold such lines too, patches of the size of leaves don't. The same for any number of threads.
+// Whether each point lies on a line along which there are more points, within `tolerance`, than chance would put there
+// (a contrario detection, Desolneux, Moisan and Morel, Meaningful alignments, IJCV 2000): the chance that a cell of the
+// line is occupied is the share of the space around that is. Only points count that small steps lead to, and in a
+// second round only those that the first has taken. Surfaces much larger than their points' spacing hold such lines
+// too, patches of the size of leaves don't. Those that are not `asked` are taken. The same for any number of threads.
 std::vector<char> points_on_lines(const std::vector<Vec3>& points, const std::vector<char>& asked, double tolerance);
 
 }  // namespace bisector

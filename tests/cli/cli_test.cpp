@@ -187,6 +187,7 @@ TEST_F(Cli, HelpListsAllWords) {
   expect_words("segment", "--surfaces", cli::kSurfaceWords.list());
   expect_words("segment", "--start", cli::kStartWords.list());
   expect_words("tree", "--components", cli::kComponentWords.list());
+  expect_words("tree", "--leaves", cli::kLeafWords.list());
   expect_words("tree", "--unit", cli::kUnitWords.list());
 }
 

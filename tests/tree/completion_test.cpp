@@ -15,6 +15,7 @@
 #include "tree/polyline.h"
 #include "tree/support.h"
 #include "tree/trim.h"
+#include "tree/wood.h"
 
 namespace bisector {
 namespace {
@@ -160,7 +161,7 @@ TEST(Growth, FollowsRowsAndLeavesStraysAlone) {
   points.push_back({0.5, 0.5, 0.9});
   std::vector<Limb> limbs;
   std::vector<Index> limb_of(points.size(), kNone);
-  grow_limbs(points, {0.01, {}, {}}, limbs, limb_of);
+  grow_limbs(points, {0.01, {}, {}, {}}, limbs, limb_of);
   ASSERT_EQ(limbs.size(), 2u);
   EXPECT_EQ(limbs[0].parent, kNone);
   EXPECT_EQ(limbs[1].parent, 0u);
@@ -173,6 +174,22 @@ TEST(Growth, FollowsRowsAndLeavesStraysAlone) {
     }
 }
 
+TEST(Growth, WaysLeadToWoodAndAcrossLeaves) {
+  std::vector<Vec3> points;
+  for (int k = 0; k <= 30; ++k) points.push_back({0, 0, 0.02 * k});
+  for (int k = 1; k <= 10; ++k) points.push_back({0.02 * k, 0, 0.3});  // a row aside
+  std::vector<char> wood(points.size(), 1);
+  for (std::size_t i = 31; i < wood.size(); ++i) wood[i] = 0;  // of leaves
+  wood[10] = 0;
+  std::vector<Limb> limbs;
+  std::vector<Index> limb_of(points.size(), kNone);
+  grow_limbs(points, {0.01, {}, {}, wood}, limbs, limb_of);
+  ASSERT_EQ(limbs.size(), 1u);
+  EXPECT_NEAR(polyline_length(limbs[0].axis), 0.6, 0.01);
+  EXPECT_EQ(limb_of[10], 0u);
+  EXPECT_EQ(limb_of.back(), kNone);
+}
+
 TEST(Growth, GroupsAreTreesOfTheirOwn) {
   std::vector<Vec3> points;
   std::vector<Index> group;
@@ -183,10 +200,55 @@ TEST(Growth, GroupsAreTreesOfTheirOwn) {
     }
   std::vector<Limb> limbs;
   std::vector<Index> limb_of(points.size(), kNone);
-  grow_limbs(points, {0.01, {}, group}, limbs, limb_of);
+  grow_limbs(points, {0.01, {}, group, {}}, limbs, limb_of);
   ASSERT_EQ(limbs.size(), 2u);
   for (const Limb& limb : limbs) EXPECT_EQ(limb.parent, kNone);
   for (std::size_t i = 0; i < points.size(); ++i) EXPECT_EQ(limb_of[i] == kNone, group[i] == kNone);
+}
+
+// Rows of points among as many that lie anywhere: nearly all of the rows are taken, and few of the others.
+TEST(Wood, RowsAreToldFromScatter) {
+  Random random(5);
+  std::vector<Vec3> points;
+  constexpr std::size_t kRow = 60, kRows = 8;
+  for (std::size_t r = 0; r < kRows; ++r) {
+    const Vec3 from{random.uniform(), random.uniform(), random.uniform()};
+    const Vec3 way = unit(Vec3{random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5});
+    for (std::size_t k = 0; k < kRow; ++k) points.push_back(from + 0.02 * static_cast<double>(k) * way);
+  }
+  const std::size_t rows = points.size();
+  const Box box = bounding_box(points);
+  for (std::size_t k = 0; k < rows; ++k) {
+    Vec3 p;
+    for (int c = 0; c < 3; ++c) p[c] = box.lo[c] + random.uniform() * (box.hi[c] - box.lo[c]);
+    points.push_back(p);
+  }
+  const std::vector<char> wood = points_on_lines(points, std::vector<char>(points.size(), 1), 0.01);
+  const auto taken = [&](std::size_t first, std::size_t last) {
+    return std::count(wood.begin() + static_cast<std::ptrdiff_t>(first),
+                      wood.begin() + static_cast<std::ptrdiff_t>(last), 1);
+  };
+  EXPECT_GE(taken(0, rows), static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(rows)));
+  EXPECT_LE(taken(rows, points.size()), static_cast<std::ptrdiff_t>(0.1 * static_cast<double>(rows)));
+  EXPECT_EQ(points_on_lines(points, std::vector<char>(points.size(), 0), 0.01), std::vector<char>(points.size(), 1));
+}
+
+TEST(SparseTree, LeavesApartLeaveFewerFalseBranches) {
+  const test::TreeScan scan = test::scan_tree({.points = 5000, .leaves = 0.3, .random_seed = 6});
+  TreeOptions options;
+  const TreeResult kept = reconstruct_tree(scan.points, options);
+  EXPECT_TRUE(kept.leaf.empty());
+  EXPECT_EQ(kept.leaf_points, 0u);
+  options.leaves = TreeLeaves::apart;
+  const TreeResult apart = reconstruct_tree(scan.points, options);
+  ASSERT_EQ(apart.leaf.size(), scan.points.size());
+  EXPECT_EQ(apart.leaf_points, static_cast<std::size_t>(std::count(apart.leaf.begin(), apart.leaf.end(), 1)));
+  for (std::size_t i = 0; i < apart.leaf.size(); ++i)
+    EXPECT_TRUE(!apart.leaf[i] || apart.branch[i] == kNone) << "point " << i;
+  // What is left out is mostly leaves, which are not a third of the points.
+  EXPECT_GT(test::score_leaves(scan, apart.leaf).precision, 0.6);
+  EXPECT_LT(2 * test::score_scan(scan, test::axes_of(apart)).spurious,
+            test::score_scan(scan, test::axes_of(kept)).spurious);
 }
 
 TEST(Coverage, AreaThatNoPointsShow) {
