@@ -11,7 +11,7 @@ namespace bisector {
 namespace {
 
 constexpr double kGap = 12;              // between fitted places of an axis, in radii, at most
-constexpr std::size_t kLeastFitted = 3;  // places of a limb
+constexpr std::size_t kLeastFitted = 3;  // places of a limb, or fewer that are so far apart as it is thick
 constexpr double kWider = 1.3;           // radius over that before a gap, at most
 
 }  // namespace
@@ -20,16 +20,18 @@ std::size_t fitted_end(const Limb& limb, double hidden) {
   const std::size_t m = limb.axis.size();
   std::size_t last = 0, count = 0;
   double since = -hidden;  // length since the last fitted place, or since the base came out of the parent
+  double length = 0;       // between the first and the last one
   for (std::size_t k = 0; k < m; ++k) {
     if (k > 0) since += norm(limb.axis[k] - limb.axis[k - 1]);
     if (!limb.fitted[k]) continue;
     if (since > kGap * limb.radii[k]) break;
     if (count > 0 && limb.radii[k] > kWider * limb.radii[last]) break;
+    if (count > 0) length += since;
     since = 0;
     last = k;
     ++count;
   }
-  return count >= kLeastFitted ? last + 1 : 0;
+  return count >= kLeastFitted || (count > 1 && length >= 2 * limb.radii[last]) ? last + 1 : 0;
 }
 
 void trim_limbs(std::vector<Limb>& limbs) {
