@@ -132,6 +132,26 @@ class Filling {
   const PipeModel& model_;
 };
 
+// Of each trunk the largest extent of its tree.
+std::vector<double> tree_sizes(const std::vector<Limb>& limbs) {
+  std::vector<std::size_t> trunk(limbs.size());
+  std::vector<Box> box(limbs.size());
+  for (std::size_t b = 0; b < limbs.size(); ++b) {
+    const Limb& limb = limbs[b];
+    trunk[b] = limb.parent == kNone ? b : trunk[limb.parent];
+    if (limb.parent == kNone) box[b] = {limb.axis[0], limb.axis[0]};
+    Box& all = box[trunk[b]];
+    for (const Vec3& p : limb.axis)
+      for (int c = 0; c < 3; ++c) {
+        all.lo[c] = std::min(all.lo[c], p[c]);
+        all.hi[c] = std::max(all.hi[c], p[c]);
+      }
+  }
+  std::vector<double> sizes;
+  for (const Box& all : box) sizes.push_back(std::max({all.hi.x - all.lo.x, all.hi.y - all.lo.y, all.hi.z - all.lo.z}));
+  return sizes;
+}
+
 }  // namespace
 
 PipeModel fill_radii(std::vector<Limb>& limbs, double tip_radius, double slenderness) {
@@ -139,19 +159,12 @@ PipeModel fill_radii(std::vector<Limb>& limbs, double tip_radius, double slender
   model.tip_radius = tip_radius;
   const Lengths lengths = measure_lengths(limbs);
   fit_exponent(limbs, lengths, model);
-  Box box{limbs.empty() ? Vec3{} : limbs[0].axis[0], limbs.empty() ? Vec3{} : limbs[0].axis[0]};
-  for (const Limb& limb : limbs)
-    for (const Vec3& p : limb.axis)
-      for (int c = 0; c < 3; ++c) {
-        box.lo[c] = std::min(box.lo[c], p[c]);
-        box.hi[c] = std::max(box.hi[c], p[c]);
-      }
-  const double size = std::max({box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z});
+  const std::vector<double> sizes = tree_sizes(limbs);
   const Filling filling(lengths, model);
   for (std::size_t b = 0; b < limbs.size(); ++b) {
     Limb& limb = limbs[b];
     if (limb.parent == kNone) {
-      filling.fill(b, std::numeric_limits<double>::infinity(), size / slenderness, limb);
+      filling.fill(b, std::numeric_limits<double>::infinity(), sizes[b] / slenderness, limb);
       continue;
     }
     const Limb& parent = limbs[limb.parent];

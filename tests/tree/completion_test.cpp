@@ -151,6 +151,16 @@ TEST(PipeModel, WithoutAnyRadiusTheSizeTellsTheTrunks) {
   std::vector<Limb> limbs = forks();
   fill_radii(limbs, 0, 50);
   EXPECT_NEAR(limbs[0].radii[0], 8.0 / 50, 1e-12);
+  // Each tree's own size, however far they are apart.
+  const std::size_t n = limbs.size();
+  for (const Limb& limb : forks()) {
+    limbs.push_back(limb);
+    for (Vec3& p : limbs.back().axis) p += Vec3{1000, 0, 0};
+    if (limb.parent != kNone) limbs.back().parent += static_cast<Index>(n);
+  }
+  fill_radii(limbs, 0, 50);
+  EXPECT_NEAR(limbs[0].radii[0], 8.0 / 50, 1e-12);
+  EXPECT_NEAR(limbs[n].radii[0], 8.0 / 50, 1e-10);
 }
 
 // Rows of points: a stem, a bough at a right angle after a gap, and a stray.
