@@ -12,15 +12,10 @@ namespace {
 // Units that a length l of border costs. The likelihood leaves it open; on generated parts with noise 4 of 1/4, 1/2, 1
 // to 16 leaves the most triangles with their surfaces.
 constexpr double kBorderCost = 4;
-constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
 // The approximate distance, negative where the polynomial is.
 double signed_distance(const Proxy& proxy, const Vec3& p) {
-  if (proxy.torus) {
-    const Vec3 v = p - proxy.torus->centre;
-    const double z = dot(v, proxy.torus->axis), r = std::sqrt(std::max(0.0, norm2(v) - z * z)) - proxy.torus->radius;
-    return std::sqrt(r * r + z * z) - proxy.torus->minor_radius;
-  }
+  if (proxy.torus) return signed_distance(*proxy.torus, p);
   return std::copysign(approximate_distance(proxy.quadric, proxy.second_order, p), value_of(proxy.quadric, p));
 }
 

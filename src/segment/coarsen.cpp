@@ -92,10 +92,11 @@ TriangleSamples samples_of(const SurfaceMoments& moments) {
   const SurfaceMoments centred = moved(moments, moments.centroid());
   const double area = centred.area();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  if (area > 0)
+  if (area > 0) {
     covariance << centred.m[4], centred.m[5], centred.m[6], centred.m[5], centred.m[7], centred.m[8], centred.m[6],
         centred.m[8], centred.m[9];
-  if (area > 0) covariance /= area;
+    covariance /= area;
+  }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
   const Eigen::Matrix3d root = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   constexpr double kCorners[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};

@@ -50,20 +50,6 @@ Index farthest_triangle(const Partition& partition, Index region) {
                            [&](Index a, Index b) { return partition.distances[a] < partition.distances[b]; });
 }
 
-Index nearest_triangle(const SegmentDomain& domain, const std::vector<Index>& triangles, const Proxy& proxy) {
-  Index best = triangles[0];
-  double least = std::numeric_limits<double>::infinity();
-  for (const Index t : triangles) {
-    if (!(domain.areas[t] > 0)) continue;
-    const double d = distance_to(domain, t, proxy) / domain.areas[t];
-    if (d < least) {
-      least = d;
-      best = t;
-    }
-  }
-  return best;
-}
-
 Proxy plane_of(const SegmentDomain& domain, Index triangle) {
   const Vec3& n = domain.normals[triangle];
   return Proxy::of(plane_quadric(n, dot(n, domain.barycentres[triangle])));
@@ -156,7 +142,7 @@ void PartitionEditor::improve_division(const Partition& partition, Index region,
                                               trial.evaluations, k % 2 == 1);
       energy += fitted.fit.energy;
       proxies[i] = fitted.proxy;
-      seeds[i] = nearest_triangle(domain, parts[i], fitted.proxy);
+      seeds[i] = lloyd_.seed(parts[i], trial.distances);
     }
     const double gain = partition.fits[region].energy - energy;
     if (!(gain > division.gain)) break;
@@ -177,7 +163,8 @@ PartitionEditor::Division PartitionEditor::find_division(const Partition& partit
     if (division.gain > best.gain) best = std::move(division);
   };
   const Index worst = farthest_triangle(partition, region);
-  start({partition.proxies[region], plane_of(domain, worst)}, {lloyd_.seed(partition, region), worst});
+  start({partition.proxies[region], plane_of(domain, worst)},
+        {lloyd_.seed(partition.triangles[region], partition.distances), worst});
   for (const auto& parts : {halves(domain, triangles), flat_and_rest(domain, triangles)}) {
     if (parts[0].empty() || parts[1].empty()) continue;
     std::array<Proxy, 2> proxies;
@@ -186,7 +173,7 @@ PartitionEditor::Division PartitionEditor::find_division(const Partition& partit
       proxies[i] =
           lloyd_.refit(parts[i], sum_of_moments(domain, parts[i]), nullptr, trial.distances, trial.evaluations, false)
               .proxy;
-      seeds[i] = nearest_triangle(domain, parts[i], proxies[i]);
+      seeds[i] = lloyd_.seed(parts[i], trial.distances);
     }
     start(proxies, seeds);
   }
@@ -413,7 +400,7 @@ bool PartitionEditor::insert_farthest(Partition& partition) {
   const Index worst = farthest_triangle(partition, region);
   const auto count = static_cast<Index>(partition.count());
   std::vector<FloodSeed> seeds;
-  for (Index r = 0; r < count; ++r) seeds.push_back({lloyd_.seed(partition, r), r});
+  for (Index r = 0; r < count; ++r) seeds.push_back({lloyd_.seed(partition.triangles[r], partition.distances), r});
   if (seeds[region].triangle == worst) return false;
   seeds.push_back({worst, count});
   std::vector<Proxy> proxies = partition.proxies;

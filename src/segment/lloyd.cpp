@@ -152,13 +152,13 @@ Partition Lloyd::fit(std::vector<Index> labels, std::size_t count) {
   return partition;
 }
 
-Index Lloyd::seed(const Partition& partition, Index region) const {
-  Index best = partition.triangles[region][0];
+Index Lloyd::seed(const std::vector<Index>& triangles, const std::vector<double>& distances) const {
+  Index best = triangles[0];
   double least = std::numeric_limits<double>::infinity();
-  for (const Index t : partition.triangles[region]) {
+  for (const Index t : triangles) {
     if (!(domain_.areas[t] > 0)) continue;
     // What differs by rounding only is as near.
-    const double d = std::max(kExact, partition.distances[t] / domain_.areas[t]);
+    const double d = std::max(kExact, distances[t] / domain_.areas[t]);
     if (d < least) {
       least = d;
       best = t;
@@ -169,7 +169,7 @@ Index Lloyd::seed(const Partition& partition, Index region) const {
 
 void Lloyd::flood(const std::vector<Index>& regions, const std::vector<Index>& triangles, Partition& partition) {
   std::vector<FloodSeed> seeds;
-  for (const Index r : regions) seeds.push_back({seed(partition, r), r});
+  for (const Index r : regions) seeds.push_back({seed(partition.triangles[r], partition.distances), r});
   for (const Index t : triangles) partition.labels[t] = kNone;
   flooding_.fill(partition.proxies, seeds, partition.labels, partition.distances, counts.evaluations);
 }

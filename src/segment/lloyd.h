@@ -52,8 +52,8 @@ class Lloyd {
   // The same with one flooding only, and moves at borders after that; gives up where steps as large as the last would
   // not bring the energy below `goal`. `undo` takes it back.
   void try_out(Partition& partition, int iterations, double goal, PartitionUndo& undo);
-  // The triangle of a region nearest its proxy.
-  Index seed(const Partition& partition, Index region) const;
+  // The one of some triangles, at least one, that is nearest its proxy by the distances of all.
+  Index seed(const std::vector<Index>& triangles, const std::vector<double>& distances) const;
   // Shares out some triangles among regions, from these regions' seeds; lists stay as they are.
   void flood(const std::vector<Index>& regions, const std::vector<Index>& triangles, Partition& partition);
 

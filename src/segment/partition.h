@@ -15,8 +15,8 @@ struct RegionFit {
   double energy = 0;       // sum of distance_to over the region
   bool invalid = false;    // the best quadric is no surface of its own (is_invalid)
   SurfaceMoments moments;  // of the region
-  std::uint64_t version =
-      0;  // differs for every pair of a set of triangles and a proxy, so that costs can be kept by it
+  // Differs for every pair of a set of triangles and a proxy, so that costs can be kept by it.
+  std::uint64_t version = 0;
 };
 
 // Work on some regions costs as much as these have triangles: nothing here is to be gone through as a whole but once.

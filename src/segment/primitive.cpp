@@ -636,6 +636,14 @@ std::pair<Vec3, Vec3> frame_across(const Vec3& axis) {
   return {u, cross(axis, u)};
 }
 
+Vec3 rotated(const Vec3& p, const Vec3& w) {
+  const double angle = norm(w);
+  if (!(angle > 0)) return p;
+  const Vec3 axis = (1 / angle) * w;
+  const double along = (1 - std::cos(angle)) * dot(axis, p);
+  return std::cos(angle) * p + std::sin(angle) * cross(axis, p) + along * axis;
+}
+
 SurfaceType type_of(const Primitive& primitive) {
   return std::visit([](const auto& s) { return surface_type(s); }, primitive);
 }

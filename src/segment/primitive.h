@@ -12,6 +12,9 @@ namespace bisector {
 // Two vectors u and v of length 1, so that (u, v, axis) is right-handed and orthonormal; the axis has length 1.
 std::pair<Vec3, Vec3> frame_across(const Vec3& axis);
 
+// p turned about the origin by |w| radians, about the direction of w (Rodrigues' formula).
+Vec3 rotated(const Vec3& p, const Vec3& w);
+
 // Axes and normals need not have length 1. Throw Error for those without direction, lengths that are not positive,
 // angles outside (0, pi/2), and tori whose minor radius is not the smaller one.
 Plane make_plane(const Vec3& normal, double offset);

@@ -236,14 +236,6 @@ NormalEquations normal_equations(const Shape& shape, const Local& local) {
   });
 }
 
-Vec3 rotated(const Vec3& p, const Vec3& w) {
-  const double angle = norm(w);
-  if (!(angle > 0)) return p;
-  const Vec3 axis = (1 / angle) * w;
-  const double along = (1 - std::cos(angle)) * dot(axis, p);
-  return std::cos(angle) * p + std::sin(angle) * cross(axis, p) + along * axis;
-}
-
 // A radius after a step that is linear in its inverse: distances are, nearly, where points cover little of the surface.
 double stepped_radius(double radius, double step) {
   return step < radius / 2 ? radius * radius / (radius - step) : radius + 2 * step;

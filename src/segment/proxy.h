@@ -32,17 +32,21 @@ struct Proxy {
   }
 };
 
+// Exact, negative inside.
+inline double signed_distance(const Torus& torus, const Vec3& p) {
+  const Vec3 v = p - torus.centre;
+  const double z = dot(v, torus.axis), r = std::sqrt(std::max(0.0, norm2(v) - z * z)) - torus.radius;
+  return std::sqrt(r * r + z * z) - torus.minor_radius;
+}
+
 // The thesis' d(t, P), Eq. 2.3: from squared approximate distances (2.2.2) of the corners and the barycentre, times the
 // area; distances to a torus are exact.
 inline double distance_to(const SegmentDomain& domain, Index triangle, const Proxy& proxy) {
   const TriangleSamples& s = domain.samples[triangle];
   double squares[4];
   if (proxy.torus) {
-    const Torus& torus = *proxy.torus;
     for (std::size_t k = 0; k < 4; ++k) {
-      const Vec3 v = Vec3{s.x[k], s.y[k], s.z[k]} - torus.centre;
-      const double z = dot(v, torus.axis), r = std::sqrt(std::max(0.0, norm2(v) - z * z)) - torus.radius;
-      const double d = std::sqrt(r * r + z * z) - torus.minor_radius;
+      const double d = signed_distance(*proxy.torus, {s.x[k], s.y[k], s.z[k]});
       squares[k] = d * d;
     }
   } else {

@@ -137,13 +137,6 @@ Residual residual(const Shape& shape, const Vec3& p) {
   return {length - shape.second, cosine * out + sine * shape.axis, -cosine, -1};
 }
 
-Vec3 rotated(const Vec3& p, const Vec3& w) {
-  const double angle = norm(w);
-  if (!(angle > 0)) return p;
-  const Vec3 axis = (1 / angle) * w;
-  return std::cos(angle) * p + std::sin(angle) * cross(axis, p) + ((1 - std::cos(angle)) * dot(axis, p)) * axis;
-}
-
 // A region's surface while it is regularized.
 struct Member {
   std::vector<Index> regions;  // several are of one plane
@@ -443,10 +436,10 @@ std::optional<double> make_right(const std::vector<Value>& measured, const std::
 
 class Regularizer {
  public:
-  explicit Regularizer(std::vector<Member> members) : members_(std::move(members)) {}
+  explicit Regularizer(std::vector<Member> all) : members(std::move(all)) {}
 
-  std::vector<Member> members_;
-  std::vector<SegmentRelation> relations_;
+  std::vector<Member> members;
+  std::vector<SegmentRelation> relations;
 
   void run() {
     share_directions();
@@ -462,8 +455,8 @@ class Regularizer {
   std::optional<std::size_t> strained() const {
     std::optional<std::size_t> worst;
     double most = 1;
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      const Member& m = members_[i];
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const Member& m = members[i];
       if (m.constraints == 0) continue;
       if (!is_possible(m.shape)) return i;
       const double growth = (mean_square(m.shape, m.samples) - m.best) * m.count / m.variance;
@@ -477,12 +470,12 @@ class Regularizer {
   }
 
   bool shares_place(std::size_t member) const {
-    return has_axis(members_[member].shape) && members_[member].held[along_u];
+    return has_axis(members[member].shape) && members[member].held[along_u];
   }
 
  private:
   void refit_all() {
-    for (Member& m : members_)
+    for (Member& m : members)
       if (m.constraints > 0) refit(m);
   }
 
@@ -495,15 +488,15 @@ class Regularizer {
   std::vector<Index> regions_of(const std::vector<std::size_t>& items) const {
     std::vector<Index> regions;
     for (const std::size_t i : items)
-      regions.insert(regions.end(), members_[i].regions.begin(), members_[i].regions.end());
+      regions.insert(regions.end(), members[i].regions.begin(), members[i].regions.end());
     std::sort(regions.begin(), regions.end());
     return regions;
   }
 
   void share_directions() {
     std::vector<Value> directions;
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      const Member& m = members_[i];
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const Member& m = members[i];
       if (m.shape.type == SurfaceType::sphere) continue;
       // A turn about u moves the axis towards -v, one about v towards u.
       Eigen::Matrix<double, 3, 2> f;
@@ -531,10 +524,10 @@ class Regularizer {
     for (const RightAngle& angle : kept) right[angle.a] = right[angle.b] = 1;
     for (std::size_t k = 0; k < directions.size(); ++k) {
       if (std::vector<Index> regions = regions_of(directions[k].items); regions.size() > 1)
-        relations_.push_back({RelationKind::parallel, std::move(regions), {}, 0});
+        relations.push_back({RelationKind::parallel, std::move(regions), {}, 0});
       if (directions[k].items.size() < 2 && !right[k]) continue;
       for (const std::size_t i : directions[k].items) {
-        Member& m = members_[i];
+        Member& m = members[i];
         const Vec3 axis = dot(m.shape.axis, axes[k]) < 0 ? -axes[k] : axes[k];
         const Vec3 w = cross(m.shape.axis, axis);
         turn(m.shape, m.samples.centroid, w);
@@ -545,8 +538,8 @@ class Regularizer {
       groups_.push_back({axes[k], directions[k].covariance, directions[k].items});
     }
     for (const RightAngle& angle : kept)
-      relations_.push_back({RelationKind::perpendicular, regions_of(directions[angle.a].items),
-                            regions_of(directions[angle.b].items), 0});
+      relations.push_back({RelationKind::perpendicular, regions_of(directions[angle.a].items),
+                           regions_of(directions[angle.b].items), 0});
   }
 
   void share_places() {
@@ -555,7 +548,7 @@ class Regularizer {
       const auto f = frame(group.axis);
       const auto [u, v] = frame_across(group.axis);
       for (const std::size_t i : group.items) {
-        const Member& m = members_[i];
+        const Member& m = members[i];
         if (!has_axis(m.shape) || !m.place) continue;
         axes.push_back(
             {Vector2d(dot(m.shape.point, u), dot(m.shape.point, v)), covariance(m, {along_u, along_v}), {i}});
@@ -563,7 +556,7 @@ class Regularizer {
       // How far an axis is off where another surface is depends on its direction, too.
       const Matrix2d tilt = f.transpose() * group.covariance * f;
       const auto height = [&](const Value& value) {
-        return dot(members_[value.items.front()].samples.centroid, group.axis);
+        return dot(members[value.items.front()].samples.centroid, group.axis);
       };
       join_equal(
           axes,
@@ -575,11 +568,11 @@ class Regularizer {
       for (const Value& value : axes) {
         if (value.items.size() < 2) continue;
         for (const std::size_t i : value.items) {
-          Shape& shape = members_[i].shape;
+          Shape& shape = members[i].shape;
           shape.point = value.mean(0) * u + value.mean(1) * v + dot(shape.point, group.axis) * group.axis;
-          hold(members_[i], {along_u, along_v});
+          hold(members[i], {along_u, along_v});
         }
-        relations_.push_back({RelationKind::coaxial, regions_of(value.items), {}, 0});
+        relations.push_back({RelationKind::coaxial, regions_of(value.items), {}, 0});
       }
     }
   }
@@ -591,8 +584,8 @@ class Regularizer {
 
   void share_sizes() {
     std::vector<Size> radii, angles;
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      const SurfaceType type = members_[i].shape.type;
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const SurfaceType type = members[i].shape.type;
       if (is_free(type, radius)) radii.push_back({i, radius});
       if (is_free(type, second)) (type == SurfaceType::cone ? angles : radii).push_back({i, second});
     }
@@ -604,7 +597,7 @@ class Regularizer {
   void share_sizes(const std::vector<Size>& sizes, double range, RelationKind kind) {
     std::vector<Value> values;
     for (std::size_t k = 0; k < sizes.size(); ++k) {
-      const Member& m = members_[sizes[k].member];
+      const Member& m = members[sizes[k].member];
       const double value = sizes[k].column == radius ? m.shape.radius : m.shape.second;
       values.push_back({VectorXd::Constant(1, value), covariance(m, {sizes[k].column}), {k}});
     }
@@ -613,12 +606,12 @@ class Regularizer {
       if (value.items.size() < 2) continue;
       std::vector<std::size_t> items;
       for (const std::size_t k : value.items) {
-        Member& m = members_[sizes[k].member];
+        Member& m = members[sizes[k].member];
         (sizes[k].column == radius ? m.shape.radius : m.shape.second) = value.mean(0);
         hold(m, {sizes[k].column});
         items.push_back(sizes[k].member);
       }
-      relations_.push_back({kind, regions_of(items), {}, value.mean(0)});
+      relations.push_back({kind, regions_of(items), {}, value.mean(0)});
     }
   }
 
@@ -765,8 +758,8 @@ std::vector<SegmentRelation> regularize(const SegmentDomain& domain, const std::
       }
       continue;
     }
-    for (const Member& m : regularizer.members_) write(m, primitives);
-    relations.insert(relations.end(), regularizer.relations_.begin(), regularizer.relations_.end());
+    for (const Member& m : regularizer.members) write(m, primitives);
+    relations.insert(relations.end(), regularizer.relations.begin(), regularizer.relations.end());
     for (SegmentRelation& relation : relations)
       if (relation.kind == RelationKind::equal_radius) relation.value *= domain.scale;
     return relations;

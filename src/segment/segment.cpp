@@ -45,7 +45,6 @@ constexpr std::size_t kSpareShare =
 // for, halved so many times.
 constexpr double kMostGrowth = 1.05;
 constexpr int kFirstHalvings = 3, kMostHalvings = 8;
-constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
 
 // Types and smooth borders cost some of the error; where they take more than was left, a smaller error is aimed at.
 constexpr int kAttempts = 2;

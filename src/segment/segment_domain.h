@@ -10,6 +10,8 @@
 
 namespace bisector {
 
+inline constexpr double kNegligible = 1e-9;  // distance in the unit-sized model that rounding alone may cause
+
 // The points of Eq. 2.3: corners and barycentre, together in memory.
 struct TriangleSamples {
   std::array<double, 4> x, y, z;

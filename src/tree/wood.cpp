@@ -16,13 +16,13 @@
 namespace bisector {
 namespace {
 
-constexpr double kReach = 9;          // of a line to both sides, in spacings of the points
-constexpr int kCells = 8;             // of the line
-constexpr double kLink = 2.5;         // spacings between neighbours on a branch, at most
-constexpr int kRounds = 2;            // the second asks only what the first has taken for wood
-constexpr double kFalseAlarms = 0.1;  // lines through a point that chance may bring, at most
-constexpr double kAway = 3;           // tolerances that a point is off another, at least, to tell a direction
-constexpr std::size_t kMostDirections = 256;
+constexpr double kReach = 9;                  // of a line to both sides, in spacings of the points
+constexpr int kCells = 8;                     // of the line
+constexpr double kLink = 2.5;                 // spacings between neighbours on a branch, at most
+constexpr int kRounds = 2;                    // the second asks only what the first has taken for wood
+constexpr double kFalseAlarms = 0.1;          // lines through a point that chance may bring, at most
+constexpr double kAway = 3;                   // tolerances that a point is off another, at least, to tell a direction
+constexpr std::size_t kMostDirections = 256;  // that are tried: farther points tell none that nearer ones do not
 
 // Median distance of points from their second neighbours.
 double spacing_of(const std::vector<Vec3>& points) {
@@ -67,12 +67,16 @@ class Lines {
   // Of a place that may be one of the points.
   bool holds(const Vec3& place) const {
     std::vector<std::pair<Index, double>> found;
-    search(place, link_, found);
-    const auto other = std::find_if(found.begin(), found.end(), [](const auto& f) { return f.second > 0; });
-    if (other == found.end()) return false;
-    const Index part = part_[other->first];
     search(place, reach_, found);
     std::sort(found.begin(), found.end());
+    Index part = kNone;  // that of the nearest other point
+    double least = link_ * link_;
+    for (const auto& [j, squared] : found)
+      if (squared > 0 && squared < least) {
+        least = squared;
+        part = part_[j];
+      }
+    if (part == kNone) return false;
     std::vector<Vec3> offsets;
     for (const auto& [j, squared] : found)
       if (squared > 0 && part_[j] == part) offsets.push_back(points_[j] - place);
@@ -96,7 +100,7 @@ class Lines {
   void search(const Vec3& place, double radius, std::vector<std::pair<Index, double>>& found) const {
     const double at[3] = {place.x, place.y, place.z};
     found.clear();
-    tree_.radiusSearch(at, radius * radius, found, nanoflann::SearchParams(32, 0, true));
+    tree_.radiusSearch(at, radius * radius, found, nanoflann::SearchParams(32, 0, false));
   }
 
   // One of the points in each cell of a grid.

@@ -11,6 +11,7 @@
 #include "segment/segment_domain.h"
 #include "support/csg.h"
 #include "support/models.h"
+#include "support/tree_growth.h"
 
 namespace bisector::test {
 namespace {
@@ -23,10 +24,6 @@ struct Scene {
   SplitMix64 random{7};
   double noise = 0;
 
-  double gauss() {
-    return std::sqrt(-2 * std::log(1 - random.unit())) * std::cos(2 * std::numbers::pi * random.unit());
-  }
-
   // A patch of n x n vertices at place(s, t), moved along normal(s, t).
   template <class Place, class Normal>
   void add(const Primitive& primitive, const Place& place, const Normal& normal) {
@@ -35,7 +32,7 @@ struct Scene {
     for (Index i = 0; i < n; ++i)
       for (Index j = 0; j < n; ++j) {
         const double s = i / (n - 1.0), t = j / (n - 1.0);
-        mesh.vertices.push_back(place(s, t) + noise * gauss() * normal(s, t));
+        mesh.vertices.push_back(place(s, t) + noise * gaussian(random) * normal(s, t));
       }
     for (Index i = 0; i + 1 < n; ++i)
       for (Index j = 0; j + 1 < n; ++j) {
@@ -166,7 +163,7 @@ TEST(Regularize, FindsNothingInRandomSurfaces) {
   }
 }
 
-// A noisy block's faces become parallel in pairs and at right angles, and nearer to the truth than they were.
+// A noisy block's faces become parallel in pairs and at right angles, and stay as near to their data.
 TEST(Regularize, ABlocksFacesBecomeRight) {
   const CsgModel model = csg_part(6000, 1e-3, 2);
   SegmentOptions options;
