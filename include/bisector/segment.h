@@ -123,8 +123,8 @@ struct SegmentOptions {
   SegmentStart start = SegmentStart::merging;
   int iterations = 30;      // Lloyd steps at most, each time
   double smooth = 1;        // weight of the borders' length, over that which the distances left suggest; 0: borders are
-                            // left as they are. Halved where the root mean square distance would grow by more than 5
-                            // percent
+                            // left as they are. Less of it is used where the root mean square distance would grow by
+                            // more than 5 percent
   int fuzzy_rings = 0;      // triangles so many steps from a border may change sides; 0: as many as it takes
   bool regularize = false;  // let planes, spheres, cylinders, cones and tori share parameters where the data allow
   bool project = false;     // move the vertices onto the proxies
