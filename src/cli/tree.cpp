@@ -299,7 +299,7 @@ Command add_tree(CLI::App& program) {
       "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
       "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
       "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
-      "\"x y z\"; z is up and the tree has no leaves. Ctrl-C stops the run; nothing is written.");
+      "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written.");
   add_options(app, *command);
   return {app,
           [=] {
