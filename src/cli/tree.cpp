@@ -293,13 +293,13 @@ void run(const TreeCommand& command) {
 
 Command add_tree(CLI::App& program) {
   const auto command = std::make_shared<TreeCommand>();
-  CLI::App* app = add_command(
-      program, "tree", "Reconstruct the branches of a tree from a laser scan.", "bisector tree POINTS -o OUT [options]",
-      "Examples:\n"
-      "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
-      "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
-      "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
-      "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written.");
+  CLI::App* app = add_command(program, "tree", "Reconstruct the branches of a tree from a laser scan.",
+                              "bisector tree POINTS -o OUT [options]",
+                              "Examples:\n"
+                              "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
+                              "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
+                              "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
+                              "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written.");
   add_options(app, *command);
   return {app,
           [=] {
