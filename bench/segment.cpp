@@ -38,9 +38,9 @@ struct Options {
   std::vector<std::size_t> proxies{22};
   std::string csv, json;
   SegmentOptions segment;
+  PolygoniseOptions polygonise;
   std::size_t repeat = 3, spread = 0, peer_iterations = 100;
   unsigned threads = 1;
-  double chord = 0.2;
   bool peers = false, polygons = false;
 };
 
@@ -205,13 +205,13 @@ void add_polygons(Table& table, const Options& options, const std::string& name,
   const SegmentResult own = segment(mesh, wanted);
   const auto add_own = [&](const char* method, const SegmentResult& regions) {
     const Stopwatch watch;
-    const PolygonisedMesh made = polygonise(mesh, regions, {options.chord});
+    const PolygonisedMesh made = polygonise(mesh, regions, options.polygonise);
     add_polygon_row(table, name, method, made.polygons.rows(), made.triangulated, mesh, watch.seconds());
   };
   add_own("Bisector", own);
-  for (const double chord : {0.0, options.chord}) {
+  for (const double chord : {0.0, options.polygonise.chord}) {
     const Stopwatch watch;
-    const CgalPolygons made = cgal_polygons(mesh, proxies, options.peer_iterations, false, chord);
+    const CgalPolygons made = cgal_polygons(mesh, proxies, options.peer_iterations, chord);
     add_polygon_row(table, name, chord > 0 ? "CGAL L2, chords" : "CGAL L2", made.polygons, made.mesh, mesh,
                     watch.seconds());
     if (chord > 0) add_own("Bisector on CGAL's regions", with_best_planes(mesh, made.labels));
@@ -288,7 +288,8 @@ int main(int argc, char** argv) {
   app.add_option("--repeat", options.repeat, "runs of each; times are medians")->check(CLI::Range(1, 1000));
   app.add_flag("--peers", options.peers, "also CGAL's planar regions, L2 and L2,1; for edge-manifold meshes");
   app.add_flag("--polygons", options.polygons, "instead: coarse meshes of planar regions, CGAL's beside them");
-  app.add_option("--chord", options.chord, "with --polygons: where borders are divided")->check(CLI::PositiveNumber);
+  app.add_option("--chord", options.polygonise.chord, "with --polygons: where borders are divided")
+      ->check(CLI::PositiveNumber);
   app.add_option("--peer-iterations", options.peer_iterations, "of CGAL's")->check(CLI::Range(1, 100'000));
   app.add_option("--spread", options.spread,
                  "instead: errors over so many random seeds (random), or renumbered and moved meshes (merging)")

@@ -8,7 +8,6 @@
 
 #include <array>
 #include <iterator>
-#include <type_traits>
 
 namespace bisector::bench {
 namespace {
@@ -16,6 +15,8 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Points = boost::property_map<Mesh, boost::vertex_point_t>::type;
+using L2 = CGAL::Surface_mesh_approximation::L2_metric_plane_proxy<Mesh>;
+using L21 = CGAL::Surface_mesh_approximation::L21_metric_plane_proxy<Mesh>;
 
 template <class Metric>
 using Approximation = CGAL::Variational_shape_approximation<Mesh, Points, Metric>;
@@ -34,16 +35,41 @@ std::vector<Index> find_regions(Mesh& mesh, Approximation<Metric>& approximation
   return labels;
 }
 
+Mesh converted(const TriangleMesh& input) {
+  Mesh mesh;
+  std::vector<Mesh::Vertex_index> vertices;
+  for (const Vec3& p : input.vertices) vertices.push_back(mesh.add_vertex({p.x, p.y, p.z}));
+  for (const auto& [a, b, c] : input.triangles) mesh.add_face(vertices[a], vertices[b], vertices[c]);
+  return mesh;
+}
+
 template <class Metric>
-CgalPolygons polygons(Mesh& mesh, const Metric& metric, std::size_t proxies, std::size_t iterations, double chord) {
+std::vector<Index> regions_by(const TriangleMesh& input, std::size_t proxies, std::size_t iterations) {
+  Mesh mesh = converted(input);
+  const Points points = get(CGAL::vertex_point, mesh);
+  const Metric metric(mesh, points);
+  Approximation<Metric> approximation(mesh, points, metric);
+  return find_regions(mesh, approximation, proxies, iterations);
+}
+
+}  // namespace
+
+std::vector<Index> cgal_regions(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, bool l21) {
+  return l21 ? regions_by<L21>(input, proxies, iterations) : regions_by<L2>(input, proxies, iterations);
+}
+
+CgalPolygons cgal_polygons(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, double chord) {
   namespace np = CGAL::parameters;
-  Approximation<Metric> approximation(mesh, get(CGAL::vertex_point, mesh), metric);
+  Mesh mesh = converted(input);
+  const Points points = get(CGAL::vertex_point, mesh);
+  const L2 metric(mesh, points);
+  Approximation<L2> approximation(mesh, points, metric);
   CgalPolygons result;
   result.labels = find_regions(mesh, approximation, proxies, iterations);
-  result.manifold =
-      chord > 0 ? approximation.extract_mesh(
-                      np::subdivision_ratio(Kernel::FT(chord)).relative_to_chord(true).with_dihedral_angle(true))
-                : approximation.extract_mesh(np::all_default());
+  if (chord > 0)
+    approximation.extract_mesh(
+        np::subdivision_ratio(Kernel::FT(chord)).relative_to_chord(true).with_dihedral_angle(true));
+  else approximation.extract_mesh(np::all_default());
   std::vector<Kernel::Point_3> anchors;
   std::vector<std::array<std::size_t, 3>> triangles;
   approximation.output(np::anchors(std::back_inserter(anchors)).triangles(std::back_inserter(triangles)));
@@ -54,38 +80,6 @@ CgalPolygons polygons(Mesh& mesh, const Metric& metric, std::size_t proxies, std
   approximation.indexed_boundary_polygons(std::back_inserter(borders));
   result.polygons = borders.size();
   return result;
-}
-
-Mesh converted(const TriangleMesh& input) {
-  Mesh mesh;
-  std::vector<Mesh::Vertex_index> vertices;
-  for (const Vec3& p : input.vertices) vertices.push_back(mesh.add_vertex({p.x, p.y, p.z}));
-  for (const auto& [a, b, c] : input.triangles) mesh.add_face(vertices[a], vertices[b], vertices[c]);
-  return mesh;
-}
-
-// Calls `use` with the metric.
-template <class Use>
-auto with_metric(Mesh& mesh, bool l21, const Use& use) {
-  const Points points = get(CGAL::vertex_point, mesh);
-  if (l21) return use(CGAL::Surface_mesh_approximation::L21_metric_plane_proxy<Mesh>(mesh, points));
-  return use(CGAL::Surface_mesh_approximation::L2_metric_plane_proxy<Mesh>(mesh, points));
-}
-
-}  // namespace
-
-std::vector<Index> cgal_regions(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, bool l21) {
-  Mesh mesh = converted(input);
-  return with_metric(mesh, l21, [&](const auto& metric) {
-    Approximation<std::decay_t<decltype(metric)>> approximation(mesh, get(CGAL::vertex_point, mesh), metric);
-    return find_regions(mesh, approximation, proxies, iterations);
-  });
-}
-
-CgalPolygons cgal_polygons(const TriangleMesh& input, std::size_t proxies, std::size_t iterations, bool l21,
-                           double chord) {
-  Mesh mesh = converted(input);
-  return with_metric(mesh, l21, [&](const auto& metric) { return polygons(mesh, metric, proxies, iterations, chord); });
 }
 
 }  // namespace bisector::bench

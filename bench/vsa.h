@@ -16,12 +16,11 @@ struct CgalPolygons {
   std::vector<Index> labels;  // region of each triangle of the input
   TriangleMesh mesh;          // of the anchors, triangulated
   std::size_t polygons = 0;   // border polygons of the regions, holes not counted
-  bool manifold = false;      // as extract_mesh says
 };
 
-// CGAL's coarse mesh of such regions: with its default parameters, or, for a positive `chord`, divided where a border
-// strays from a chord by more than this share of its length times the sine of the angle between the planes.
-CgalPolygons cgal_polygons(const TriangleMesh& mesh, std::size_t proxies, std::size_t iterations, bool l21,
-                           double chord);
+// CGAL's coarse mesh of such regions, by the L2 metric: with its default parameters, or, for a positive `chord`,
+// divided where a border strays from a chord by more than this share of its length times the sine of the angle between
+// the planes.
+CgalPolygons cgal_polygons(const TriangleMesh& mesh, std::size_t proxies, std::size_t iterations, double chord);
 
 }  // namespace bisector::bench

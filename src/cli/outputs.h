@@ -21,6 +21,7 @@ inline Output report_output(const std::string& path) { return {path == "-" ? "" 
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
 inline const std::vector<std::string> kMeshFormats{".off", ".obj", ".ply", ".stl"};
+inline const std::vector<std::string> kPolygonFormats{".obj", ".ply", ".off"};
 inline const std::vector<std::string> kTreeFormats{".obj", ".ply", ".off", ".stl", ".igs", ".iges"};
 inline const std::vector<std::string> kTetFormats{".mesh", ".msh", ".vtu"};
 

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -34,7 +33,7 @@ void add_parameters(Json& json, const Cylinder& cylinder) {
 void add_parameters(Json& json, const Cone& cone) {
   json["centre"] = point_json(cone.apex);
   json["axis"] = point_json(cone.axis);
-  json["angle"] = 180 / std::numbers::pi * cone.angle;
+  json["angle"] = kDegreesPerRadian * cone.angle;
 }
 
 void add_parameters(Json& json, const Torus& torus) {

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "bisector/io.h"
-#include "bisector/polygonise.h"
 #include "bisector/preview.h"
 #include "bisector/quality.h"
 #include "bisector/region_borders.h"
@@ -21,6 +20,7 @@
 #include "commands.h"
 #include "console.h"
 #include "core/geometry.h"
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "options.h"
@@ -28,6 +28,7 @@
 #include "region_json.h"
 #include "report.h"
 #include "segment/dual_graph.h"
+#include "segment/polygonise.h"
 #include "summary.h"
 #include "words.h"
 
@@ -160,25 +161,39 @@ std::vector<std::string> region_names(const SegmentResult& result) {
   return names;
 }
 
+// Of faces with these labels.
+template <class Label>
+std::vector<Colour> face_colours(const std::vector<Label>& labels, const std::vector<Colour>& of_regions) {
+  std::vector<Colour> colours;
+  colours.reserve(labels.size());
+  for (const Label label : labels) colours.push_back(of_regions[static_cast<std::size_t>(label)]);
+  return colours;
+}
+
+// PLY has the regions' colours too, which only meshes of polygons hold.
 void write_regions(const std::string& path, const TriangleMesh& mesh, const SegmentResult& result,
-                   const std::vector<Colour>& colours) {
-  if (extension_of(path) != ".ply") return write_mesh(path, mesh, {"region", region_names(result)});
-  PolygonMesh polygons;
-  polygons.vertices = mesh.vertices;
-  for (const Triangle& t : mesh.triangles) {
-    polygons.polygons.values.insert(polygons.polygons.values.end(), t.begin(), t.end());
-    polygons.polygons.offsets.push_back(polygons.polygons.values.size());
-  }
-  polygons.labels = result.labels;
-  polygons.colours = colours;
-  polygons.feature_edges = mesh.feature_edges;
-  write_polygons(path, polygons);
+                   const std::vector<Colour>& of_regions) {
+  const GroupNames names{"region", region_names(result)};
+  if (extension_of(path) != ".ply") return write_mesh(path, mesh, names);
+  write_polygons(path,
+                 {mesh.vertices,
+                  rows_of(mesh.triangles),
+                  {mesh.labels.begin(), mesh.labels.end()},
+                  face_colours(mesh.labels, of_regions),
+                  mesh.feature_edges},
+                 names);
+}
+
+void write_regions(const std::string& path, const PolygonisedMesh& mesh, const SegmentResult& result,
+                   const std::vector<Colour>& of_regions) {
+  write_polygons(path, {mesh.vertices, mesh.polygons, mesh.labels, face_colours(mesh.labels, of_regions)},
+                 {"region", region_names(result)});
 }
 
 PolygonisedMesh polygonise(Console& console, const SegmentCommand& command, const TriangleMesh& mesh,
-                           const SegmentResult& result) {
+                           const SegmentResult& result, const RegionBorders& borders) {
   console.phase("making polygons");
-  PolygonisedMesh polygons = bisector::polygonise(mesh, result, command.polygonise);
+  PolygonisedMesh polygons = bisector::polygonise(mesh, result, borders, command.polygonise);
   const auto curved = std::count_if(result.regions.begin(), result.regions.end(), [](const SegmentRegion& region) {
     return type_of(region.proxy) != SurfaceType::plane;
   });
@@ -190,26 +205,11 @@ PolygonisedMesh polygonise(Console& console, const SegmentCommand& command, cons
         fmt::format("{}: {} not lie flat with few corners and became triangles; more proxies or a smaller "
                     "--chord help",
                     command.polygons, counted(polygons.folded, "region does", "regions do")));
+  if (polygons.self_intersections > 0)
+    console.warn(fmt::format(
+        "{}: {}; where the input's do not, more proxies or a smaller --chord help", command.polygons,
+        counted(polygons.self_intersections, "pair of triangles intersects", "pairs of triangles intersect")));
   return polygons;
-}
-
-void write_regions(const std::string& path, const PolygonisedMesh& mesh, const SegmentResult& result,
-                   const std::vector<Colour>& colours_of_regions, bool triangulate) {
-  PolygonMesh polygons;
-  if (triangulate) {
-    polygons.vertices = mesh.triangulated.vertices;
-    for (const Triangle& t : mesh.triangulated.triangles) {
-      polygons.polygons.values.insert(polygons.polygons.values.end(), t.begin(), t.end());
-      polygons.polygons.offsets.push_back(polygons.polygons.values.size());
-    }
-    polygons.labels.assign(mesh.triangulated.labels.begin(), mesh.triangulated.labels.end());
-  } else {
-    polygons.vertices = mesh.vertices;
-    polygons.polygons = mesh.polygons;
-    polygons.labels = mesh.labels;
-  }
-  for (const Index label : polygons.labels) polygons.colours.push_back(colours_of_regions[label]);
-  write_polygons(path, polygons, {"region", region_names(result)});
 }
 
 // "plane" to "planes", "plane_pair" to "plane pairs", "torus" to "tori".
@@ -235,7 +235,7 @@ Json relation_json(const SegmentRelation& relation) {
   Json json{{"kind", name_of(relation.kind)}, {"regions", relation.regions}};
   if (relation.kind == RelationKind::perpendicular) json["others"] = relation.others;
   if (relation.kind == RelationKind::equal_radius) json["radius"] = relation.value;
-  if (relation.kind == RelationKind::equal_angle) json["angle"] = 180 / std::numbers::pi * relation.value;
+  if (relation.kind == RelationKind::equal_angle) json["angle"] = kDegreesPerRadian * relation.value;
   return json;
 }
 
@@ -280,7 +280,8 @@ Json polygons_json(const PolygonisedMesh& polygons) {
           {"faces", polygons.polygons.rows()},
           {"triangles", polygons.triangulated.triangles.size()},
           {"divided", polygons.divided},
-          {"folded", polygons.folded}};
+          {"folded", polygons.folded},
+          {"self_intersections", polygons.self_intersections}};
 }
 
 Json segment_seconds(const SegmentSeconds& seconds) {
@@ -321,7 +322,7 @@ void run(const SegmentCommand& command) {
   check_outputs({{command.output, kMeshFormats},
                  {command.preview, {".png"}},
                  {command.trims, {".json"}},
-                 {command.polygons, {".obj", ".ply", ".off"}},
+                 {command.polygons, kPolygonFormats},
                  report_output(report_path)},
                 {command.input});
   const ThreadLimit limit(command.common.threads);
@@ -337,28 +338,30 @@ void run(const SegmentCommand& command) {
   console.phase("segmenting");
   const SegmentResult result = segment(input, command.options, context);
   const TriangleMesh mesh = labelled_mesh(input, result);
-  const std::vector<Colour> colours_of_regions = region_colours(mesh, result);
-  std::vector<Colour> colours;
-  for (const Index label : result.labels) colours.push_back(colours_of_regions[label]);
+  const std::vector<Colour> colours = region_colours(mesh, result);
   const double diagonal = bounding_box(input.vertices).diagonal();
 
-  std::optional<PolygonisedMesh> polygons;
-  if (!command.polygons.empty()) polygons = polygonise(console, command, mesh, result);
+  const Stopwatch polygonising;
   RegionBorders borders;
-  if (!command.trims.empty()) borders = region_borders(mesh, result);
+  if (!command.polygons.empty() || !command.trims.empty()) borders = region_borders(mesh, result);
+  std::optional<PolygonisedMesh> polygons;
+  if (!command.polygons.empty()) polygons = polygonise(console, command, mesh, result, borders);
+  const double polygon_seconds = polygonising.seconds();
 
   const Stopwatch measuring;
   Json report;
   if (!report_path.empty()) report = segment_report(console, result, mesh, input, diagonal);
   if (!report_path.empty() && polygons) report["polygons"] = polygons_json(*polygons);
   Json seconds = segment_seconds(result.seconds);
+  seconds["polygons"] = polygon_seconds;
   seconds["quality"] = measuring.seconds();
 
   console.phase("writing " + command.output);
   stop_watching_interrupts();
   const Stopwatch writing;
   write_regions(command.output, mesh, result, colours);
-  if (polygons) write_regions(command.polygons, *polygons, result, colours_of_regions, command.triangulate);
+  if (polygons && command.triangulate) write_regions(command.polygons, polygons->triangulated, result, colours);
+  else if (polygons) write_regions(command.polygons, *polygons, result, colours);
   if (!command.trims.empty())
     write_report(command.trims, trims_json(command.input, mesh, result, borders), console.warnings());
   io += writing.seconds();
@@ -367,7 +370,7 @@ void run(const SegmentCommand& command) {
     PreviewOptions picture;
     picture.edges = false;
     picture.outlines = true;
-    picture.colours = colours;
+    picture.colours = face_colours(mesh.labels, colours);
     write_preview(command.preview, mesh, picture);
   }
   seconds["preview"] = drawing.seconds();

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <functional>
 #include <numbers>
 #include <vector>
 
@@ -54,6 +56,15 @@ Vec3 perpendicular(const Vec3& n);
 // Normal of the triangle (a, b, c), as long as twice its area, on the side from which the corners run
 // counter-clockwise.
 inline Vec3 twice_area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(b - a, c - a); }
+
+// Twice the vector area of any surface that a closed polygon bounds: `point_of` gives the place of each of its corners.
+template <class Loop, class PointOf = std::identity>
+Vec3 twice_vector_area(const Loop& loop, const PointOf& point_of = {}) {
+  Vec3 sum;
+  for (std::size_t i = 2; i < loop.size(); ++i)
+    sum += twice_area_normal(point_of(loop[0]), point_of(loop[i - 1]), point_of(loop[i]));
+  return sum;
+}
 
 // Six times the signed volume of the tetrahedron (a, b, c, d), rounded: positive as orientation() says.
 inline double rounded_six_volume(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {

@@ -1,4 +1,5 @@
-// Sorting values into the rows of a Csr by counting; within a row they keep the order in which they come.
+// Sorting values into the rows of a Csr by counting; within a row they keep the order in which they come. Triangles as
+// rows.
 #pragma once
 
 #include <cstddef>
@@ -21,6 +22,18 @@ Csr<T> group_into_rows(std::size_t rows, const List& list) {
   std::vector<std::size_t> next(grouped.offsets.begin(), grouped.offsets.end() - 1);
   list([&](std::size_t row, const T& value) { grouped.values[next[row]++] = value; });
   return grouped;
+}
+
+// A row of three corners for each triangle.
+inline Csr<Index> rows_of(const std::vector<Triangle>& triangles) {
+  Csr<Index> rows;
+  rows.values.reserve(3 * triangles.size());
+  rows.offsets.reserve(triangles.size() + 1);
+  for (const Triangle& t : triangles) {
+    rows.values.insert(rows.values.end(), t.begin(), t.end());
+    rows.offsets.push_back(rows.values.size());
+  }
+  return rows;
 }
 
 // For each vertex the indices of the items (edges, triangles, tetrahedra) that have it as a corner, ascending.

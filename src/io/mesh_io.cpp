@@ -122,17 +122,20 @@ struct MeshFormat {
   std::string_view extension;
   Soup (*read)(const std::string& path, std::string_view bytes);
   std::string (*bytes_of)(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups);
+  std::string (*bytes_of_polygons)(const PolygonMesh& mesh, const GroupNames& groups);  // null: triangles only
 };
 
 constexpr MeshFormat kFormats[] = {
-    {".off", read_off,
-     [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_off(mesh); }},
+    {".off", read_off, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_off(mesh); },
+     [](const PolygonMesh& mesh, const GroupNames&) { return format_off(mesh); }},
     {".obj", read_obj,
-     [](const std::string&, const TriangleMesh& mesh, const GroupNames& groups) { return format_obj(mesh, groups); }},
-    {".ply", read_ply,
-     [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_ply(mesh); }},
+     [](const std::string&, const TriangleMesh& mesh, const GroupNames& groups) { return format_obj(mesh, groups); },
+     [](const PolygonMesh& mesh, const GroupNames& groups) { return format_obj(mesh, groups); }},
+    {".ply", read_ply, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_ply(mesh); },
+     [](const PolygonMesh& mesh, const GroupNames&) { return format_ply(mesh); }},
     {".stl", read_stl,
-     [](const std::string& path, const TriangleMesh& mesh, const GroupNames&) { return format_stl(path, mesh); }},
+     [](const std::string& path, const TriangleMesh& mesh, const GroupNames&) { return format_stl(path, mesh); },
+     nullptr},
 };
 
 // "use .off, .obj, .ply or .stl"
@@ -258,6 +261,15 @@ void check_face(const std::string& path, std::size_t face, const Index* begin, c
                              *v, vertices));
 }
 
+// Each label has a name if any has.
+template <class Label>
+void check_label_names(const std::string& path, const std::vector<Label>& labels, const GroupNames& groups) {
+  if (groups.names.empty()) return;
+  for (const Label label : labels)
+    if (std::cmp_less(label, 0) || std::cmp_greater_equal(label, groups.names.size()))
+      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, groups.names.size()));
+}
+
 [[noreturn]] void fail_write(const std::string& path, int error) {
   fail(path, fmt::format("cannot be written: {}; check the folder, its permissions and the free space",
                          std::strerror(error)));
@@ -277,9 +289,7 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNa
     check_face(path, i, mesh.triangles[i].data(), mesh.triangles[i].data() + 3, mesh.vertices.size());
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.triangles.size())
     fail(path, fmt::format("{} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
-  for (const std::int32_t label : mesh.labels)
-    if (!groups.names.empty() && (label < 0 || static_cast<std::size_t>(label) >= groups.names.size()))
-      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, groups.names.size()));
+  check_label_names(path, mesh.labels, groups);
   for (const Edge& e : mesh.feature_edges)
     if (std::max(e[0], e[1]) >= mesh.vertices.size())
       fail(path, fmt::format("feature edge {} {} is out of range, the mesh has {} vertices; nothing was written", e[0],
@@ -290,8 +300,8 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNa
 
 void write_polygons(const std::string& path, const PolygonMesh& mesh, const GroupNames& groups) {
   const std::size_t faces = mesh.polygons.rows();
-  const std::string extension = lower_extension(path);
-  if (extension != ".ply" && extension != ".obj" && extension != ".off")
+  const MeshFormat& format = format_of(path);
+  if (format.bytes_of_polygons == nullptr)
     fail(path, "polygons are written as PLY, OBJ or OFF; use .ply, .obj or .off");
   if ((!mesh.labels.empty() && mesh.labels.size() != faces) || (!mesh.colours.empty() && mesh.colours.size() != faces))
     fail(path, fmt::format("{} labels and {} colours for {} polygons; give one each", mesh.labels.size(),
@@ -299,12 +309,8 @@ void write_polygons(const std::string& path, const PolygonMesh& mesh, const Grou
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < faces; ++i)
     check_face(path, i, mesh.polygons.begin(i), mesh.polygons.end(i), mesh.vertices.size());
-  for (const Index label : mesh.labels)
-    if (!groups.names.empty() && label >= groups.names.size())
-      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, groups.names.size()));
-  write_file(path, extension == ".ply"   ? format_ply(mesh)
-                   : extension == ".obj" ? format_obj(mesh, groups)
-                                         : format_off(mesh));
+  check_label_names(path, mesh.labels, groups);
+  write_file(path, format.bytes_of_polygons(mesh, groups));
 }
 
 std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name) {

@@ -22,9 +22,12 @@ void join_fans(const std::vector<Triangle>& triangles, const EdgeTable& table, s
       fans.join(corner_at(triangles, sides[0], v), corner_at(triangles, sides[s], v));
 }
 
-// Number of vertices whose corners make more than one fan; `fans` links the corners (3 t + k) of each.
-std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count,
-                                 DisjointSets<>& fans) {
+}  // namespace
+
+std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count,
+                                 const EdgeTable& table) {
+  DisjointSets<> fans(3 * triangles.size());
+  for (std::size_t e = 0; e < table.edges.size(); ++e) join_fans(triangles, table, e, fans);
   constexpr std::size_t kUnseen = static_cast<std::size_t>(-1);
   std::vector<std::size_t> fan(vertex_count, kUnseen);
   std::vector<char> split(vertex_count, 0);
@@ -34,10 +37,8 @@ std::size_t count_split_vertices(const std::vector<Triangle>& triangles, std::si
     if (fan[v] == kUnseen) fan[v] = root;
     if (fan[v] != root) split[v] = 1;
   }
-  return static_cast<std::size_t>(std::count(split.begin(), split.end(), 1));
+  return split;
 }
-
-}  // namespace
 
 Csr<Index> vertex_neighbours(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
   const EdgeTable table = edge_table(triangles, vertex_count);
@@ -98,7 +99,7 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
   const EdgeTable table = edge_table(triangles, vertex_count);
   MeshTopology topology;
   topology.oriented = true;
-  DisjointSets<> fans(3 * triangles.size()), parts(vertex_count);
+  DisjointSets<> parts(vertex_count);
   for (std::size_t e = 0; e < table.edges.size(); ++e) {
     const auto [a, b] = table.edges[e];
     const std::size_t* sides = table.half_edges.begin(e);
@@ -107,9 +108,9 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
     if (count == 1) ++topology.boundary_edges;
     if (count > 2 || a == b) ++topology.non_manifold_edges;
     if (count == 2 && origin(triangles, sides[0]) == origin(triangles, sides[1])) topology.oriented = false;
-    join_fans(triangles, table, e, fans);
   }
-  topology.non_manifold_vertices = count_split_vertices(triangles, vertex_count, fans);
+  const std::vector<char> split = split_vertices(triangles, vertex_count, table);
+  topology.non_manifold_vertices = static_cast<std::size_t>(std::count(split.begin(), split.end(), 1));
   topology.closed = topology.boundary_edges == 0;
   topology.manifold = topology.non_manifold_edges == 0 && topology.non_manifold_vertices == 0;
 

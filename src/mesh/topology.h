@@ -16,6 +16,10 @@ struct EdgeTable {
 };
 EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
+// For each vertex whether its triangles hang together through its edges in more than one fan.
+std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count,
+                                 const EdgeTable& table);
+
 // The vertices at the other ends of each vertex's edges, ascending.
 Csr<Index> vertex_neighbours(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 

@@ -392,12 +392,7 @@ void write_preview(const std::string& path, const std::vector<Vec3>& vertices, c
 }
 
 void write_preview(const std::string& path, const TriangleMesh& mesh, const PreviewOptions& options) {
-  Csr<Index> polygons;
-  for (const Triangle& t : mesh.triangles) {
-    polygons.values.insert(polygons.values.end(), t.begin(), t.end());
-    polygons.offsets.push_back(polygons.values.size());
-  }
-  write_preview(path, mesh.vertices, polygons, options);
+  write_preview(path, mesh.vertices, rows_of(mesh.triangles), options);
 }
 
 }  // namespace bisector

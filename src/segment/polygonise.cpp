@@ -1,4 +1,4 @@
-#include "bisector/polygonise.h"
+#include "segment/polygonise.h"
 
 #include <fmt/format.h>
 
@@ -12,10 +12,9 @@
 
 #include "bisector/error.h"
 #include "bisector/quality.h"
-#include "bisector/region_borders.h"
-#include "core/disjoint_sets.h"
 #include "core/grouping.h"
 #include "mesh/half_edges.h"
+#include "mesh/topology.h"
 #include "segment/border_loops.h"
 #include "segment/collapse.h"
 #include "segment/meeting_point.h"
@@ -35,9 +34,10 @@ using Edge = std::array<Index, 2>;
 
 class Polygoniser {
  public:
-  Polygoniser(const TriangleMesh& mesh, const SegmentResult& segmentation, const PolygoniseOptions& options)
-      : mesh_(mesh), segmentation_(segmentation), options_(options), borders_(region_borders(mesh, segmentation)),
-        positions_(mesh.vertices), fixed_(mesh.vertices.size(), 0), regions_(segmentation.regions.size()) {
+  Polygoniser(const TriangleMesh& mesh, const SegmentResult& segmentation, const RegionBorders& borders,
+              const PolygoniseOptions& options)
+      : mesh_(mesh), segmentation_(segmentation), options_(options), borders_(borders), positions_(mesh.vertices),
+        fixed_(mesh.vertices.size(), 0), regions_(segmentation.regions.size()) {
     for (std::size_t r = 0; r < regions_.size(); ++r) {
       const auto* plane = std::get_if<Plane>(&segmentation.regions[r].proxy);
       if (plane == nullptr) continue;
@@ -133,19 +133,12 @@ class Polygoniser {
       if (!regions_[segmentation_.labels[t]].plane)
         for (const Index v : triangles[t]) fixed_[v] = 1;
     const HalfEdgeTwins twins = half_edge_twins(triangles, n);
-    DisjointSets<std::size_t> fans(3 * triangles.size());
     for (std::size_t h = 0; h < twins.twin.size(); ++h) {
-      if (twins.twin[h] == kNoTwin) {
-        if (twins.is_single[h]) continue;
-        for (const std::size_t end : {h, next_half_edge(h)}) fixed_[origin(triangles, end)] = 1;
-      } else {
-        fans.join(h, next_half_edge(twins.twin[h]));
-      }
+      if (twins.twin[h] != kNoTwin || twins.is_single[h]) continue;
+      for (const std::size_t end : {h, next_half_edge(h)}) fixed_[origin(triangles, end)] = 1;
     }
-    // More than one fan of triangles.
-    std::vector<char> seen(n, 0);
-    for (std::size_t h = 0; h < twins.twin.size(); ++h)
-      if (fans.is_root(h) && std::exchange(seen[origin(triangles, h)], 1)) fixed_[origin(triangles, h)] = 1;
+    const std::vector<char> split = split_vertices(triangles, n, edge_table(triangles, n));
+    for (std::size_t v = 0; v < n; ++v) fixed_[v] |= split[v];
   }
 
   void place_vertices() {
@@ -395,13 +388,14 @@ class Polygoniser {
         }
         v = number[v];
       }
+    mesh.self_intersections = count_self_intersections(mesh.triangulated);
     return mesh;
   }
 
   const TriangleMesh& mesh_;
   const SegmentResult& segmentation_;
   const PolygoniseOptions& options_;
-  const RegionBorders borders_;
+  const RegionBorders& borders_;
   std::vector<Vec3> positions_;
   std::vector<char> fixed_, kept_;  // vertices that stay whatever happens, and these with the anchors
   std::vector<Region> regions_;
@@ -410,11 +404,16 @@ class Polygoniser {
 
 }  // namespace
 
-PolygonisedMesh polygonise(const TriangleMesh& mesh, const SegmentResult& segmentation,
+PolygonisedMesh polygonise(const TriangleMesh& mesh, const SegmentResult& segmentation, const RegionBorders& borders,
                            const PolygoniseOptions& options) {
   if (!(options.chord > 0) || !std::isfinite(options.chord))
     throw Error(fmt::format("borders may stray from chords by {} of their length; it must be positive", options.chord));
-  return Polygoniser(mesh, segmentation, options).run();
+  return Polygoniser(mesh, segmentation, borders, options).run();
+}
+
+PolygonisedMesh polygonise(const TriangleMesh& mesh, const SegmentResult& segmentation,
+                           const PolygoniseOptions& options) {
+  return polygonise(mesh, segmentation, region_borders(mesh, segmentation), options);
 }
 
 }  // namespace bisector

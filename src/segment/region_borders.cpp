@@ -105,7 +105,10 @@ class Measurer {
     Vec3 mean;
     for (const Index* t = triangles.begin(region); t != triangles.end(region); ++t) mean += twice_normals_[*t];
     if (!is_flat(mean, region, triangles)) return;
-    const auto runs_around = [&](const BorderLoop& loop) { return dot(vector_area(loop), mean) > 0; };
+    const auto point_of = [&](Index v) -> const Vec3& { return vertices_[v]; };
+    const auto runs_around = [&](const BorderLoop& loop) {
+      return dot(twice_vector_area(loop.vertices, point_of), mean) > 0;
+    };
     if (std::count_if(outline.loops.begin(), outline.loops.end(), runs_around) != 1) return;
     const auto outer = std::find_if(outline.loops.begin(), outline.loops.end(), runs_around);
     std::rotate(outline.loops.begin(), outer, outer + 1);
@@ -117,15 +120,6 @@ class Measurer {
     for (const Index* t = triangles.begin(region); t != triangles.end(region); ++t)
       (dot(twice_normals_[*t], mean) > 0 ? with : against) += norm(twice_normals_[*t]);
     return with >= kFlatShare * (with + against);
-  }
-
-  // Twice that of any surface that the loop bounds.
-  Vec3 vector_area(const BorderLoop& loop) const {
-    const Vec3& start = vertices_[loop.vertices[0]];
-    Vec3 sum;
-    for (std::size_t i = 2; i < loop.vertices.size(); ++i)
-      sum += twice_area_normal(start, vertices_[loop.vertices[i - 1]], vertices_[loop.vertices[i]]);
-    return sum;
   }
 
   const std::vector<Vec3>& vertices_;

@@ -24,15 +24,13 @@
 #include <set>
 
 #include "segment/meeting_point.h"
+#include "step/convert.h"
 
 namespace bisector::step {
 namespace {
 
 constexpr int kSamples = 32;         // of a curve, to see whether it is on the surfaces, at least
 constexpr double kTolerance = 1e-5;  // of the diagonal, for surfaces that are exact
-
-gp_Pnt point(const Vec3& p) { return {p.x, p.y, p.z}; }
-Vec3 vector(const gp_Pnt& p) { return {p.X(), p.Y(), p.Z()}; }
 
 struct Curve {
   Handle(Geom_Curve) geometry;
@@ -239,7 +237,7 @@ class EdgeMaker {
     if (turned < 0) normal = -normal;
     const Vec3 start = points[0] - middle, x = unit(start - dot(start, normal) * normal);
     if (norm2(x) == 0) return {};
-    const gp_Ax2 axes(point(middle), gp_Dir(normal.x, normal.y, normal.z), gp_Dir(x.x, x.y, x.z));
+    const gp_Ax2 axes(point(middle), direction(normal), direction(x));
     const Handle(Geom_Curve) circle = new Geom_Circle(axes, std::sqrt(square));
     if (!is_near(circle, points)) return {};
     return Curve{circle, 0, 2 * std::numbers::pi};

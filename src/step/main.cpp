@@ -1,6 +1,5 @@
 // bisector-step: the surfaces of a segmentation as STEP or IGES.
 #include <fmt/format.h>
-#include <unistd.h>
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <BRepBuilderAPI_Transform.hxx>
 #include <IFSelect_ReturnStatus.hxx>
@@ -15,26 +14,33 @@
 #include <STEPControl_Controller.hxx>
 #include <STEPControl_Writer.hxx>
 #include <Standard_Failure.hxx>
+#include <StepData_Protocol.hxx>
+#include <StepData_StepModel.hxx>
+#include <StepData_StepWriter.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <gp_Pnt.hxx>
 #include <gp_Trsf.hxx>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cctype>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <iterator>
+#include <ostream>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "bisector/error.h"
+#include "io/files.h"
 #include "step/shell.h"
 #include "step/trims.h"
 
 namespace {
 
 using namespace bisector;
-namespace fs = std::filesystem;
 
 struct Options {
   std::string input, output, unit = "mm";
@@ -42,7 +48,7 @@ struct Options {
 };
 
 bool is_iges(const std::string& path) {
-  std::string extension = fs::path(path).extension().string();
+  std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   if (extension == ".igs" || extension == ".iges") return true;
@@ -59,12 +65,21 @@ constexpr Unit kUnits[] = {
     {"mm", "MM", 1}, {"cm", "CM", 10}, {"m", "M", 1000}, {"in", "INCH", 25.4}, {"ft", "FT", 304.8}};
 
 const Unit& unit_of(const std::string& word) {
-  return *std::find_if(std::begin(kUnits), std::end(kUnits) - 1, [&](const Unit& unit) { return word == unit.word; });
+  for (const Unit& unit : kUnits)
+    if (word == unit.word) return unit;
+  throw Error(fmt::format("the unit {} is unknown", word));
+}
+
+std::vector<std::string> unit_words() {
+  std::vector<std::string> words;
+  for (const Unit& unit : kUnits) words.emplace_back(unit.word);
+  return words;
 }
 
 // Coordinates are written as they are, with the name of their unit: OpenCASCADE, which takes shapes to be in
-// millimetres, converts them. Dates are fixed, so that the same shape gives the same file.
-bool write_shape(const TopoDS_Shape& given, const std::string& path, bool iges, const Unit& unit) {
+// millimetres, converts them. Dates are fixed, so that the same shape gives the same bytes. False if OpenCASCADE cannot
+// do it.
+bool print_shape(const TopoDS_Shape& given, bool iges, const Unit& unit, std::ostream& out) {
   gp_Trsf scaling;
   scaling.SetScale(gp_Pnt(), unit.millimetres);
   const TopoDS_Shape shape = unit.millimetres == 1 ? given : BRepBuilderAPI_Transform(given, scaling, true).Shape();
@@ -78,7 +93,7 @@ bool write_shape(const TopoDS_Shape& given, const std::string& path, bool iges, 
     header.SetDate(new TCollection_HAsciiString("19700101.000000"));
     header.SetLastChangeDate(new TCollection_HAsciiString("19700101.000000"));
     writer.Model()->SetGlobalSection(header);
-    return writer.Write(path.c_str());
+    return writer.Write(out);
   }
   STEPControl_Controller::Init();
   Interface_Static::SetCVal("write.step.unit", unit.name);
@@ -88,25 +103,13 @@ bool write_shape(const TopoDS_Shape& given, const std::string& path, bool iges, 
   APIHeaderSection_MakeHeader header(writer.Model());
   header.SetName(new TCollection_HAsciiString("regions"));
   header.SetTimeStamp(new TCollection_HAsciiString("1970-01-01T00:00:00"));
-  return writer.Write(path.c_str()) == IFSelect_RetDone;
-}
-
-void write_atomically(const TopoDS_Shape& shape, const Options& options) {
-  const fs::path target(options.output);
-  const fs::path temporary = target.parent_path() / fmt::format(".bisector-step-{}.tmp", ::getpid());
-  std::error_code error;
-  if (write_shape(shape, temporary.string(), is_iges(options.output), unit_of(options.unit))) {
-    fs::rename(temporary, target, error);
-    if (!error) return;
-  }
-  std::error_code ignored;
-  fs::remove(temporary, ignored);
-  throw Error(
-      fmt::format("{}: cannot be written; check the folder, its permissions and the free space", options.output));
+  StepData_StepWriter printer(writer.Model());
+  printer.SendModel(Handle(StepData_Protocol)::DownCast(writer.Model()->Protocol()));
+  return printer.Print(out);
 }
 
 void run(const Options& options) {
-  is_iges(options.output);
+  const bool iges = is_iges(options.output);
   const step::Trims trims = step::read_trims(options.input);
   const step::Shell shell = step::build_shell(trims, options.tolerance);
   std::size_t sound = 0;
@@ -116,7 +119,10 @@ void run(const Options& options) {
       fmt::print(stderr, "bisector-step: warning: the face of region {} ({}) {}\n", r,
                  name_of(type_of(trims.regions[r].surface)), shell.flaws[r]);
   }
-  write_atomically(shell.shape, options);
+  std::ostringstream out;
+  if (!print_shape(shell.shape, iges, unit_of(options.unit), out))
+    throw Error(fmt::format("{}: OpenCASCADE cannot turn the faces into this format; try another", options.output));
+  write_file(options.output, out.str());
   const char* kind = shell.shape.ShapeType() == TopAbs_SOLID   ? "a solid"
                      : shell.shape.ShapeType() == TopAbs_SHELL ? "a shell"
                                                                : "faces";
@@ -135,7 +141,7 @@ int main(int argc, char** argv) {
                  "mesh's unit; default: as near as the regions are")
       ->check(CLI::PositiveNumber);
   app.add_option("--unit", options.unit, "of the coordinates; they are not converted")
-      ->check(CLI::IsMember({"mm", "cm", "m", "in", "ft"}))
+      ->check(CLI::IsMember(unit_words()))
       ->capture_default_str();
   try {
     app.parse(argc, argv);

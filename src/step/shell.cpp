@@ -91,7 +91,7 @@ double area_of(const TopoDS_Shape& shape) {
 double expected_area(const Trims& trims, const Region& region) {
   if (!std::holds_alternative<Plane>(region.surface)) return region.area;
   Vec3 twice;
-  for (const std::vector<Vec3>& loop : outline_of(trims, region).loops) twice += vector_area(loop);
+  for (const std::vector<Vec3>& loop : outline_of(trims, region).loops) twice += twice_vector_area(loop);
   return 0.5 * norm(twice);
 }
 

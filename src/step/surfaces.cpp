@@ -30,15 +30,13 @@
 #include "segment/primitive.h"
 #include "segment/quadric.h"
 #include "segment/surface_normal.h"
+#include "step/convert.h"
 
 namespace bisector::step {
 namespace {
 
 constexpr double kMargin = 0.1;   // of their extent, that unbounded surfaces go beyond the border
 constexpr int kPatchPoints = 32;  // on each side of a height field
-
-gp_Pnt point(const Vec3& p) { return {p.x, p.y, p.z}; }
-gp_Dir direction(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 Vec3 mean_of(const std::vector<Vec3>& points) {
   Vec3 sum;
@@ -98,7 +96,7 @@ Handle(Geom_Surface) surface_of(const Sphere& s, const Outline& outline) {
     const Vec3 middle = unit(mean_of(outline.points) - s.centre);
     if (norm2(middle) > 0) axis = perpendicular(middle);
   } else if (!outline.loops.empty()) {
-    const Vec3 around = unit(vector_area(outline.loops[0]));
+    const Vec3 around = unit(twice_vector_area(outline.loops[0]));
     if (norm2(around) > 0) axis = around;
   }
   return new Geom_SphericalSurface(frame(s.centre, axis, outline), s.radius);
@@ -249,7 +247,7 @@ bool is_flipped(const Handle(Geom_Surface) & made, const Primitive& surface) {
   gp_Vec du, dv;
   made->D1(inside(u0, u1), inside(v0, v1), p, du, dv);
   const gp_Vec normal = du.Crossed(dv);
-  const Vec3 own = surface_normal(surface, foot_point(surface, {p.X(), p.Y(), p.Z()}));
+  const Vec3 own = surface_normal(surface, foot_point(surface, vector(p)));
   return dot({normal.X(), normal.Y(), normal.Z()}, own) < 0;
 }
 
@@ -266,14 +264,8 @@ double height_on(const Quadric& q, const Vec3& p, const Vec3& along, bool falls)
 
 }  // namespace
 
-Vec3 vector_area(const std::vector<Vec3>& loop) {
-  Vec3 sum;
-  for (std::size_t i = 2; i < loop.size(); ++i) sum += twice_area_normal(loop[0], loop[i - 1], loop[i]);
-  return sum;
-}
-
 Handle(Geom_Surface) make_patch(const GeneralQuadric& quadric, const Outline& outline, bool same_sense, bool& flipped) {
-  const Vec3 facing = unit(vector_area(outline.loops[0])), middle = mean_of(outline.points);
+  const Vec3 facing = unit(twice_vector_area(outline.loops[0])), middle = mean_of(outline.points);
   const auto [u, v] = frame_across(facing);
   const Range x = range_along(outline.points, middle, u), y = range_along(outline.points, middle, v);
   TColgp_Array2OfPnt points(1, kPatchPoints, 1, kPatchPoints);

@@ -15,9 +15,6 @@ struct Outline {
   double area = 0;           // of the region
 };
 
-// Twice the vector area of a surface that the loop bounds.
-Vec3 vector_area(const std::vector<Vec3>& loop);
-
 // The surface, large enough for a region with this outline: a plane, cylinder, cone, sphere or torus as
 // such, general cylinders as extrusions and other quadrics as exact rational B-splines. Its normal (du x dv) points
 // where the primitive's own does if `flipped` comes back false. Seams and poles are far from the outline where that can

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <array>
+#include <exception>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "bisector/error.h"
 #include "segment/primitive.h"
@@ -54,7 +54,6 @@ Region region_of(const Json& json) {
   region.has_outer = json.at("has_outer").get<bool>();
   region.area = json.at("area").get<double>();
   region.rms = json.at("rms").get<double>();
-  region.max = json.at("max").get<double>();
   for (const Json& loop : json.at("loops")) {
     std::vector<Use>& uses = region.loops.emplace_back();
     for (const Json& use : loop.at("chains"))

@@ -18,7 +18,7 @@ struct Region {
   Primitive surface;
   bool same_sense = true;
   bool has_outer = false;  // the first loop is, and the region can be laid flat
-  double area = 0, rms = 0, max = 0;
+  double area = 0, rms = 0;
   std::vector<std::vector<Use>> loops;
 };
 

@@ -1463,8 +1463,11 @@ TEST_F(CliSegment, WritesPolygonsOfPlanes) {
   ASSERT_EQ(run(segment({"--proxies", "6", "--polygons", in("p.off"), "--chord", "0.1", "--triangulate"})).code, 0);
   EXPECT_TRUE(read_mesh(in("p.off")).face_of_triangle.empty());
   const Json report = report_of(segment({"--proxies", "6", "--polygons", in("p.off"), "--report", "-", "--quiet"}));
-  EXPECT_EQ(report["polygons"],
-            (Json{{"vertices", 8}, {"faces", 6}, {"triangles", 12}, {"divided", 0}, {"folded", 0}}));
+  EXPECT_EQ(
+      report["polygons"],
+      (Json{
+          {"vertices", 8}, {"faces", 6}, {"triangles", 12}, {"divided", 0}, {"folded", 0}, {"self_intersections", 0}}));
+  EXPECT_GT(report["seconds"].value("polygons", 0.0), 0);
   // A ball of one region has no polygon.
   const Result ball =
       run({"segment", in("sphere.off"), "-o", in("out.ply"), "--proxies", "1", "--polygons", in("b.ply")});

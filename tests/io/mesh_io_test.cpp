@@ -806,6 +806,7 @@ TEST_F(Io, WritesPolygons) {
   write_polygons(path("a.ply"), wheel);
   EXPECT_EQ(read_mesh(path("a.ply")).triangles.size(), 298u);
 
+  EXPECT_THROW(write_polygons(path("b.ply"), mesh, {"region", {"one", "two"}}), Error);  // 7 has no name
   mesh.labels.pop_back();
   EXPECT_THROW(write_polygons(path("b.ply"), mesh), Error);
   EXPECT_THROW(write_polygons(path("b.stl"), wheel), Error);

@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <set>
 #include <vector>
 
 #include "bisector/error.h"
+#include "core/geometry.h"
 #include "support/csg.h"
 #include "support/models.h"
 
@@ -150,11 +152,8 @@ TEST(RegionBorders, OuterLoopsComeFirst) {
     with_holes += region.loops.size() > 1;
     const Vec3 facing = region.same_sense ? plane->normal : -plane->normal;
     for (std::size_t k = 0; k < region.loops.size(); ++k) {
-      Vec3 area;
-      const std::vector<Index>& loop = region.loops[k].vertices;
-      for (std::size_t i = 2; i < loop.size(); ++i)
-        area += twice_area_normal(model.mesh.vertices[loop[0]], model.mesh.vertices[loop[i - 1]],
-                                  model.mesh.vertices[loop[i]]);
+      const Vec3 area =
+          twice_vector_area(region.loops[k].vertices, [&](Index v) -> const Vec3& { return model.mesh.vertices[v]; });
       EXPECT_EQ(dot(area, facing) > 0, k == 0) << "region " << r << ", loop " << k;
     }
   }
@@ -195,7 +194,7 @@ TEST(RegionBorders, RegionsWithoutBorderAndTouchingThemselves) {
   TriangleMesh fan;
   fan.vertices = {{0, 0, 0}};
   for (int k = 0; k < 6; ++k)
-    fan.vertices.push_back({std::cos(k * 1.0471975511965976), std::sin(k * 1.0471975511965976), 0});
+    fan.vertices.push_back({std::cos(k * std::numbers::pi / 3), std::sin(k * std::numbers::pi / 3), 0});
   for (Index k = 0; k < 6; ++k) fan.triangles.push_back({0, 1 + k, 1 + (k + 1) % 6});
   const SegmentResult split = with_regions({0, 1, 1, 0, 1, 1}, {Plane{{0, 0, 1}, 0}, Plane{{0, 0, 1}, 0}});
   const RegionBorders touching = region_borders(fan, split);
