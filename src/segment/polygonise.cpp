@@ -26,9 +26,9 @@ namespace {
 
 // Where corners fold a region or make polygons cross, vertices go back towards the mesh, by halves.
 constexpr int kHalvings = 4;
-// And regions that stay folded get more corners.
+// And regions that stay folded or cross others get more corners.
 constexpr int kRefinements = 6;
-constexpr double kFinerChord = 0.5;
+constexpr double kFinerChord = 0.25;
 
 using Edge = std::array<Index, 2>;
 
@@ -52,7 +52,7 @@ class Polygoniser {
     const std::vector<Vec3> placed = positions_;
     remove_inner_vertices();
     simplify();
-    if (folded() > 0) refine(placed);
+    if (flaws() > 0) refine(placed);
     separate_edges();
     return result();
   }
@@ -63,29 +63,36 @@ class Polygoniser {
     Vec3 normal;  // on the side that the triangles face; zero for other surfaces
     std::vector<std::vector<Index>> loops;
     std::vector<Triangle> triangles;
-    bool has_handles = false, is_folded = false;
+    bool has_handles = false, is_folded = false, crosses = false;
     double chord = 1;  // share of the options'
   };
 
-  // Regions that their corners fold get more of them. Those that stay folded get none, and if
-  // all this gives more faces than before, it is undone.
+  struct Simplified {
+    std::vector<Vec3> positions;
+    std::vector<Region> regions;
+    LabelledTriangles triangles;
+  };
+
+  // Regions that their corners fold, or that cross others, get more of them, and in the end those for which that was of
+  // no use get none. Of all these the one with the fewest crossing regions is kept, then with the fewest faces.
   void refine(const std::vector<Vec3>& placed) {
-    const std::vector<Vec3> positions = positions_;
-    const std::vector<Region> regions = regions_;
-    const LabelledTriangles coarse = coarse_;
-    const std::size_t before = faces();
+    const auto cost = [&] { return std::pair(crossing(), faces()); };
+    auto least = cost();
+    Simplified best{positions_, regions_, coarse_};
     const auto simplify_with = [&](double factor) {
       for (Region& region : regions_)
-        if (region.is_folded) region.chord = std::min(1.0, factor * region.chord);
+        if (region.is_folded || region.crosses) region.chord = std::min(1.0, factor * region.chord);
       positions_ = placed;
       simplify();
+      if (!(cost() < least)) return;
+      least = cost();
+      best = {positions_, regions_, coarse_};
     };
-    for (int k = 0; k < kRefinements && folded() > 0; ++k) simplify_with(kFinerChord);
-    if (folded() > 0) simplify_with(1 / std::pow(kFinerChord, kRefinements));
-    if (faces() < before) return;
-    positions_ = positions;
-    regions_ = regions;
-    coarse_ = coarse;
+    for (int k = 0; k < kRefinements && flaws() > 0; ++k) simplify_with(kFinerChord);
+    if (flaws() > 0) simplify_with(1 / std::pow(kFinerChord, kRefinements));
+    positions_ = std::move(best.positions);
+    regions_ = std::move(best.regions);
+    coarse_ = std::move(best.triangles);
   }
 
   // What all choices of anchors have in common.
@@ -111,6 +118,7 @@ class Polygoniser {
     find_loops();
     fill_regions();
     for (int k = 0; k < kHalvings && draw_back(k + 1 == kHalvings); ++k) fill_regions();
+    find_crossings();
   }
 
   // But for holes: one for each region, or as many as it has triangles.
@@ -120,9 +128,14 @@ class Polygoniser {
     return count;
   }
 
-  std::size_t folded() const {
+  std::size_t crossing() const {
     return static_cast<std::size_t>(
-        std::count_if(regions_.begin(), regions_.end(), [](const Region& region) { return region.is_folded; }));
+        std::count_if(regions_.begin(), regions_.end(), [](const Region& region) { return region.crosses; }));
+  }
+
+  std::size_t flaws() const {
+    return static_cast<std::size_t>(std::count_if(
+        regions_.begin(), regions_.end(), [](const Region& region) { return region.is_folded || region.crosses; }));
   }
 
   // Other surfaces keep their triangles, and so does what is no manifold.
@@ -255,24 +268,39 @@ class Polygoniser {
     }
   }
 
+  // Vertices of the triangles that cross others; notes their regions.
+  std::set<Index> find_crossings() {
+    TriangleMesh made{positions_, {}};
+    std::vector<std::size_t> region_of;
+    for (std::size_t r = 0; r < regions_.size(); ++r) {
+      regions_[r].crosses = false;
+      made.triangles.insert(made.triangles.end(), regions_[r].triangles.begin(), regions_[r].triangles.end());
+      region_of.resize(made.triangles.size(), r);
+    }
+    std::set<Index> vertices;
+    for (const auto& pair : find_self_intersections(made))
+      for (const Index t : pair) {
+        regions_[region_of[t]].crosses = true;
+        vertices.insert(made.triangles[t].begin(), made.triangles[t].end());
+      }
+    return vertices;
+  }
+
   // Moves vertices of folded regions, and of triangles that cross, halfway back to the mesh, or all the way. False if
   // there are none.
   bool draw_back(bool all_the_way) {
-    std::set<Index> moved;
-    TriangleMesh made{positions_, {}};
+    std::set<Index> moved = find_crossings();
     for (const Region& region : regions_) {
-      made.triangles.insert(made.triangles.end(), region.triangles.begin(), region.triangles.end());
       if (!region.is_folded) continue;
       for (const std::vector<Index>& loop : region.loops) moved.insert(loop.begin(), loop.end());
     }
-    for (const auto& pair : find_self_intersections(made))
-      for (const Index t : pair) moved.insert(made.triangles[t].begin(), made.triangles[t].end());
     for (const Index v : moved)
       positions_[v] = all_the_way ? mesh_.vertices[v] : 0.5 * (positions_[v] + mesh_.vertices[v]);
     return !moved.empty();
   }
 
-  // Diagonals of planar regions may join vertices that another edge joins already: these get a vertex in the middle.
+  // Diagonals of planar regions may join vertices that another edge joins already: these give way to the other diagonal
+  // of their two triangles, or get a vertex in the middle.
   void separate_edges() {
     std::set<Edge> taken;
     for (const Region& region : regions_) {
@@ -287,13 +315,40 @@ class Polygoniser {
       std::set<Edge> own;
       for (const std::vector<Index>& loop : region.loops)
         for (std::size_t i = 0; i < loop.size(); ++i) own.insert(ascending(loop[i], loop[(i + 1) % loop.size()]));
-      for (std::size_t t = 0; t < region.triangles.size(); ++t)
+      std::vector<Edge> twice;
+      for (const Triangle& t : region.triangles)
         for (std::size_t k = 0; k < 3; ++k) {
-          const Edge e = ascending(region.triangles[t][k], region.triangles[t][(k + 1) % 3]);
-          if (!own.insert(e).second) continue;
-          if (!taken.insert(e).second) divide_edge(region.triangles, e);
+          const Edge e = ascending(t[k], t[(k + 1) % 3]);
+          if (own.insert(e).second && !taken.insert(e).second) twice.push_back(e);
         }
+      for (const Edge& e : twice) {
+        if (const std::optional<Edge> other = flip(region, e, taken)) taken.insert(*other);
+        else divide_edge(region.triangles, e);
+      }
     }
+  }
+
+  // The other diagonal of the two triangles at e, if it lies inside them and joins what no edge joins.
+  std::optional<Edge> flip(Region& region, const Edge& e, const std::set<Edge>& taken) const {
+    std::array<std::size_t, 2> sides{};
+    std::array<Index, 2> across{};
+    for (std::size_t t = 0; t < region.triangles.size(); ++t)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Triangle& v = region.triangles[t];
+        if (ascending(v[k], v[(k + 1) % 3]) != e) continue;
+        const std::size_t side = v[k] == e[0] ? 0 : 1;  // the first triangle has e in its own direction
+        sides[side] = t;
+        across[side] = v[(k + 2) % 3];
+      }
+    const Edge other = ascending(across[0], across[1]);
+    if (taken.contains(other)) return std::nullopt;
+    const Triangle first{e[0], across[1], across[0]}, second{across[1], e[1], across[0]};
+    for (const Triangle& t : {first, second})
+      if (!(dot(region.normal, twice_area_normal(positions_[t[0]], positions_[t[1]], positions_[t[2]])) > 0))
+        return std::nullopt;
+    region.triangles[sides[0]] = first;
+    region.triangles[sides[1]] = second;
+    return other;
   }
 
   void divide_edge(std::vector<Triangle>& triangles, const Edge& e) {
