@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <vector>
 
@@ -25,9 +26,12 @@ class RegionTopology {
   // The regions across an edge, with the number of pairs of triangles.
   const std::map<Index, std::size_t>& contacts(Index region) const { return contacts_[region]; }
 
-  // The triangles of a region that was connected through edges, and no longer hang together with most of it since the
-  // given triangles joined or left it.
+  // The triangles of a region that was connected through edges, and no longer hang together with the middle of it (or
+  // most of it, if that left) since the given triangles joined or left it.
   std::vector<Index> crumbs(Index region, const std::vector<Index>& changed);
+  // Finds the middle of a connected region and ways to it anew, after changes that stay: crumbs() is faster then.
+  // `triangles`: all of the region, and others.
+  void settle(Index region, const std::vector<Index>& triangles);
 
   // What the given triangles contribute to a region's topology: differences of these are differences of the whole.
   struct Local {
@@ -43,6 +47,10 @@ class RegionTopology {
     Index triangle;
     std::size_t root;
   };
+
+  // Whether a triangle's way to the middle of its region, which is in it, is in the region still.
+  bool is_rooted(Index triangle, Index region);
+  Index innermost(Index region, const std::vector<Index>& triangles);
 
   long long euler(Index region, const std::vector<Index>& changed, const std::vector<Index>& vertices) const;
   std::size_t loops(Index region, const std::vector<Index>& vertices);
@@ -60,7 +68,13 @@ class RegionTopology {
   std::vector<std::size_t> edge_of_;  // of half-edge 3 t + k
   Csr<Index> at_vertex_;              // triangles, ascending
   std::vector<Index> front_;          // of a triangle: where the search for crumbs came from, or kNone
-  std::vector<char> seen_;            // of an edge, while loops are followed
+  // Of each region that it was settled with, a spanning tree; of each triangle the tree that it is in, and the next one
+  // towards the root.
+  std::vector<Index> root_, tree_, parent_;
+  std::vector<std::uint64_t> rooted_;  // of a triangle: twice the search that last asked for its way, plus the answer
+  std::uint64_t search_ = 0;
+  std::vector<Index> way_, queue_;
+  std::vector<char> seen_;  // of an edge, while loops are followed
 };
 
 }  // namespace bisector
