@@ -23,6 +23,7 @@ constexpr double kUnit = 0x1p40;  // of Cost, to the energy at the start
 
 constexpr double kFar = 1e100;  // squared distances from here on are no numbers to add up
 constexpr int kSplits = 4;      // of connected changes that the topology forbids
+constexpr int kPasses = 4;      // that take changes back by a row of triangles each, later ones by ever more
 constexpr int kFirstRings = 4;  // width of a strip that is widened where its cut asks for more
 
 // Triangles along a region's borders, and the energy of a labelling x of them: 0 for the region, 1 for another one that
@@ -332,8 +333,9 @@ class BorderSmoother {
   bool move(const Triangles& wanted, bool lowers, int splits) {
     Triangles changed = wanted;
     apply(changed);
-    while (give_back(changed)) {
-    }
+    int steps = 0;
+    for (int pass = 1; give_back(changed, steps); ++pass)
+      if (pass >= kPasses) steps = 2 * steps + 1;
     const bool better = !changed.empty() && ((lowers && changed.size() == wanted.size()) || lowers_energy(changed));
     if (better && keeps_topology(changed)) {
       for (const Index t : changed) {
@@ -393,9 +395,9 @@ class BorderSmoother {
 
   bool meet(Index a, Index b) const { return std::binary_search(meets_[a].begin(), meets_[a].end(), b); }
 
-  // Takes back the changes that leave crumbs, or make regions meet or part; true if there were any and some are left.
-  // Each call makes the changes fewer, so calls come to an end.
-  bool give_back(Triangles& changed) {
+  // Takes back the changes that leave crumbs, or make regions meet or part, and those within so many steps from them;
+  // true if there were any and some are left. Each call makes the changes fewer, so calls come to an end.
+  bool give_back(Triangles& changed, int steps) {
     Triangles crumbs;
     for (const auto& [r, triangles] : by_region(changed)) {
       const Triangles of_region = topology_.crumbs(r, triangles);
@@ -417,6 +419,17 @@ class BorderSmoother {
     Triangles kept, undone;
     for (const Index t : changed) (breaks(t) ? undone : kept).push_back(t);
     for (const Index t : crumbs) position_[t] = kNone;
+    if (steps > 0) {
+      for (const Index t : kept) position_[t] = 0;
+      for (std::size_t begin = 0, step = 0; step < static_cast<std::size_t>(steps) && begin < undone.size(); ++step) {
+        const std::size_t end = undone.size();
+        for (; begin < end; ++begin)
+          for (const Index* u = graph_.neighbours.begin(undone[begin]); u != graph_.neighbours.end(undone[begin]); ++u)
+            if (std::exchange(position_[*u], kNone) != kNone) undone.push_back(*u);
+      }
+      std::erase_if(kept, [&](Index t) { return position_[t] == kNone; });
+      for (const Index t : kept) position_[t] = kNone;
+    }
     undo(undone);
     changed = std::move(kept);
     return !undone.empty() && !changed.empty();
