@@ -225,15 +225,14 @@ std::vector<Index> RegionTopology::crumbs(Index region, const std::vector<Index>
   return result;
 }
 
-RegionTopology::Local RegionTopology::local(Index region, const std::vector<Index>& changed) {
+std::vector<Index> RegionTopology::vertices_of(const std::vector<Index>& changed) const {
   std::vector<Index> vertices;
   for (const Index t : changed) vertices.insert(vertices.end(), triangles_[t].begin(), triangles_[t].end());
   sort_once(vertices);
-  return {euler(region, changed, vertices), loops(region, vertices)};
+  return vertices;
 }
 
-long long RegionTopology::euler(Index region, const std::vector<Index>& changed,
-                                const std::vector<Index>& vertices) const {
+long long RegionTopology::local_euler(Index region, const std::vector<Index>& changed) {
   long long sum = 0;
   std::vector<std::size_t> edges;
   for (const Index t : changed) {
@@ -243,18 +242,15 @@ long long RegionTopology::euler(Index region, const std::vector<Index>& changed,
   sort_once(edges);
   for (const std::size_t edge : edges) sum -= triangles_at(edge, region) > 0;
   std::vector<Fan> fans;
-  for (const Index v : vertices) sum += static_cast<long long>(find_fans(v, region, fans));
+  for (const Index v : vertices_of(changed)) sum += static_cast<long long>(find_fans(v, region, fans));
   return sum;
 }
 
-std::size_t RegionTopology::loops(Index region, const std::vector<Index>& vertices) {
-  std::vector<std::size_t> starts, followed;
+std::size_t RegionTopology::local_loops(Index region, const std::vector<Index>& changed) {
+  std::vector<std::size_t> followed;
   std::vector<Fan> fans;
-  for (const Index v : vertices)
-    for (const Index* t = at_vertex_.begin(v); t != at_vertex_.end(v); ++t) add_border_edges(v, region, *t, starts);
-  if (starts.empty() || is_one_chain(region, vertices, starts)) return starts.empty() ? 0 : 1;
   std::size_t count = 0;
-  for (const std::size_t start : starts) {
+  for (const std::size_t start : border_edges_at(region, vertices_of(changed))) {
     if (seen_[start]) continue;
     ++count;
     std::vector<std::size_t> stack{start};
@@ -277,47 +273,73 @@ std::size_t RegionTopology::loops(Index region, const std::vector<Index>& vertic
   return count;
 }
 
-// Whether border edges hang together at the given vertices, so that they are of one loop without a look at its rest.
-bool RegionTopology::is_one_chain(Index region, const std::vector<Index>& vertices,
-                                  std::vector<std::size_t> edges) const {
-  sort_once(edges);
-  DisjointSets chains(edges.size());
+std::vector<std::vector<std::size_t>> RegionTopology::border_chains(Index region, const std::vector<Index>& changed) {
+  const std::vector<Index> vertices = vertices_of(changed);
+  const std::vector<std::size_t> edges = border_edges_at(region, vertices);
+  DisjointSets sets(edges.size());
   std::vector<Fan> fans;
-  std::vector<std::size_t> of_triangle;
+  std::vector<std::size_t> of_triangle, first;
   for (const Index v : vertices) {
     find_fans(v, region, fans);
-    std::vector<std::size_t> first(fans.size(), edges.size());  // a border edge of each fan
+    first.assign(fans.size(), edges.size());  // a border edge of each fan
     for (const Fan& fan : fans) {
       of_triangle.clear();
       add_border_edges(v, region, fan.triangle, of_triangle);
       for (const std::size_t edge : of_triangle) {
         const auto at = static_cast<std::size_t>(std::lower_bound(edges.begin(), edges.end(), edge) - edges.begin());
         if (first[fan.root] == edges.size()) first[fan.root] = at;
-        else chains.join(first[fan.root], at);
+        else sets.join(first[fan.root], at);
       }
     }
   }
-  return chains.count() == 1;
+  // Edges with one end at the vertices are of no changed triangle, so they are the same before and after.
+  std::vector<std::vector<std::size_t>> leaving(edges.size()), result;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const auto is_inside = [&](Index v) { return std::binary_search(vertices.begin(), vertices.end(), v); };
+    const auto [a, b] = table_.edges[edges[i]];
+    if (!is_inside(a) || !is_inside(b)) leaving[sets.root(i)].push_back(edges[i]);
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    if (sets.root(i) == i) result.push_back(std::move(leaving[i]));
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+// Ascending.
+std::vector<std::size_t> RegionTopology::border_edges_at(Index region, const std::vector<Index>& vertices) const {
+  std::vector<std::size_t> edges;
+  for (const Index v : vertices)
+    for (const Index* t = at_vertex_.begin(v); t != at_vertex_.end(v); ++t) add_border_edges(v, region, *t, edges);
+  sort_once(edges);
+  return edges;
 }
 
 // The region's triangles about a vertex, ascending, joined across the edges that end there; the number of fans.
-std::size_t RegionTopology::find_fans(Index vertex, Index region, std::vector<Fan>& fans) const {
+std::size_t RegionTopology::find_fans(Index vertex, Index region, std::vector<Fan>& fans) {
   fans.clear();
-  std::vector<std::pair<std::size_t, std::size_t>> spokes;  // edge, position in `fans`
+  spokes_.clear();
   for (const Index* t = at_vertex_.begin(vertex); t != at_vertex_.end(vertex); ++t) {
     if (labels_[*t] != region || (!fans.empty() && fans.back().triangle == *t)) continue;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t edge = edge_of_[3 * std::size_t{*t} + k];
-      if (table_.edges[edge][0] == vertex || table_.edges[edge][1] == vertex) spokes.push_back({edge, fans.size()});
+      if (table_.edges[edge][0] == vertex || table_.edges[edge][1] == vertex) spokes_.push_back({edge, fans.size()});
     }
     fans.push_back({*t, fans.size()});
   }
-  std::sort(spokes.begin(), spokes.end());
-  DisjointSets sets(fans.size());
-  for (std::size_t i = 1; i < spokes.size(); ++i)
-    if (spokes[i].first == spokes[i - 1].first) sets.join(spokes[i].second, spokes[i - 1].second);
-  for (Fan& fan : fans) fan.root = sets.root(fan.root);
-  return sets.count();
+  std::sort(spokes_.begin(), spokes_.end());
+  const auto root = [&](std::size_t i) {
+    while (fans[i].root != i) i = fans[i].root = fans[fans[i].root].root;
+    return i;
+  };
+  std::size_t count = fans.size();
+  for (std::size_t i = 1; i < spokes_.size(); ++i) {
+    if (spokes_[i].first != spokes_[i - 1].first) continue;
+    const std::size_t a = root(spokes_[i].second), b = root(spokes_[i - 1].second);
+    count -= a != b;
+    fans[std::max(a, b)].root = std::min(a, b);
+  }
+  for (std::size_t i = 0; i < fans.size(); ++i) fans[i].root = root(i);
+  return count;
 }
 
 // The edges of a triangle of the region, if it is one, that end at a vertex and have no other triangle of the region.

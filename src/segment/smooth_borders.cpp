@@ -443,12 +443,21 @@ class BorderSmoother {
                                    [](Index other, const auto& contact) { return other == contact.first; });
       if (topology_.triangle_count(r) == 0 || !same) return false;
     }
-    std::vector<RegionTopology::Local> after, before;
-    for (const auto& [r, triangles] : of_regions) after.push_back(topology_.local(r, triangles));
-    undo(changed);
-    for (const auto& [r, triangles] : of_regions) before.push_back(topology_.local(r, triangles));
-    apply(changed);
-    return after == before;
+    const auto measured = [&](const auto& measure) {
+      std::vector<decltype(measure(Index{}, changed))> result;
+      for (const auto& [r, triangles] : of_regions) result.push_back(measure(r, triangles));
+      return result;
+    };
+    const auto is_kept = [&](const auto& measure) {
+      const auto after = measured(measure);
+      undo(changed);
+      const auto before = measured(measure);
+      apply(changed);
+      return after == before;
+    };
+    return is_kept([&](Index r, const Triangles& t) { return topology_.local_euler(r, t); }) &&
+           (is_kept([&](Index r, const Triangles& t) { return topology_.border_chains(r, t); }) ||
+            is_kept([&](Index r, const Triangles& t) { return topology_.local_loops(r, t); }));
   }
 
   const DualGraph& graph_;
