@@ -21,9 +21,8 @@ constexpr double kFlatShare = 0.6, kRestShare = 0.1;  // of the triangles, that 
 constexpr int kTrimSteps = 4, kAverages = 4;  // of trimmed least squares, and of averaging over neighbours in each
 
 // Teleportation: a region is removed and another one divided.
-constexpr int kTrialSteps = 8;                 // of Lloyd's iteration, before a teleportation is judged
-constexpr std::size_t kMostEvaluations = 100;  // of distances for each triangle, in all teleportations: bounds the time
-constexpr int kMostRefusals = 10;              // in a row that do not lower the energy: others would hardly do better
+constexpr int kTrialSteps = 8;        // of Lloyd's iteration, before a teleportation is judged
+constexpr int kMostRefusals = 10;     // in a row that do not lower the energy: others would hardly do better
 constexpr double kLeastShare = 0.1;   // of what the removal costs before iterating, that the division must gain
 constexpr double kWorthwhile = 1e-3;  // part of the energy that a teleportation must gain
 
@@ -123,8 +122,9 @@ std::array<std::vector<Index>, 2> flat_and_rest(const SegmentDomain& domain, con
 
 }  // namespace
 
-PartitionEditor::PartitionEditor(Lloyd& lloyd, int iterations)
-    : lloyd_(lloyd), iterations_(iterations), trials_([&lloyd] { return Trial(lloyd.domain()); }) {}
+PartitionEditor::PartitionEditor(Lloyd& lloyd, int iterations, std::size_t most_evaluations)
+    : lloyd_(lloyd), iterations_(iterations), most_evaluations_(most_evaluations),
+      trials_([&lloyd] { return Trial(lloyd.domain()); }) {}
 
 void PartitionEditor::improve_division(const Partition& partition, Index region, int steps, Division& division,
                                        Trial& trial) const {
@@ -492,7 +492,7 @@ bool PartitionEditor::remove_cheapest(Partition& partition, std::size_t most, do
 void PartitionEditor::teleport(Partition& partition) {
   std::set<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> refused;
   const auto most = 4 * partition.count();
-  const std::size_t budget = lloyd_.counts.evaluations + kMostEvaluations * partition.labels.size();
+  const std::size_t budget = lloyd_.counts.evaluations + most_evaluations_;
   int refusals = 0;
   for (std::size_t k = 0; k < most && refusals < kMostRefusals && lloyd_.counts.evaluations < budget; ++k) {
     lloyd_.context().check();

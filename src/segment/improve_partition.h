@@ -18,7 +18,8 @@ namespace bisector {
 
 class PartitionEditor {
  public:
-  PartitionEditor(Lloyd& lloyd, int iterations);
+  // `most_evaluations`: of distances, from which on there are no further teleportations.
+  PartitionEditor(Lloyd& lloyd, int iterations, std::size_t most_evaluations);
 
   // Adds a region about the triangle that is farthest from its proxy, in an invalid region or else the one of most
   // energy (thesis, "Proxy insertion"), and iterates. False: every region is a single triangle or exact.
@@ -90,6 +91,7 @@ class PartitionEditor {
 
   Lloyd& lloyd_;
   int iterations_;
+  std::size_t most_evaluations_;
   ThreadLocal<Trial> trials_;
   std::unordered_map<std::uint64_t, Division> divisions_;        // by version
   std::unordered_map<std::uint64_t, Deletion> deletions_;        // by version

@@ -243,13 +243,13 @@ bool Lloyd::step(Partition& partition, bool flooding, PartitionUndo* undo) {
   return after < (1 - kEnough) * before;
 }
 
-void Lloyd::iterate(Partition& partition, int iterations) {
+void Lloyd::iterate(Partition& partition, int iterations, bool fresh) {
   std::vector<double> energies{partition.energy()};
   for (int k = 0; k < iterations; ++k) {
     context_.check();
     const int steps = counts.iterations;
     // Once regions have found their places, only their borders move.
-    const bool flooding = k < kFirstFloods || k % kFloodEvery == 0;
+    const bool flooding = fresh && (k < kFirstFloods || k % kFloodEvery == 0);
     const bool more = step(partition, flooding) || (!flooding && step(partition, true));
     if (counts.iterations > steps) energies.push_back(partition.energy());
     if (!more) break;

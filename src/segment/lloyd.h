@@ -47,8 +47,9 @@ class Lloyd {
                     std::vector<double>& distances, std::size_t& evaluations, bool tori = true) const;
   // Flooding and fitting, at most so many times, as long as the energy falls. It falls at each step: a flooding that
   // would raise it is replaced by moves of single triangles at borders, and a proxy is exchanged only for a better one.
-  // Regions that neither changed nor border on such are left out.
-  void iterate(Partition& partition, int iterations);
+  // Regions that neither changed nor border on such are left out. `fresh`: where the regions may not have found their
+  // places yet, they are flooded at first and now and then; otherwise only where moves at borders gain little.
+  void iterate(Partition& partition, int iterations, bool fresh = true);
   // The same with one flooding only, and moves at borders after that; gives up where steps as large as the last would
   // not bring the energy below `goal`. `undo` takes it back.
   void try_out(Partition& partition, int iterations, double goal, PartitionUndo& undo);

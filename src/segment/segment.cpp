@@ -35,8 +35,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // all pairs.
 constexpr std::size_t kFewestPieces = 200, kMostPieces = 1000;
 constexpr std::size_t kPiecesPerProxy = 10, kTrianglesPerPiece = 40;
-// Clusters of triangles that regions are found on, where a mesh has more triangles: enough for regions of so many each.
-constexpr std::size_t kCoarse = 16'000, kClustersPerRegion = 50;
+// Clusters of triangles that regions are found on, where a mesh has so many times more triangles: at most so many, or
+// twice so many for each region. Joining pairs leaves between half of that and all.
+constexpr std::size_t kCoarse = 4'000, kClustersPerRegion = 50, kTrianglesPerCluster = 4;
+// Distances that are taken for each of the mesh's triangles to move regions, on clusters as well: bounds the time. To
+// know what every removal and division would cost takes a hundred, and later only what changes is asked for anew.
+constexpr std::size_t kMostEvaluations = 150;
 constexpr int kPlanarSteps = 4;  // of Lloyd's iteration, for the pieces
 constexpr std::size_t kSpareShare =
     5;  // one region in so many is added: which can be spared shows after Lloyd's iteration
@@ -158,7 +162,7 @@ Partition start_partition(Lloyd& lloyd, const SegmentOptions& options, SegmentSe
 }
 
 // Inserts regions until there are enough and takes away those that are not needed. `fresh`: of a partition that was
-// not improved yet, regions are also moved from where they are hardly missed.
+// not improved yet, regions are also flooded, and moved from where they are hardly missed.
 void improve(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& options, bool fresh, Partition& partition,
              SegmentSeconds& seconds) {
   const Context& context = lloyd.context();
@@ -168,7 +172,7 @@ void improve(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& option
   const auto enough = [&](const Partition& p) { return wanted > 0 ? p.count() >= wanted : p.energy() <= allowed; };
   Stopwatch clock;
   report(context, "Lloyd", 0.2, partition.energy());
-  lloyd.iterate(partition, options.iterations);
+  lloyd.iterate(partition, options.iterations, fresh);
   while (!enough(partition)) {
     report(context, "inserting regions", 0.3, partition.energy());
     const std::size_t most = wanted > 0 ? wanted - partition.count() : partition.labels.size();
@@ -186,31 +190,38 @@ void improve(Lloyd& lloyd, PartitionEditor& editor, const SegmentOptions& option
   if (wanted == 0)
     while (editor.remove_cheapest(partition, partition.count(), allowed))
       report(context, "removing regions", 0.7, partition.energy());
-  lloyd.iterate(partition, options.iterations);
+  lloyd.iterate(partition, options.iterations, fresh);
   seconds.improve += clock.lap();
 }
 
 // The regions of a large mesh are found on clusters of its triangles; what is left to do is to move borders by single
 // triangles. Empty where the mesh is small, or the regions would be of too few clusters.
 Partition coarse_partition(Lloyd& lloyd, const SegmentOptions& options, SegmentSeconds& seconds) {
-  const std::size_t most = std::max(kCoarse, kClustersPerRegion * options.proxies);
-  if (lloyd.domain().triangles.size() <= most) return {};
-  const CoarseDomain coarse = coarsened(lloyd.domain(), most);
-  if (2 * coarse.domain.triangles.size() > lloyd.domain().triangles.size()) return {};
-  Lloyd on_clusters(coarse.domain, options.surfaces, lloyd.context());
-  PartitionEditor editor(on_clusters, options.iterations);
-  Partition partition = start_partition(on_clusters, options, seconds);
-  const bool fine_enough = partition.count() * kClustersPerRegion <= coarse.domain.triangles.size() ||
-                           partition.count() == lloyd.domain().component_count;
-  if (fine_enough) improve(on_clusters, editor, options, true, partition, seconds);
-  lloyd.counts.add(on_clusters.counts);
-  if (!fine_enough) return {};
-  Stopwatch clock;
-  std::vector<Index> labels(coarse.cluster_of.size());
-  for (std::size_t t = 0; t < labels.size(); ++t) labels[t] = partition.labels[coarse.cluster_of[t]];
-  partition = lloyd.fit(std::move(labels), partition.count());
-  seconds.lloyd += clock.lap();
-  return partition;
+  const SegmentDomain& domain = lloyd.domain();
+  for (std::size_t most = std::max(kCoarse, 2 * kClustersPerRegion * options.proxies);;) {
+    if (domain.triangles.size() < kTrianglesPerCluster * most) return {};
+    const CoarseDomain coarse = coarsened(domain, most);
+    const std::size_t clusters = coarse.domain.triangles.size();
+    if (domain.triangles.size() < kTrianglesPerCluster * clusters) return {};  // creases kept them apart
+    Lloyd on_clusters(coarse.domain, options.surfaces, lloyd.context());
+    Partition partition = start_partition(on_clusters, options, seconds);
+    // How many regions an error takes shows only now.
+    const bool fine_enough = options.proxies > 0 || partition.count() * kClustersPerRegion <= clusters ||
+                             partition.count() == domain.component_count;
+    if (fine_enough) {
+      PartitionEditor editor(on_clusters, options.iterations, kMostEvaluations * domain.triangles.size());
+      improve(on_clusters, editor, options, true, partition, seconds);
+    }
+    lloyd.counts.add(on_clusters.counts);
+    most = std::max(2 * most, 2 * kClustersPerRegion * partition.count());
+    if (!fine_enough) continue;
+    Stopwatch clock;
+    std::vector<Index> labels(coarse.cluster_of.size());
+    for (std::size_t t = 0; t < labels.size(); ++t) labels[t] = partition.labels[coarse.cluster_of[t]];
+    partition = lloyd.fit(std::move(labels), partition.count());
+    seconds.lloyd += clock.lap();
+    return partition;
+  }
 }
 
 // Numbers the regions in descending order of area.
@@ -385,7 +396,7 @@ SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, c
   aimed.proxies = possible_count(domain, options.proxies, context);
   SegmentResult result;
   Lloyd lloyd(domain, options.surfaces, context);
-  PartitionEditor editor(lloyd, options.iterations);
+  PartitionEditor editor(lloyd, options.iterations, kMostEvaluations * domain.triangles.size());
   bool fresh = false;
   Partition partition = coarse_partition(lloyd, aimed, result.seconds);
   if (partition.count() == 0) {

@@ -23,6 +23,7 @@ constexpr double kUnit = 0x1p40;  // of Cost, to the energy at the start
 
 constexpr double kFar = 1e100;  // squared distances from here on are no numbers to add up
 constexpr int kSplits = 4;      // of connected changes that the topology forbids
+constexpr int kPasses = 4;      // that take changes back by a row of triangles each, later ones by ever more
 constexpr int kFirstRings = 4;  // width of a strip that is widened where its cut asks for more
 
 // Triangles along a region's borders, and the energy of a labelling x of them: 0 for the region, 1 for another one that
@@ -33,36 +34,51 @@ struct Strip {
     Cost forth, back;  // if x_i = 0 and x_j = 1, and the other way round
   };
   std::vector<Index> triangles, others;
-  std::vector<Cost> costs;  // of x_i = 1 over x_i = 0, links to triangles beside the strip included
+  std::vector<Cost> differences;  // in cost between the other region and this one, of the triangles alone
+  std::vector<Cost> costs;        // of x_i = 1 over x_i = 0, links to triangles beside the strip included
   std::vector<Link> links;
 };
 
 // The labelling of least energy, by maximum flow from label 0 to label 1 (Boykov and Kolmogorov 2004).
 std::vector<char> minimum_cut(const Strip& strip) {
-  const std::size_t n = strip.triangles.size(), source = n, sink = n + 1;
-  std::vector<std::pair<std::size_t, std::size_t>> arcs;  // 2 k and 2 k + 1 run against each other
-  std::vector<Cost> capacities;
-  const auto connect = [&](std::size_t from, std::size_t to, Cost forth, Cost back) {
-    arcs.insert(arcs.end(), {{from, to}, {to, from}});
-    capacities.insert(capacities.end(), {forth, back});
+  using Node = std::uint32_t;
+  const auto n = static_cast<Node>(strip.triangles.size());
+  const Node source = n, sink = n + 1;
+  std::vector<Node> offsets(n + 3, 0);  // of each node's arcs
+  const auto for_each_pair = [&](const auto& visit) {
+    for (Node i = 0; i < n; ++i) {
+      if (strip.costs[i] > 0) visit(source, i, strip.costs[i], Cost{0});
+      if (strip.costs[i] < 0) visit(i, sink, -strip.costs[i], Cost{0});
+    }
+    for (const Strip::Link& link : strip.links) visit(link.i, link.j, link.forth, link.back);
   };
-  for (std::size_t i = 0; i < n; ++i) {
-    if (strip.costs[i] > 0) connect(source, i, strip.costs[i], 0);
-    if (strip.costs[i] < 0) connect(i, sink, -strip.costs[i], 0);
-  }
-  for (const Strip::Link& link : strip.links) connect(link.i, link.j, link.forth, link.back);
-
-  using Network = boost::compressed_sparse_row_graph<boost::directedS, boost::no_property, std::size_t>;
-  std::vector<std::size_t> numbers(arcs.size());
-  std::iota(numbers.begin(), numbers.end(), std::size_t{0});
-  Network network(boost::edges_are_unsorted_multi_pass, arcs.begin(), arcs.end(), numbers.begin(), n + 2);
-  std::vector<Network::edge_descriptor> reverses(arcs.size()), predecessors(n + 2);
-  const auto [begin, end] = edges(network);
-  for (auto e = begin; e != end; ++e) reverses[network[*e] ^ 1] = *e;
+  for_each_pair([&](Node i, Node j, Cost, Cost) {
+    ++offsets[i + 1];
+    ++offsets[j + 1];
+  });
+  std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+  using Network = boost::compressed_sparse_row_graph<boost::directedS, boost::no_property, boost::no_property,
+                                                     boost::no_property, Node, Node>;
+  using Arc = boost::graph_traits<Network>::edge_descriptor;
+  std::vector<std::pair<Node, Node>> arcs(offsets.back());  // sorted by the node that they come from
+  std::vector<Cost> capacities(arcs.size());
+  std::vector<Arc> reverses(arcs.size());
+  std::vector<Node> next(offsets.begin(), offsets.end() - 1);
+  for_each_pair([&](Node i, Node j, Cost forth, Cost back) {
+    const Node to = next[i]++, fro = next[j]++;
+    arcs[to] = {i, j};
+    arcs[fro] = {j, i};
+    capacities[to] = forth;
+    capacities[fro] = back;
+    reverses[to] = Arc(j, fro);
+    reverses[fro] = Arc(i, to);
+  });
+  const Network network(boost::edges_are_sorted, arcs.begin(), arcs.end(), n + 2);
   std::vector<Cost> residuals(arcs.size());
+  std::vector<Arc> predecessors(n + 2);
   std::vector<boost::default_color_type> colours(n + 2);
-  std::vector<long> distances(n + 2);
-  const auto number = get(boost::edge_bundle, network);
+  std::vector<int> distances(n + 2);
+  const auto number = get(boost::edge_index, network);
   const auto vertex = get(boost::vertex_index, network);
   const auto of_arcs = [&](auto& list) { return boost::make_iterator_property_map(list.begin(), number); };
   const auto of_vertices = [&](auto& list) { return boost::make_iterator_property_map(list.begin(), vertex); };
@@ -123,12 +139,17 @@ class BorderSmoother {
     int rings = options_.rings > 0 ? options_.rings : kFirstRings;
     Strip strip;
     std::vector<char> x;
-    for (;; rings *= 2) {
-      const std::size_t last = gather(region, rings, strip);
+    begin_strip(region, strip);
+    std::vector<Index> ends = strip.triangles;
+    for (int steps = rings - 1;; steps = rings, rings *= 2) {
+      widen(region, ends, steps, strip);
       fill(region, strip);
       x = minimum_cut(strip);
-      if (options_.rings > 0 || !changes_from(last, region, strip, x)) break;
+      if (options_.rings > 0) break;
+      ends = changed_ends(region, strip, x);
+      if (ends.empty()) break;
     }
+    for (const Index t : strip.triangles) position_[t] = kNone;
     touched_.clear();
     for (std::size_t i = 0; i < x.size(); ++i) {
       const Index t = strip.triangles[i];
@@ -151,15 +172,24 @@ class BorderSmoother {
     }
     for (const Triangles& group : groups) moved += move(group, true, kSplits);
     for (const Index t : strip.triangles) before_[t] = kNone;
+    for (const Index r : touched_) topology_.settle(r, members_[r]);
     return moved > 0 ? Outcome::cut : same ? Outcome::same : Outcome::refused;
   }
 
-  // Whether a labelling moves one of the strip's triangles from a position on: at the strip's end more might move.
-  bool changes_from(std::size_t position, Index region, const Strip& strip, const std::vector<char>& x) const {
-    for (std::size_t i = position; i < x.size(); ++i)
-      if ((labels_[strip.triangles[i]] == region) != (x[i] == 0)) return true;
-    return false;
+  // The triangles at the strip's end that a labelling moves: beside them more might move.
+  Triangles changed_ends(Index region, const Strip& strip, const std::vector<char>& x) const {
+    Triangles ends;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const Index t = strip.triangles[i];
+      if ((labels_[t] == region) == (x[i] == 0)) continue;
+      if (std::any_of(graph_.neighbours.begin(t), graph_.neighbours.end(t),
+                      [&](Index u) { return position_[u] == kNone && may_change(u, region); }))
+        ends.push_back(t);
+    }
+    return ends;
   }
+
+  bool may_change(Index t, Index region) const { return labels_[t] == region || meet(region, labels_[t]); }
 
   // --- The strip and its energy ---
 
@@ -176,38 +206,45 @@ class BorderSmoother {
     unit_ = energy_ > 0 ? kUnit / energy_ : 0;
   }
 
-  // The triangles within so many steps from the region's borders, in the order of steps, with the region that each may
-  // be of instead: its own, or of this region's that which is nearest among those across the border. Returns the
-  // position where those of the last step begin.
-  std::size_t gather(Index region, int rings, Strip& strip) {
-    Triangles& out = strip.triangles;
-    out.clear();
-    strip.others.clear();
-    const std::vector<Index>& met = meets_[region];
-    const auto add = [&](Index t) {
-      if (position_[t] != kNone) return;
-      position_[t] = static_cast<Index>(out.size());
-      out.push_back(t);
-    };
+  // The triangles at a region's borders, on both sides. Until the strip is finished, `position_` is where each is in
+  // it.
+  void begin_strip(Index region, Strip& strip) {
     std::erase_if(members_[region], [&](Index t) { return labels_[t] != region; });
     for (const Index t : members_[region])
       for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u)
         if (labels_[*u] != region) {
-          add(t);
-          add(*u);
+          add(t, strip);
+          add(*u, strip);
         }
-    std::size_t begin = 0;
-    for (int ring = 1;; ++ring) {
-      const std::size_t end = out.size();
-      for (std::size_t i = begin; i < end; ++i) strip.others.push_back(other_region(out[i], region, strip));
-      if (ring == rings || begin == end) break;
-      for (std::size_t i = begin; i < end; ++i)
-        for (const Index* u = graph_.neighbours.begin(out[i]); u != graph_.neighbours.end(out[i]); ++u)
-          if (labels_[*u] == region || std::binary_search(met.begin(), met.end(), labels_[*u])) add(*u);
-      begin = end;
+    find_others(region, strip);
+  }
+
+  // Adds the triangles within so many steps from some of the strip's, in the order of steps.
+  void widen(Index region, std::vector<Index> from, int steps, Strip& strip) {
+    for (int step = 0; step < steps && !from.empty(); ++step) {
+      const std::size_t begin = strip.triangles.size();
+      for (const Index t : from)
+        for (const Index* u = graph_.neighbours.begin(t); u != graph_.neighbours.end(t); ++u)
+          if (may_change(*u, region)) add(*u, strip);
+      find_others(region, strip);
+      from.assign(strip.triangles.begin() + static_cast<std::ptrdiff_t>(begin), strip.triangles.end());
     }
-    for (const Index t : out) position_[t] = kNone;
-    return begin;
+  }
+
+  void add(Index t, Strip& strip) {
+    if (position_[t] != kNone) return;
+    position_[t] = static_cast<Index>(strip.triangles.size());
+    strip.triangles.push_back(t);
+  }
+
+  // For the triangles last added, the region that each may be of instead: its own, or of this region's that which is
+  // nearest among those across the border.
+  void find_others(Index region, Strip& strip) {
+    for (std::size_t i = strip.others.size(); i < strip.triangles.size(); ++i) {
+      const Index t = strip.triangles[i];
+      strip.others.push_back(other_region(t, region, strip));
+      strip.differences.push_back(cost_of(t, strip.others[i]) - cost_of(t, region));
+    }
   }
 
   Index other_region(Index t, Index region, const Strip& strip) const {
@@ -231,12 +268,10 @@ class BorderSmoother {
 
   void fill(Index region, Strip& strip) {
     const std::size_t n = strip.triangles.size();
-    for (std::size_t i = 0; i < n; ++i) position_[strip.triangles[i]] = static_cast<Index>(i);
-    strip.costs.assign(n, 0);
+    strip.costs = strip.differences;
     strip.links.clear();
     for (std::size_t i = 0; i < n; ++i) {
       const Index t = strip.triangles[i], own = strip.others[i];
-      strip.costs[i] += cost_of(t, own) - cost_of(t, region);
       strip.costs[i] += labels_[t] == region ? 1 : -1;  // of equally good labellings that of fewest changes
       for (std::size_t k = graph_.neighbours.offsets[t]; k < graph_.neighbours.offsets[t + 1]; ++k) {
         const Index u = graph_.neighbours.values[k], j = position_[u];
@@ -258,7 +293,6 @@ class BorderSmoother {
         }
       }
     }
-    for (const Index t : strip.triangles) position_[t] = kNone;
   }
 
   // What is no number, or more than all there is, is as much as all there is: no cut pays for it.
@@ -299,8 +333,9 @@ class BorderSmoother {
   bool move(const Triangles& wanted, bool lowers, int splits) {
     Triangles changed = wanted;
     apply(changed);
-    while (give_back(changed)) {
-    }
+    int steps = 0;
+    for (int pass = 1; give_back(changed, steps); ++pass)
+      if (pass >= kPasses) steps = 2 * steps + 1;
     const bool better = !changed.empty() && ((lowers && changed.size() == wanted.size()) || lowers_energy(changed));
     if (better && keeps_topology(changed)) {
       for (const Index t : changed) {
@@ -360,9 +395,9 @@ class BorderSmoother {
 
   bool meet(Index a, Index b) const { return std::binary_search(meets_[a].begin(), meets_[a].end(), b); }
 
-  // Takes back the changes that leave crumbs, or make regions meet or part; true if there were any and some are left.
-  // Each call makes the changes fewer, so calls come to an end.
-  bool give_back(Triangles& changed) {
+  // Takes back the changes that leave crumbs, or make regions meet or part, and those within so many steps from them;
+  // true if there were any and some are left. Each call makes the changes fewer, so calls come to an end.
+  bool give_back(Triangles& changed, int steps) {
     Triangles crumbs;
     for (const auto& [r, triangles] : by_region(changed)) {
       const Triangles of_region = topology_.crumbs(r, triangles);
@@ -384,6 +419,17 @@ class BorderSmoother {
     Triangles kept, undone;
     for (const Index t : changed) (breaks(t) ? undone : kept).push_back(t);
     for (const Index t : crumbs) position_[t] = kNone;
+    if (steps > 0) {
+      for (const Index t : kept) position_[t] = 0;
+      for (std::size_t begin = 0, step = 0; step < static_cast<std::size_t>(steps) && begin < undone.size(); ++step) {
+        const std::size_t end = undone.size();
+        for (; begin < end; ++begin)
+          for (const Index* u = graph_.neighbours.begin(undone[begin]); u != graph_.neighbours.end(undone[begin]); ++u)
+            if (std::exchange(position_[*u], kNone) != kNone) undone.push_back(*u);
+      }
+      std::erase_if(kept, [&](Index t) { return position_[t] == kNone; });
+      for (const Index t : kept) position_[t] = kNone;
+    }
     undo(undone);
     changed = std::move(kept);
     return !undone.empty() && !changed.empty();
@@ -397,12 +443,21 @@ class BorderSmoother {
                                    [](Index other, const auto& contact) { return other == contact.first; });
       if (topology_.triangle_count(r) == 0 || !same) return false;
     }
-    std::vector<RegionTopology::Local> after, before;
-    for (const auto& [r, triangles] : of_regions) after.push_back(topology_.local(r, triangles));
-    undo(changed);
-    for (const auto& [r, triangles] : of_regions) before.push_back(topology_.local(r, triangles));
-    apply(changed);
-    return after == before;
+    const auto measured = [&](const auto& measure) {
+      std::vector<decltype(measure(Index{}, changed))> result;
+      for (const auto& [r, triangles] : of_regions) result.push_back(measure(r, triangles));
+      return result;
+    };
+    const auto is_kept = [&](const auto& measure) {
+      const auto after = measured(measure);
+      undo(changed);
+      const auto before = measured(measure);
+      apply(changed);
+      return after == before;
+    };
+    return is_kept([&](Index r, const Triangles& t) { return topology_.local_euler(r, t); }) &&
+           (is_kept([&](Index r, const Triangles& t) { return topology_.border_chains(r, t); }) ||
+            is_kept([&](Index r, const Triangles& t) { return topology_.local_loops(r, t); }));
   }
 
   const DualGraph& graph_;

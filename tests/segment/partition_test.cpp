@@ -46,7 +46,8 @@ void expect_consistent(const SegmentDomain& domain, const Partition& partition) 
 struct Example {
   explicit Example(std::size_t regions)
       : domain(make_segment_domain(csg_part(2000, 1e-3, 1).mesh)), lloyd(domain, SegmentSurfaces::all, context),
-        editor(lloyd, 30), partition(lloyd.fit(merge_into_planes(domain, regions, kInfinity, context), regions)) {}
+        editor(lloyd, 30, 1000 * domain.triangles.size()),
+        partition(lloyd.fit(merge_into_planes(domain, regions, kInfinity, context), regions)) {}
 
   Context context;
   SegmentDomain domain;
