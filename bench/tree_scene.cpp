@@ -1,93 +1,165 @@
-// scratch
-#pragma GCC diagnostic ignored "-Wconversion"
+// How well scans of several trees with ground, walls and low plants are divided, and their trees made: generated scenes.
 #include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
 #include <cmath>
-#include <cstdlib>
-#include "bisector/io.h"
-#include "core/stopwatch.h"
-#include "support/scene_scan.h"
-#include "tree/ground.h"
-#include "tree/walls.h"
-#include "tree/part_trees.h"
+#include <cstdio>
+#include <exception>
 #include <map>
-#include <fstream>
+#include <string>
+#include <vector>
+
+#include "bisector/error.h"
+#include "bisector/tree.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
+#include "io/files.h"
+#include "support/scene_score.h"
+#include "support/tree_score.h"
+
+namespace {
+
 using namespace bisector;
+
+struct Row {
+  double trees = 0, found = 0, right_tree = 0, bushes = 0;
+  test::Shares ground, wall;
+  double right = 0, alone = 0;                // share of branches with the right parent; made from its points alone
+  double volume = 0, alone_volume = 0;        // mean size of the trees' relative errors
+  double base = 0;                            // mean distance of the bases' heights from the true ones, m
+  double scene_seconds = 0, seconds = 0;
+};
+
+const char* const kHead =
+    "| scene | points | trees | found | right tree | ground P | R | wall P | R | bushes in trees | right parent | alone "
+    "| volume | alone | base | s of the division | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+
+void print_row(const std::string& name, std::size_t points, const Row& r) {
+  fmt::print(
+      "| {} | {} | {:.3g} | {:.3g} | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | "
+      "{:.1f} % | {:.1f} % | {:.1f} % | {:.3f} m | {:.2f} | {:.2f} |\n",
+      name, points, r.trees, r.found, 100 * r.right_tree, 100 * r.ground.precision, 100 * r.ground.recall,
+      100 * r.wall.precision, 100 * r.wall.recall, 100 * r.bushes, 100 * r.right, 100 * r.alone, 100 * r.volume,
+      100 * r.alone_volume, r.base, r.scene_seconds, r.seconds);
+  std::fflush(stdout);
+}
+
+// 2 to 5 trees 3 to 6 m apart, slopes to 0.4, bumps to 0.2 m; every other seed has a wall.
+test::SceneScanOptions options_of(std::size_t points, std::size_t leaves, std::uint64_t seed) {
+  test::SplitMix64 random(seed ^ 0x5ce7e5u);
+  test::SceneScanOptions options;
+  options.trees = 2 + random.below(4);
+  options.apart = random.range(3.75, 5);
+  options.points = points;
+  options.slope = random.range(0, 0.4);
+  options.bumps = random.range(0, 0.2);
+  options.wall = seed % 2 == 0;
+  options.leaves = leaves;
+  options.bushes = random.below(5);
+  options.noise = random.range(0.005, 0.015);
+  options.random_seed = seed;
+  return options;
+}
+
+Row measure(const test::SceneScan& scan, const TreeOptions& options) {
+  Row row;
+  Stopwatch watch;
+  const TreeResult result = reconstruct_tree(scan.points, options);
+  row.seconds = watch.seconds();
+  row.scene_seconds = result.seconds.scene;
+  const test::SceneScore score = test::score_scene(scan, result);
+  row.trees = static_cast<double>(score.trees);
+  row.found = static_cast<double>(score.found_trees);
+  row.right_tree = score.right_tree;
+  row.bushes = score.bushes_in_trees;
+  row.ground = score.ground;
+  row.wall = score.wall;
+  double branches = 0, right = 0, alone = 0;
+  for (std::size_t t = 0; t < score.trees; ++t) {
+    const test::TreeScan truth = scan.tree_alone(static_cast<Index>(t));
+    TreeOptions plain = options;
+    plain.scene = false;
+    const TreeResult single = reconstruct_tree(truth.points, plain);
+    const test::ScanScore best = test::score_scan(truth, test::axes_of(single));
+    branches += static_cast<double>(best.branches);
+    alone += static_cast<double>(best.right_parent);
+    row.alone_volume += std::abs(best.volume_error) / row.trees;
+    if (score.match[t] == kNone) {
+      row.volume += 1 / row.trees;
+      continue;
+    }
+    const test::ScanScore own = test::score_scan(truth, test::axes_of_tree(result, score.match[t]));
+    right += static_cast<double>(own.right_parent);
+    row.volume += std::abs(own.volume_error) / row.trees;
+    row.base += std::abs(result.trees[score.match[t]].ground - scan.branches[t][0].axis[0].z) / row.trees;
+  }
+  row.right = right / branches;
+  row.alone = alone / branches;
+  return row;
+}
+
+Row mean(const std::vector<Row>& rows) {
+  Row result;
+  result.ground = result.wall = {0, 0};
+  const double share = 1 / static_cast<double>(rows.size());
+  for (const Row& r : rows) {
+    for (const auto value : {&Row::trees, &Row::found, &Row::right_tree, &Row::bushes, &Row::right, &Row::alone,
+                             &Row::volume, &Row::alone_volume, &Row::base, &Row::scene_seconds, &Row::seconds})
+      result.*value += share * (r.*value);
+    for (const auto part : {&Row::ground, &Row::wall}) {
+      (result.*part).precision += share * (r.*part).precision;
+      (result.*part).recall += share * (r.*part).recall;
+    }
+  }
+  return result;
+}
+
+void write_scan(const std::string& path, const test::SceneScan& scan) {
+  std::string text;
+  for (const Vec3& p : scan.points) text += fmt::format("{:.4f} {:.4f} {:.4f}\n", p.x, p.y, p.z);
+  write_file(path, text);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  if (argc > 1 && std::string(argv[1]).find('.') != std::string::npos) {
-    for (int k = 1; k < argc; ++k) {
-      const auto points = read_points(argv[k]);
-      const Ground g = find_ground(points, {});
-      fmt::print("{}: found {} noise {} cell {} ground {} of {}\n", argv[k], g.found, g.noise, g.surface.cell, std::count(g.is_ground.begin(), g.is_ground.end(), 1), points.size());
-    }
-    return 0;
-  }
-  if (argc > 1 && std::string(argv[1]) == "part") {
-    double sum = 0; int cnt = 0;
-    for (std::uint64_t seed = std::atoi(argv[2]); seed <= (std::uint64_t)std::atoi(argv[3]); ++seed)
-    for (std::size_t n : {30000, 120000}) for (int ground = 1; ground >= (argc > 4); --ground) {
-        const auto scan = test::scan_scene({.trees = 2 + seed % 4, .apart = 3.0 + (seed % 3) * 1.5, .points = n, .ground = ground == 1, .slope = 0.1 * (seed % 4), .bumps = 0.03 + 0.05 * (seed % 3), .wall = seed % 2 == 0, .bushes = 3, .random_seed = seed});
-        Stopwatch w;
-        const Ground g = find_ground(scan.points, {});
-        double tg = w.lap();
-        std::vector<Vec3> rest; std::vector<Index> id; double top = 0, lowest = 1e300;
-        for (std::size_t i = 0; i < scan.points.size(); ++i) if (!g.is_ground[i]) { rest.push_back(scan.points[i]); id.push_back(i); lowest = std::min(lowest, scan.points[i].z); }
-        std::vector<double> h;
-        for (auto& p : rest) { h.push_back(p.z - (g.found ? g.surface.at(p.x, p.y) : lowest)); top = std::max(top, h.back()); }
-        const Walls walls = find_walls(rest, top);
-        double tw = w.lap();
-        std::vector<Vec3> pts; std::vector<double> hh; std::vector<Index> id2;
-        std::size_t wall_ok = 0, wall_said = 0, wall_true = 0;
-        for (std::size_t k = 0; k < rest.size(); ++k) {
-          const bool is = scan.kinds[id[k]] == test::ScenePoint::wall;
-          wall_ok += is && walls.wall[k] != kNone; wall_said += walls.wall[k] != kNone; wall_true += is;
-          if (walls.wall[k] == kNone) { pts.push_back(rest[k]); hh.push_back(h[k]); id2.push_back(id[k]); }
+  std::vector<std::size_t> points{30'000, 120'000}, leaves{0};
+  std::array<std::uint64_t, 2> seeds{1, 5};
+  std::string folder;
+  unsigned threads = 2;
+  CLI::App app{"How well scans of several trees are divided: generated scenes."};
+  app.add_option("--points", points, "of each scan")->delimiter(',');
+  app.add_option("--leaves", leaves, "on each tree")->delimiter(',');
+  app.add_option("--seeds", seeds, "the first and the last one")->delimiter(',');
+  app.add_option("--write", folder, "write the scans there, as .xyz");
+  app.add_option("--threads", threads, "default 2");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    const ThreadLimit limit(threads);
+    fmt::print("{}", kHead);
+    for (const std::size_t leaf_count : leaves)
+      for (const std::size_t count : points) {
+        std::vector<Row> rows;
+        for (std::uint64_t seed = seeds[0]; seed <= seeds[1]; ++seed) {
+          const test::SceneScan scan = test::scan_scene(options_of(count, leaf_count, seed));
+          if (!folder.empty()) write_scan(fmt::format("{}/scene_{}_{}_{}.xyz", folder, seed, count, leaf_count), scan);
+          TreeOptions options;
+          options.scene = true;
+          if (leaf_count > 0) options.leaves = TreeLeaves::apart;
+          try {
+            rows.push_back(measure(scan, options));
+          } catch (const Error& error) {
+            fmt::print(stderr, "bench_tree_scene: {} points, seed {}: {}\n", count, seed, error.what());
+            continue;
+          }
+          print_row(fmt::format("{}, {} leaves", seed, leaf_count), scan.points.size(), rows.back());
         }
-        const PartedTrees parted = part_trees(pts, hh, g.found);
-        double tp = w.lap();
-        // matching: tree -> true tree by base
-        std::map<std::pair<Index, Index>, std::size_t> count; std::size_t trees = 0, lowtree = 0, straytree = 0, bushes = 0, bushtree = 0;
-        for (std::size_t k = 0; k < pts.size(); ++k) {
-          const Index t = scan.trees[id2[k]];
-          if (scan.kinds[id2[k]] == test::ScenePoint::bush) { ++bushes; bushtree += parted.tree[k] != kNone; }
-        if (t == kNone) continue;
-          ++trees;
-          if (parted.tree[k] == kNone) { (parted.low[k] ? lowtree : straytree)++; continue; }
-          ++count[{parted.tree[k], t}];
-        }
-        std::size_t right = 0;
-        std::map<Index, std::pair<std::size_t, Index>> best;
-        for (auto& [key, c] : count) if (c > best[key.second].first) best[key.second] = {c, key.first};
-        for (auto& [t, b] : best) right += b.first;
-        std::size_t alltrees = 0; for (Index t : scan.trees) alltrees += t != kNone;
-        sum += double(right) / alltrees; ++cnt;
-        fmt::print("seed {} n {} ground {} ({}) trees {} found {} right {:.4f} low {} stray {} of {}; bushes {} as tree {}; walls {} P {:.4f} R {:.4f}; s {:.2f} {:.2f} {:.2f}\n", seed, scan.points.size(), ground, g.found, scan.branches.size(), parted.base.size(), double(right) / alltrees, lowtree, straytree, trees, bushes, bushtree, walls.count, wall_said ? double(wall_ok) / wall_said : 1, wall_true ? double(wall_ok) / wall_true : 1, tg, tw, tp);
-        std::fflush(stdout);
-        if (const char* out = std::getenv("DUMP")) { std::ofstream o(fmt::format("{}/{}_{}_{}.txt", out, seed, n, ground));
-          for (std::size_t i = 0; i < scan.points.size(); ++i) o << fmt::format("{:.3f} {:.3f} {:.3f} {} {} {}\n", scan.points[i].x, scan.points[i].y, scan.points[i].z, (int)scan.kinds[i], (int)scan.trees[i], 0);
-          std::ofstream p(fmt::format("{}/{}_{}_{}.part", out, seed, n, ground));
-          for (std::size_t k = 0; k < pts.size(); ++k) p << fmt::format("{:.3f} {:.3f} {:.3f} {} {} {}\n", pts[k].x, pts[k].y, pts[k].z, (int)parted.tree[k], (int)parted.low[k], (int)scan.trees[id2[k]]);
-        }
-    }
-    fmt::print("mean {:.4f}\n", sum / cnt);
-    return 0;
-  }
-  for (int ground = 1; ground >= 0; --ground)
-  for (double slope : {0.0, 0.2, 0.5})
-    for (double bumps : {0.02, 0.15})
-      for (std::size_t n : {15000, 60000}) 
-      for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-        const auto scan = test::scan_scene({.trees = 1 + seed, .points = n, .ground = ground == 1, .slope = slope, .bumps = bumps, .wall = seed == 2, .bushes = 3, .random_seed = seed});
-        Stopwatch w;
-        const Ground g = find_ground(scan.points, {});
-        std::size_t both = 0, said = 0, truly = 0, tree = 0, trees = 0, wall = 0, bush = 0;
-        for (std::size_t i = 0; i < scan.points.size(); ++i) {
-          const bool is = scan.kinds[i] == test::ScenePoint::ground;
-          both += is && g.is_ground[i]; said += g.is_ground[i]; truly += is;
-          tree += scan.kinds[i] == test::ScenePoint::tree && g.is_ground[i];
-          trees += scan.kinds[i] == test::ScenePoint::tree;
-          wall += scan.kinds[i] == test::ScenePoint::wall && g.is_ground[i];
-          bush += scan.kinds[i] == test::ScenePoint::bush && g.is_ground[i];
-        }
-        fmt::print("ground {} slope {} bumps {} n {} seed {}: found {} cell {:.3f} noise {:.4f} P {:.4f} R {:.4f} of {} ({}); tree {}/{} wall {} bush {}  {:.2f} s\n", ground, slope, bumps, scan.points.size(), seed, g.found, g.surface.cell, g.noise, said ? double(both) / said : 1, truly ? double(both) / truly : 1, truly, said, tree, trees, wall, bush, w.seconds());
+        if (!rows.empty()) print_row(fmt::format("mean, {} leaves", leaf_count), count, mean(rows));
       }
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bench_tree_scene: {}\n", error.what());
+    return 1;
+  }
+  return 0;
 }

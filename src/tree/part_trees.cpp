@@ -61,10 +61,10 @@ class Parting {
     result.tree.assign(points_.size(), kNone);
     result.low.assign(points_.size(), 0);
     if (stems_.empty()) return result;
-    for (const Stem& stem : stems_) result.base.push_back(stem.lowest);
     find_low_plants(result.low);
     context.check();
     walk(result.low, result.tree);
+    result.base = find_bases(result.tree);
     return result;
   }
 
@@ -195,9 +195,10 @@ class Parting {
   }
 
   bool at_a_stem(const Vec3& p) const {
-    return std::any_of(stems_.begin(), stems_.end(), [&](const Stem& stem) {
-      return std::hypot(p.x - stem.centre.x, p.y - stem.centre.y) <= kFlare * stem.radius;
-    });
+    return std::any_of(stems_.begin(), stems_.end(), [&](const Stem& stem) { return is_at(stem, p); });
+  }
+  static bool is_at(const Stem& stem, const Vec3& p) {
+    return std::hypot(p.x - stem.centre.x, p.y - stem.centre.y) <= kFlare * stem.radius;
   }
 
   void walk(const std::vector<char>& low, std::vector<Index>& tree) const {
@@ -205,6 +206,16 @@ class Parting {
     for (std::size_t s = 0; s < stems_.size(); ++s)
       for (const Index i : stems_[s].points) sources.emplace_back(i, static_cast<Index>(s));
     dijkstra(sources, kFar * size_, low, tree);
+  }
+
+  // The lowest points of the trees at their stems.
+  std::vector<Index> find_bases(const std::vector<Index>& tree) const {
+    std::vector<Index> base;
+    for (const Stem& stem : stems_) base.push_back(stem.lowest);
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      if (const Index t = tree[i]; t != kNone && is_at(stems_[t], points_[i]) && heights_[i] < heights_[base[t]])
+        base[t] = static_cast<Index>(i);
+    return base;
   }
 
   // Sums of squared steps from sources (point, label), of steps up to `longest`; `barred` points are not entered.

@@ -16,10 +16,10 @@ struct PartedTrees {
 
 // Stems are what holds out: as a level rises through the scan, parts that hang together grow and join, and a stem is a
 // part that comes up near the ground, is narrow and joins another one only much higher (topological persistence;
-// Edelsbrunner, Letscher and Zomorodian 2002). Each point then goes to the stem whose way to it is cheapest, by the sum
-// of squared steps as in growth.h, over the metabolic size of the tree (Tao et al., Segmenting tree crowns from
-// terrestrial and mobile LiDAR data by exploring ecological theories, ISPRS J. 110, 2015): crowns that touch are parted
-// where neither is nearer. What stands near the ground and is no stem takes part, as low plants.
+// Edelsbrunner, Letscher and Zomorodian 2002). Each point then goes to the stem whose way to it is cheapest, as in Tao
+// et al., Segmenting tree crowns from terrestrial and mobile LiDAR data by exploring ecological theories, ISPRS J. 110,
+// 2015, but by the sum of squared steps (growth.h), and alike for thick and thin stems: crowns that touch are parted.
+// What stands near the ground and is no stem takes part, as low plants.
 //
 // `points` are distinct. `heights` are those above the ground, if that is known, else above the lowest point. The same
 // for any number of threads.

@@ -18,6 +18,7 @@
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
 #include "tree/refine.h"
+#include "tree/scene.h"
 #include "tree/skeleton.h"
 
 namespace bisector {
@@ -45,12 +46,20 @@ struct Scan {
   double unit = 1;  // length in the input of 1 here
 };
 
-void check_options(const TreeOptions& options) {
+void check_options(const std::vector<Vec3>& points, const TreeOptions& options) {
   if (!(options.delta > 0 && options.delta < 1))
     throw Error(fmt::format("delta is {}; give a number above 0 and below 1", options.delta));
   if (!(options.tip_radius >= 0 && std::isfinite(options.tip_radius)))
     throw Error(fmt::format("the tips' radius is {}; give a positive length, or 0", options.tip_radius));
   if (std::isnan(options.ground)) throw Error("the ground's height is not a number; give its z");
+  if (!options.classes.empty() && options.classes.size() != points.size())
+    throw Error(fmt::format("{} classes for {} points; give one for each", options.classes.size(), points.size()));
+  if (options.scene && options.components == TreeComponents::separate)
+    throw Error("the trees of a scene are told from each other; leave their components bridged");
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(points[i][k]))
+        throw Error(fmt::format("point {}: a coordinate is not finite; remove the point", i));
 }
 
 bool on_one_line(const std::vector<Vec3>& points) {
@@ -67,9 +76,6 @@ Scan prepare(const std::vector<Vec3>& input, const TreeOptions& options, TreeRes
   scan.of_input.assign(input.size(), kNone);
   std::vector<Index> order;
   for (std::size_t i = 0; i < input.size(); ++i) {
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(input[i][k]))
-        throw Error(fmt::format("point {}: a coordinate is not finite; remove the point", i));
     if (input[i].z < options.ground) ++result.ground_points;
     else order.push_back(static_cast<Index>(i));
   }
@@ -115,7 +121,7 @@ void warn_of_ground(const Scan& scan, const Context& context) {
   if (kPlateShare * low.size() > scan.points.size() && wide > kPlateWidth * std::max(box.hi.x, box.hi.y))
     context.warn(
         fmt::format("the lowest 2 % of the height hold {} of {} points, as wide as the tree: if they are the "
-                    "ground, give its height",
+                    "ground, have it found or give its height",
                     low.size(), scan.points.size()));
 }
 
@@ -125,7 +131,8 @@ struct Network {
   std::vector<Index> lowest;  // point of each tree
 };
 
-Network connect(const Scan& scan, const TreeOptions& options, TreeResult& result) {
+// The root is a point of the scan, kNone: the lowest.
+Network connect(const Scan& scan, const TreeOptions& options, Index root, TreeResult& result) {
   Network network;
   network.graph = build_point_graph(scan.points);
   result.components = network.graph.components;
@@ -146,7 +153,7 @@ Network connect(const Scan& scan, const TreeOptions& options, TreeResult& result
       result.bridges.push_back(scan.unit * b.length);
     }
     network.neighbours = add_edges(network.neighbours, edges);
-    network.lowest = {*std::min_element(lowest.begin(), lowest.end(), higher)};
+    network.lowest = {root != kNone ? root : *std::min_element(lowest.begin(), lowest.end(), higher)};
     return network;
   }
   for (std::size_t c = 0; c < size.size(); ++c) {
@@ -269,10 +276,10 @@ void loft(const std::vector<Limb>& limbs, TreeResult& result) {
       1);
 }
 
-}  // namespace
-
-TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
-  check_options(options);
+// All points as one tree, or its parts as one each. `root` is the number of the point that it grows from, kNone: the
+// lowest.
+TreeResult reconstruct(const std::vector<Vec3>& points, const TreeOptions& options, Index root,
+                       const Context& context) {
   TreeResult result;
   Stopwatch watch;
   const auto phase = [&](const char* name, double fraction) {
@@ -281,8 +288,8 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   };
   phase("connecting points", 0);
   const Scan scan = prepare(points, options, result);
-  if (result.ground_points == 0) warn_of_ground(scan, context);
-  const Network network = connect(scan, options, result);
+  if (result.ground_points == 0 && root == kNone) warn_of_ground(scan, context);
+  const Network network = connect(scan, options, root == kNone ? kNone : scan.of_input[root], result);
   result.seconds.graph = watch.lap();
 
   phase("clusters", 0.15);
@@ -331,6 +338,154 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
     }
   result.seconds.surfaces = watch.lap();
   result.seconds.total = watch.seconds();
+  return result;
+}
+
+void offset(std::vector<Index>& values, std::size_t by) {
+  for (Index& v : values)
+    if (v != kNone) v += static_cast<Index>(by);
+}
+
+// Adds the tree of the points `ids`.
+void append(TreeResult tree, const std::vector<Index>& ids, TreeResult& result) {
+  const auto branches = static_cast<Index>(result.branches.size()), nodes = static_cast<Index>(result.skeleton.size());
+  offset(tree.cluster, result.clusters);
+  offset(tree.branch, branches);
+  for (std::size_t k = 0; k < ids.size(); ++k) {
+    result.cluster[ids[k]] = tree.cluster[k];
+    result.branch[ids[k]] = tree.branch[k];
+    if (!tree.leaf.empty()) result.leaf[ids[k]] = tree.leaf[k];
+  }
+  for (TreeNode& node : tree.skeleton) {
+    if (node.parent != kNone) node.parent += nodes;
+    node.branch += branches;
+    result.skeleton.push_back(node);
+  }
+  for (TreeBranch& branch : tree.branches) {
+    offset(branch.nodes, nodes);
+    if (branch.parent != kNone) branch.parent += branches;
+    result.branches.push_back(std::move(branch));
+  }
+  if (branches == 0) {
+    result.pipe_exponent = tree.pipe_exponent;
+    result.pipe_fitted = tree.pipe_fitted;
+    result.noise = tree.noise;
+  }
+  result.bridges.insert(result.bridges.end(), tree.bridges.begin(), tree.bridges.end());
+  for (const auto count : {&TreeResult::clusters, &TreeResult::fixed_clusters, &TreeResult::components,
+                           &TreeResult::duplicate_points, &TreeResult::small_component_points,
+                           &TreeResult::leaf_points, &TreeResult::unexplained_points})
+    result.*count += tree.*count;
+  for (const auto seconds : {&TreeSeconds::graph, &TreeSeconds::clusters, &TreeSeconds::skeleton, &TreeSeconds::refine,
+                             &TreeSeconds::surfaces})
+    result.seconds.*seconds += tree.seconds.*seconds;
+}
+
+// What follows from the branches of each trunk and their points.
+std::vector<ScannedTree> describe_trees(const std::vector<Vec3>& points, const TreeResult& result) {
+  std::vector<ScannedTree> trees;
+  std::vector<std::size_t> tree_of(result.branches.size());
+  for (std::size_t b = 0; b < result.branches.size(); ++b) {
+    const TreeBranch& branch = result.branches[b];
+    tree_of[b] = branch.parent == kNone ? trees.size() : tree_of[branch.parent];
+    if (branch.parent == kNone) {
+      trees.emplace_back();
+      trees.back().trunk = static_cast<Index>(b);
+      trees.back().base = result.skeleton[branch.nodes.front()].position;
+      trees.back().noise = result.noise;
+      trees.back().pipe_exponent = result.pipe_exponent;
+      trees.back().pipe_fitted = result.pipe_fitted;
+    }
+    ScannedTree& tree = trees[tree_of[b]];
+    ++tree.branches;
+    tree.points += branch.points;
+    tree.length += branch.length;
+    tree.volume += branch.volume;
+    tree.area += branch.area;
+  }
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  std::vector<double> low(trees.size(), kFar), high(trees.size(), -kFar);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (result.branch[i] == kNone) continue;
+    const std::size_t t = tree_of[result.branch[i]];
+    low[t] = std::min(low[t], points[i].z);
+    high[t] = std::max(high[t], points[i].z);
+  }
+  for (std::size_t t = 0; t < trees.size(); ++t) trees[t].height = std::max(high[t] - low[t], 0.0);
+  return trees;
+}
+
+// Says which of several trees is at work.
+Context context_of_tree(const Context& context, std::size_t tree, std::size_t trees) {
+  constexpr double kBefore = 0.1;  // share of the run
+  Context own = context;
+  if (context.progress)
+    own.progress = [&context, tree, trees](Progress p) {
+      if (trees > 1) p.phase = fmt::format("tree {}/{}: {}", tree + 1, trees, p.phase);
+      p.fraction = kBefore + (1 - kBefore) * (static_cast<double>(tree) + p.fraction) / static_cast<double>(trees);
+      context.report(p);
+    };
+  return own;
+}
+
+// The trees of what the points show.
+TreeResult reconstruct_scene(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
+  TreeResult result;
+  Stopwatch watch;
+  context.check();
+  context.report({.phase = options.scene ? "ground, walls and trees" : "ground", .fraction = 0});
+  SceneDivision division = divide_scene(points, options, context);
+  result.seconds.scene = watch.lap();
+  result.cluster.assign(points.size(), kNone);
+  result.branch.assign(points.size(), kNone);
+  if (options.leaves == TreeLeaves::apart) result.leaf.assign(points.size(), 0);
+
+  TreeOptions of_tree = options;
+  of_tree.ground = -std::numeric_limits<double>::infinity();
+  const std::size_t trees = division.base.size();
+  std::vector<std::vector<Index>> ids(trees);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (const Index t = division.tree[i]; t != kNone) ids[t].push_back(static_cast<Index>(i));
+  for (std::size_t t = 0; t < trees; ++t) {
+    std::vector<Vec3> own;
+    for (const Index i : ids[t]) own.push_back(points[i]);
+    const auto root = std::lower_bound(ids[t].begin(), ids[t].end(), division.base[t]) - ids[t].begin();
+    TreeResult tree = reconstruct(own, of_tree, division.base[t] == kNone ? kNone : static_cast<Index>(root),
+                                  context_of_tree(context, t, trees));
+    for (ScannedTree found : describe_trees(own, tree)) {
+      found.trunk += static_cast<Index>(result.branches.size());
+      found.ground = division.ground_at(found.base);
+      if (!std::isnan(found.ground)) {
+        double top = found.ground;
+        for (const Vec3& p : own) top = std::max(top, p.z);
+        found.height = top - found.ground;
+      }
+      result.trees.push_back(found);
+    }
+    append(std::move(tree), ids[t], result);
+  }
+  const auto count = [&](ScanPart part) {
+    return static_cast<std::size_t>(std::count(division.part.begin(), division.part.end(), part));
+  };
+  result.ground_points = count(ScanPart::ground);
+  result.walls = division.walls;
+  result.wall_points = count(ScanPart::wall);
+  result.low_plant_points = count(ScanPart::low_plant);
+  result.stray_points = count(ScanPart::stray);
+  result.ground_noise = division.ground_noise;
+  result.part = std::move(division.part);
+  if (options.scene) result.tree = std::move(division.tree);
+  result.seconds.total = watch.seconds();
+  return result;
+}
+
+}  // namespace
+
+TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
+  check_options(points, options);
+  if (options.find_ground || options.scene) return reconstruct_scene(points, options, context);
+  TreeResult result = reconstruct(points, options, kNone, context);
+  result.trees = describe_trees(points, result);
   return result;
 }
 

@@ -70,13 +70,14 @@ class Terrain {
 struct Echo {
   Vec3 point;
   ScenePoint kind = ScenePoint::tree;
-  Index branch = kNone;  // of all trees
+  Index branch = kNone, leaf = kNone;  // of all trees
 };
 
 struct Scene {
   const SceneScanOptions& options;
   Terrain terrain;
-  TreeScene solids;  // trees and the leaves of bushes
+  TreeScene solids;  // branches, leaves of trees and of bushes
+  std::size_t tree_leaves = 0;
   double first = 0, last = 0;        // along the street, x
   double street = 0, wall = 0, far = 0;  // y
 
@@ -85,13 +86,14 @@ struct Scene {
         unit(direction + 0.5 * options.divergence * std::sqrt(random.unit()) * across(direction, random.range(0, 2 * kPi)));
     const SceneHit hit = solids.first_hit(origin, drawn);
     double range = hit.range;
-    echo.kind = hit.leaf != kNone ? ScenePoint::bush : ScenePoint::tree;
+    echo.kind = hit.leaf != kNone && hit.leaf >= tree_leaves ? ScenePoint::bush : ScenePoint::tree;
     echo.branch = hit.branch;
+    echo.leaf = hit.leaf;
     const auto nearer = [&](double other, ScenePoint kind) {
       if (!(other < range)) return;
       range = other;
       echo.kind = kind;
-      echo.branch = kNone;
+      echo.branch = echo.leaf = kNone;
     };
     if (options.wall && drawn.y > 0) {
       const double to_wall = (wall - origin.y) / drawn.y;
@@ -130,7 +132,7 @@ TreeScan SceneScan::tree_alone(Index tree) const {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (trees[i] != tree) continue;
     scan.points.push_back(points[i]);
-    scan.kinds.push_back(PointKind::wood);
+    scan.kinds.push_back(point_branches[i] == kNone ? PointKind::leaf : PointKind::wood);
     scan.point_branches.push_back(point_branches[i]);
   }
   scan.branches = branches[tree];
@@ -156,6 +158,8 @@ SceneScan scan_scene(const SceneScanOptions& options) {
     TreeGrowth growth = varied_growth(random.next());
     growth.base = on_ground(x, random.range(-0.5, 0.5));
     scan.branches.push_back(grow_tree(growth, random));
+    const std::vector<LeafDisc> own = grow_leaves(scan.branches.back(), options.leaves, random);
+    leaves.insert(leaves.end(), own.begin(), own.end());
     breadth = std::max(breadth, kBreadth * growth.height);
     const auto first = static_cast<Index>(all.size());
     for (std::size_t b = 0; b < scan.branches.back().size(); ++b) {
@@ -167,6 +171,7 @@ SceneScan scan_scene(const SceneScanOptions& options) {
     }
     if (t + 1 < options.trees) x += options.apart * random.range(0.8, 1.2);
   }
+  const std::size_t tree_leaves = leaves.size();
   for (std::size_t k = 0; k < options.bushes; ++k)
     add_bush(on_ground(random.range(-1, x + 1), random.range(-1.5, 1.5)), random, leaves);
 
@@ -174,6 +179,7 @@ SceneScan scan_scene(const SceneScanOptions& options) {
   const Scene scene{.options = options,
                     .terrain = terrain,
                     .solids = TreeScene(all, leaves),
+                    .tree_leaves = tree_leaves,
                     .first = -breadth - kMargin,
                     .last = x + breadth + kMargin,
                     .street = -distance,
@@ -205,8 +211,11 @@ SceneScan scan_scene(const SceneScanOptions& options) {
   for (const Echo& echo : scan_with(step)) {
     scan.points.push_back(echo.point);
     scan.kinds.push_back(echo.kind);
-    scan.trees.push_back(echo.kind == ScenePoint::tree ? name[echo.branch].first : kNone);
-    scan.point_branches.push_back(echo.kind == ScenePoint::tree ? name[echo.branch].second : kNone);
+    const bool is_wood = echo.branch != kNone, is_leaf = echo.kind == ScenePoint::tree && !is_wood;
+    scan.trees.push_back(is_wood   ? name[echo.branch].first
+                         : is_leaf ? static_cast<Index>(echo.leaf / options.leaves)
+                                   : kNone);
+    scan.point_branches.push_back(is_wood ? name[echo.branch].second : kNone);
   }
   scan.beam = 0.5 * options.divergence * (distance + breadth);
   return scan;

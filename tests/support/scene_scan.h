@@ -19,6 +19,7 @@ struct SceneScanOptions {
   double slope = 0.1;            // rise of the ground over its length, in any direction
   double bumps = 0.08;           // height of its bumps, 2 to 6 m long
   bool wall = false;             // along the street, 2 to 3.5 m behind the trunks, 6 m high
+  std::size_t leaves = 0;        // on each tree
   std::size_t bushes = 0;        // low plants of 0.4 to 1 m between the trunks
   double noise = 0.008;          // standard deviation of the range
   double divergence = 0.0003;    // of the beam
