@@ -32,6 +32,8 @@ constexpr double kSlender = 4;          // radius of a cluster over its rms from
 constexpr double kAxisTolerance = 0.3;  // distance of fitted axes from the nodes, in the branch's median radius
 constexpr double kLeastTip = 0.3;  // of the base radius: what tolerances of a pointed branch's mesh go by, at least
 
+constexpr double kMostHidden = 0.1;  // of a tree's largest extent: what may be hidden of a trunk above the ground
+
 constexpr double kTipRadius = 3e-4;  // of the thinnest twigs, in the unit cube: 3 mm of a tree of 10 m
 
 // A plate of points at the bottom that is taken for ground: how low, how many of the points, how wide beside the tree.
@@ -276,9 +278,37 @@ void loft(const std::vector<Limb>& limbs, TreeResult& result) {
       1);
 }
 
-// All points as one tree, or its parts as one each. `root` is the number of the point that it grows from, kNone: the
-// lowest.
-TreeResult reconstruct(const std::vector<Vec3>& points, const TreeOptions& options, Index root,
+// Where a tree stands.
+struct Foot {
+  Index root = kNone;                    // number of the point that it grows from; kNone: the lowest
+  const SceneDivision* scene = nullptr;  // that knows the ground, or not
+};
+
+// Trunks begin where their axes meet the ground: those that were led on below it are cut, and those whose foot is not
+// seen are led on down to it, by kMostHidden of the tree's height at most.
+void plant_trunks(const SceneDivision& scene, double height, std::vector<Limb>& limbs) {
+  for (Limb& limb : limbs) {
+    if (limb.parent != kNone || std::isnan(scene.ground_at(limb.axis.front()))) continue;
+    const auto above = [&](const Vec3& p) { return p.z - scene.ground_at(p); };
+    std::size_t first = 0;
+    while (first + 2 < limb.axis.size() && above(limb.axis[first + 1]) <= 0) ++first;
+    const auto erased = static_cast<std::ptrdiff_t>(first);
+    limb.axis.erase(limb.axis.begin(), limb.axis.begin() + erased);
+    limb.radii.erase(limb.radii.begin(), limb.radii.begin() + erased);
+    limb.fitted.erase(limb.fitted.begin(), limb.fitted.begin() + erased);
+    const double low = above(limb.axis[0]), high = above(limb.axis[1]);
+    if (low < 0 && high > 0) {
+      const double t = low / (low - high);
+      limb.axis[0] += t * (limb.axis[1] - limb.axis[0]);
+      limb.radii[0] += t * (limb.radii[1] - limb.radii[0]);
+    } else if (low > 0 && low <= kMostHidden * height && high > low) {
+      limb.axis[0] -= low / (high - low) * (limb.axis[1] - limb.axis[0]);
+    }
+  }
+}
+
+// All points as one tree, or its parts as one each.
+TreeResult reconstruct(const std::vector<Vec3>& points, const TreeOptions& options, const Foot& foot,
                        const Context& context) {
   TreeResult result;
   Stopwatch watch;
@@ -288,8 +318,8 @@ TreeResult reconstruct(const std::vector<Vec3>& points, const TreeOptions& optio
   };
   phase("connecting points", 0);
   const Scan scan = prepare(points, options, result);
-  if (result.ground_points == 0 && root == kNone) warn_of_ground(scan, context);
-  const Network network = connect(scan, options, root == kNone ? kNone : scan.of_input[root], result);
+  if (result.ground_points == 0 && foot.root == kNone) warn_of_ground(scan, context);
+  const Network network = connect(scan, options, foot.root == kNone ? kNone : scan.of_input[foot.root], result);
   result.seconds.graph = watch.lap();
 
   phase("clusters", 0.15);
@@ -320,6 +350,7 @@ TreeResult reconstruct(const std::vector<Vec3>& points, const TreeOptions& optio
     for (Vec3& p : limb.axis) p = scan.origin + scan.unit * p;
     for (double& r : limb.radii) r *= scan.unit;
   }
+  if (foot.scene) plant_trunks(*foot.scene, scan.unit, limbs);
   describe_branches(limbs, result);
   loft(limbs, result);
   result.noise = scan.unit * noise;
@@ -449,9 +480,10 @@ TreeResult reconstruct_scene(const std::vector<Vec3>& points, const TreeOptions&
   for (std::size_t t = 0; t < trees; ++t) {
     std::vector<Vec3> own;
     for (const Index i : ids[t]) own.push_back(points[i]);
-    const auto root = std::lower_bound(ids[t].begin(), ids[t].end(), division.base[t]) - ids[t].begin();
-    TreeResult tree = reconstruct(own, of_tree, division.base[t] == kNone ? kNone : static_cast<Index>(root),
-                                  context_of_tree(context, t, trees));
+    Foot foot{kNone, &division};
+    if (const Index base = division.base[t]; base != kNone)
+      foot.root = static_cast<Index>(std::lower_bound(ids[t].begin(), ids[t].end(), base) - ids[t].begin());
+    TreeResult tree = reconstruct(own, of_tree, foot, context_of_tree(context, t, trees));
     for (ScannedTree found : describe_trees(own, tree)) {
       found.trunk += static_cast<Index>(result.branches.size());
       found.ground = division.ground_at(found.base);
@@ -484,7 +516,7 @@ TreeResult reconstruct_scene(const std::vector<Vec3>& points, const TreeOptions&
 TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
   check_options(points, options);
   if (options.find_ground || options.scene) return reconstruct_scene(points, options, context);
-  TreeResult result = reconstruct(points, options, kNone, context);
+  TreeResult result = reconstruct(points, options, {}, context);
   result.trees = describe_trees(points, result);
   return result;
 }

@@ -19,7 +19,7 @@ constexpr double kMargin = 3;            // of the ground around the trees, m
 constexpr double kWallHeight = 6;        // m
 constexpr double kBreadth = 0.45;        // of a crown to one side, of the tree's height: wide enough for all
 constexpr std::size_t kBushLeaves = 250;
-constexpr std::size_t kPilotPulses = 40'000;
+constexpr std::size_t kPilotPulses = 10'000;
 constexpr std::size_t kGrain = 4096;  // pulses of a chunk
 
 // A plane with bumps: the same formula everywhere, so that rays can be traced.
