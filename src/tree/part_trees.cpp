@@ -24,8 +24,10 @@ constexpr double kStoutest = 0.05;    // radius of a trunk, at most
 constexpr double kLowPlant = 0.2;     // height of low plants, at most
 constexpr double kFar = 0.15;         // a step to what belongs to no tree
 constexpr double kLinkSpacings = 6;   // kLink in the median distance of neighbours, at least
-constexpr double kSteepest = 0.5;     // slope of a ground that is not known
-constexpr double kLean = 0.5;         // of a stem whose lower part is hidden: what is above another stem is its own
+constexpr double kSteepest = 0.2;     // slope of a ground that is not known
+constexpr double kLean = 0.5;         // tangent of a stem's angle off the vertical, at most
+constexpr double kBeside = 2;         // radii of a stem, off its middle
+constexpr std::size_t kSteps = 5;     // of height, in which it shows
 constexpr double kFlare = 3;          // radii of the stem that its base spreads to
 constexpr std::size_t kLeastPoints = 8;  // of a stem
 
@@ -38,6 +40,7 @@ struct Stem {
   Index lowest = kNone;
   Vec3 centre;
   double radius = 0;
+  bool rises = false;         // steeply, at every height over which a stem stands by itself
   std::vector<Index> points;  // of its lowest part
 };
 
@@ -108,7 +111,7 @@ class Parting {
       const Index low = minimum.point;
       if (minimum.held - heights_[low] < kHolding * size_ || !is_low(low)) continue;
       Stem stem = stem_from(low);
-      if (stem.points.size() < kLeastPoints || stem.radius > kStoutest * size_ || continues(stem)) continue;
+      if (!stem.rises || stem.points.size() < kLeastPoints || stem.radius > kStoutest * size_ || continues(stem)) continue;
       stems_.push_back(std::move(stem));
     }
   }
@@ -117,7 +120,7 @@ class Parting {
     if (ground_is_known_ || stems_.empty()) return heights_[i] < kLow * size_ + lowest();
     return std::any_of(stems_.begin(), stems_.end(), [&](const Stem& stem) {
       const Vec3 way = points_[i] - stem.centre;
-      return heights_[i] - heights_[stem.lowest] <= kLow * size_ + kSteepest * std::hypot(way.x, way.y);
+      return heights_[i] - heights_[stem.lowest] <= kLevel * size_ + kSteepest * std::hypot(way.x, way.y);
     });
   }
   double lowest() const { return ground_is_known_ ? 0 : *std::min_element(heights_.begin(), heights_.end()); }
@@ -149,6 +152,7 @@ class Parting {
     // Its lower part tells where it is and how thick: boughs may begin soon.
     std::sort(stem.points.begin(), stem.points.end(),
               [&](Index a, Index b) { return std::pair(heights_[a], a) < std::pair(heights_[b], b); });
+    const std::vector<Index> all = stem.points;
     if (stem.points.size() > kLeastPoints) stem.points.resize(std::max(kLeastPoints, stem.points.size() / 4));
     std::vector<double> x, y, off;
     for (const Index i : stem.points) {
@@ -158,6 +162,14 @@ class Parting {
     stem.centre = {quantile(x, 0.5), quantile(y, 0.5), points_[low].z};
     for (std::size_t k = 0; k < x.size(); ++k) off.push_back(std::hypot(x[k] - stem.centre.x, y[k] - stem.centre.y));
     stem.radius = quantile(off, 0.75);
+    std::vector<char> occupied(kSteps, 0);
+    for (const Index i : all) {
+      const double up = heights_[i] - heights_[low];
+      const double away = std::hypot(points_[i].x - stem.centre.x, points_[i].y - stem.centre.y);
+      const auto step = std::min(kSteps - 1, static_cast<std::size_t>(up / (kHolding * size_) * kSteps));
+      if (away <= kBeside * stem.radius + kLean * up) occupied[step] = 1;
+    }
+    stem.rises = std::count(occupied.begin(), occupied.end(), 1) == static_cast<std::ptrdiff_t>(kSteps);
     return stem;
   }
 
