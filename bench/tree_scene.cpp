@@ -1,4 +1,5 @@
-// How well scans of several trees with ground, walls and low plants are divided, and their trees made: generated scenes.
+// How well scans of several trees with ground, walls and low plants are divided, and their trees made: generated
+// scenes.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -25,15 +26,17 @@ using namespace bisector;
 struct Row {
   double trees = 0, found = 0, right_tree = 0, bushes = 0;
   test::Shares ground, wall;
-  double right = 0, alone = 0;                // share of branches with the right parent; made from its points alone
-  double volume = 0, alone_volume = 0;        // mean size of the trees' relative errors
-  double base = 0;                            // mean distance of the bases' heights from the true ones, m
+  double right = 0, alone = 0;          // share of branches with the right parent; made from its points alone
+  double volume = 0, alone_volume = 0;  // mean size of the trees' relative errors
+  double base = 0;                      // mean distance of the bases' heights from the true ones, m
   double scene_seconds = 0, seconds = 0;
 };
 
 const char* const kHead =
-    "| scene | points | trees | found | right tree | ground P | R | wall P | R | bushes in trees | right parent | alone "
-    "| volume | alone | base | s of the division | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+    "| scene | points | trees | found | right tree | ground P | R | wall P | R | bushes in trees | right parent | "
+    "alone "
+    "| volume | alone | base | s of the division | s "
+    "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
 
 void print_row(const std::string& name, std::size_t points, const Row& r) {
   fmt::print(

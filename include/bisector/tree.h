@@ -39,8 +39,8 @@ struct TreeOptions {
   double delta = 0.004;                // a cluster is a cylinder if its points lie so near one, rms, in the unit cube
   std::size_t max_cluster_points = 0;  // larger clusters are split; 0: only those that are no cylinders
   double ground = -std::numeric_limits<double>::infinity();  // points below this height (z) are left out
-  bool find_ground = false;  // find the ground, unless `ground` gives it, and leave it out, with low plants
-  bool scene = false;        // find it, walls and low plants, leave them out, and make each tree for itself
+  bool find_ground = false;           // find the ground, unless `ground` gives it, and leave it out, with low plants
+  bool scene = false;                 // find it, walls and low plants, leave them out, and make each tree for itself
   std::vector<std::uint8_t> classes;  // of each point, of a LAS file (2: ground, 6: building); empty: not known
   TreeComponents components = TreeComponents::bridge;
   TreeLeaves leaves = TreeLeaves::keep;
@@ -127,13 +127,14 @@ struct TreeResult {
   std::size_t ground_points = 0;           // of the ground or below it, left out
   std::size_t walls = 0, wall_points = 0;  // left out
   std::size_t low_plant_points = 0, stray_points = 0;  // left out
-  double ground_noise = 0;  // standard deviation of the ground's points off it, if it was looked for
+  double ground_noise = 0;                 // standard deviation of the ground's points off it, if it was looked for
   std::size_t duplicate_points = 0;        // at the place of another
   std::size_t small_component_points = 0;  // in components too small for a tree of their own, left out
   std::size_t leaf_points = 0;             // with TreeLeaves::apart, left out
   std::size_t unexplained_points = 0;      // near no branch: strays, and leaves where they are not left out
   // p of the pipe model: at a fork r^p of what comes in is the sum over what goes out. `pipe_fitted`: from this tree's
-  // radii that rest on points; else there were too few, and it is 2.3. Of a scene, like `noise`, that of the first tree.
+  // radii that rest on points; else there were too few, and it is 2.3. Of a scene, like `noise`, that of the first
+  // tree.
   double pipe_exponent = 0;
   bool pipe_fitted = false;
   double noise = 0;  // standard deviation of points off thick branches
@@ -144,9 +145,9 @@ struct TreeResult {
 // are not finite, fewer than 20 distinct points (above the ground), points that all lie on one line, options out of
 // range, points that are all ground and, of a scene, where no tree is found.
 //
-// A scan whose ground is looked for and not found, since it is cut off, gives the result that it gives without. Trees of
-// a scene come by their number of points, largest first, and `components` is bridge; the branches of each follow each
-// other.
+// A scan whose ground is looked for and not found, since it is cut off, gives the result that it gives without. Trees
+// of a scene come by their number of points, largest first, and `components` is bridge; the branches of each follow
+// each other.
 BISECTOR_API TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options = {},
                                          const Context& context = {});
 

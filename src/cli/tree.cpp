@@ -271,20 +271,18 @@ std::string tree_line(std::size_t number, const ScannedTree& tree) {
 
 void print_summary(Console& console, const TreeCommand& command, const std::vector<Vec3>& points,
                    const TreeResult& tree, const Measures& measures, const Json& seconds) {
-  console.print(
-      fmt::format("input      {}: {} in {}{}", command.input, counted(points.size(), "point", "points"),
-                  counted(tree.components, "component", "components"),
-                  tree.part.empty() && tree.ground_points > 0
-                      ? fmt::format("; {} below the ground left out", tree.ground_points)
-                      : ""));
+  console.print(fmt::format("input      {}: {} in {}{}", command.input, counted(points.size(), "point", "points"),
+                            counted(tree.components, "component", "components"),
+                            tree.part.empty() && tree.ground_points > 0
+                                ? fmt::format("; {} below the ground left out", tree.ground_points)
+                                : ""));
   if (!tree.part.empty())
     console.print(fmt::format("left out   {} of the ground, {} of {}, {} of low plants, {} strays", tree.ground_points,
                               tree.wall_points, counted(tree.walls, "wall", "walls"), tree.low_plant_points,
                               tree.stray_points));
   console.print(
       fmt::format("clusters   {}, {} of them cylinders; noise {:.3g}", tree.clusters, tree.fixed_clusters, tree.noise));
-  for (std::size_t t = 0; !tree.tree.empty() && t < tree.trees.size(); ++t)
-    console.print(tree_line(t, tree.trees[t]));
+  for (std::size_t t = 0; !tree.tree.empty() && t < tree.trees.size(); ++t) console.print(tree_line(t, tree.trees[t]));
   console.print(fmt::format(
       "tree       {} of order 0 to {}; {} in all", counted(tree.branches.size(), "branch", "branches"), measures.order,
       fmt::format("length {:.4g}, volume {:.4g}, area {:.4g}", measures.length, measures.volume, measures.area)));
@@ -368,7 +366,7 @@ Command add_tree(CLI::App& program) {
                               "bisector tree POINTS -o OUT [options]",
                               "Examples:\n"
                               "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
-                                              "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n"
+                              "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n"
                               "  bisector tree street.las -o trees.obj --scene --cylinders trees.csv\n\n"
                               "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
                               "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written.");

@@ -15,17 +15,17 @@
 namespace bisector {
 namespace {
 
-constexpr double kCoarsest = 8;         // cells along the scan, of the first plate
-constexpr double kPointsPerCell = 4;    // of the last one, on average
-constexpr double kMostCells = 128;      // along the scan
-constexpr double kRise = 0.5;           // of a cell: points higher above the last plate don't carry the next one
-constexpr int kRounds = 10;             // of fitting with new weights
-constexpr double kPlateStiffness = 0.1; // of second differences, beside the pull of a point; where cells have one each
-constexpr double kStiffness = 1;        // where all points pull
-constexpr double kAbove = 2.5;          // deviations above the plate at which a point counts half
-constexpr double kBand = 3;             // deviations off it, of the ground's points
+constexpr double kCoarsest = 8;          // cells along the scan, of the first plate
+constexpr double kPointsPerCell = 4;     // of the last one, on average
+constexpr double kMostCells = 128;       // along the scan
+constexpr double kRise = 0.5;            // of a cell: points higher above the last plate don't carry the next one
+constexpr int kRounds = 10;              // of fitting with new weights
+constexpr double kPlateStiffness = 0.1;  // of second differences, beside the pull of a point; where cells have one each
+constexpr double kStiffness = 1;         // where all points pull
+constexpr double kAbove = 2.5;           // deviations above the plate at which a point counts half
+constexpr double kBand = 3;              // deviations off it, of the ground's points
 constexpr std::size_t kLocalPoints = 10;  // that tell the noise around them
-constexpr double kLone = 10;            // distance from the fourth neighbour, in the median one: strays carry no plate
+constexpr double kLone = 10;  // distance from the fourth neighbour, in the median one: strays carry no plate
 constexpr std::size_t kLonePoints = 4;
 constexpr std::uint8_t kGroundClass = 2;  // of LAS
 
@@ -221,9 +221,8 @@ std::vector<double> local_noise(const std::vector<Vec3>& points, const std::vect
       blocks.size(),
       [&](std::size_t b) {
         std::vector<double> around;
-        blocks.visit_around(b, 1, [&](std::size_t other) {
-          around.insert(around.end(), below[other].begin(), below[other].end());
-        });
+        blocks.visit_around(
+            b, 1, [&](std::size_t other) { around.insert(around.end(), below[other].begin(), below[other].end()); });
         if (around.size() >= kLocalPoints) result[b] = deviation_below(around);
       },
       256);
@@ -252,8 +251,7 @@ std::vector<char> blocks_of_ground(const std::vector<Vec3>& points, const std::v
   DisjointSets<> sets(blocks.size());
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const Content& content = contents[b];
-    const auto quarters =
-        static_cast<std::size_t>(std::count(content.quarters.begin(), content.quarters.end(), 1));
+    const auto quarters = static_cast<std::size_t>(std::count(content.quarters.begin(), content.quarters.end(), 1));
     shows[b] = content.layer >= std::max(kLeastPoints, content.over) && quarters >= kLeastQuarters &&
                kBand * noise[b] < kThin * blocks.width();
     if (!shows[b]) continue;
@@ -315,8 +313,7 @@ Ground find_ground(const std::vector<Vec3>& points, const std::vector<std::uint8
     cell = std::max(cell, finest);
     HeightField next = make_field(box, cell);
     std::vector<Vec3> low = lowest_of_cells(carriers, next);
-    if (field.cell > 0)
-      std::erase_if(low, [&](const Vec3& p) { return p.z - field.at(p.x, p.y) > kRise * cell; });
+    if (field.cell > 0) std::erase_if(low, [&](const Vec3& p) { return p.z - field.at(p.x, p.y) > kRise * cell; });
     fit_from_below(low, kPlateStiffness, least, next);
     field = std::move(next);
     if (cell == finest) break;

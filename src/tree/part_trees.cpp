@@ -16,19 +16,19 @@ namespace bisector {
 namespace {
 
 // Lengths in the height of the highest point.
-constexpr double kLink = 0.025;       // steps so long hang together, at most
-constexpr double kLevel = 0.05;       // above a known ground, where stems are looked for: below there may be grass
-constexpr double kLow = 0.15;         // height in which stems come up
-constexpr double kHolding = 0.1;      // height over which a stem stands by itself
-constexpr double kStoutest = 0.05;    // radius of a trunk, at most
-constexpr double kLowPlant = 0.2;     // height of low plants, at most
-constexpr double kFar = 0.15;         // a step to what belongs to no tree
-constexpr double kLinkSpacings = 6;   // kLink in the median distance of neighbours, at least
-constexpr double kSteepest = 0.2;     // slope of a ground that is not known
-constexpr double kLean = 0.5;         // tangent of a stem's angle off the vertical, at most
-constexpr double kBeside = 2;         // radii of a stem, off its middle
-constexpr std::size_t kSteps = 5;     // of height, in which it shows
-constexpr double kFlare = 3;          // radii of the stem that its base spreads to
+constexpr double kLink = 0.025;          // steps so long hang together, at most
+constexpr double kLevel = 0.05;          // above a known ground, where stems are looked for: below there may be grass
+constexpr double kLow = 0.15;            // height in which stems come up
+constexpr double kHolding = 0.1;         // height over which a stem stands by itself
+constexpr double kStoutest = 0.05;       // radius of a trunk, at most
+constexpr double kLowPlant = 0.2;        // height of low plants, at most
+constexpr double kFar = 0.15;            // a step to what belongs to no tree
+constexpr double kLinkSpacings = 6;      // kLink in the median distance of neighbours, at least
+constexpr double kSteepest = 0.2;        // slope of a ground that is not known
+constexpr double kLean = 0.5;            // tangent of a stem's angle off the vertical, at most
+constexpr double kBeside = 2;            // radii of a stem, off its middle
+constexpr std::size_t kSteps = 5;        // of height, in which it shows
+constexpr double kFlare = 3;             // radii of the stem that its base spreads to
 constexpr std::size_t kLeastPoints = 8;  // of a stem
 
 struct Minimum {
@@ -111,7 +111,8 @@ class Parting {
       const Index low = minimum.point;
       if (minimum.held - heights_[low] < kHolding * size_ || !is_low(low)) continue;
       Stem stem = stem_from(low);
-      if (!stem.rises || stem.points.size() < kLeastPoints || stem.radius > kStoutest * size_ || continues(stem)) continue;
+      if (!stem.rises || stem.points.size() < kLeastPoints || stem.radius > kStoutest * size_ || continues(stem))
+        continue;
       stems_.push_back(std::move(stem));
     }
   }

@@ -17,7 +17,7 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kLeastPoints = 20;   // of a tree
+constexpr std::size_t kLeastPoints = 20;    // of a tree
 constexpr std::uint8_t kBuildingClass = 6;  // of LAS
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
@@ -42,8 +42,8 @@ class Division {
     }
     if (std::count(result_.part.begin(), result_.part.end(), ScanPart::ground) ==
         static_cast<std::ptrdiff_t>(points_.size()))
-      throw Error(fmt::format("all {} points are ground; give a scan with a tree, or the ground's height",
-                              points_.size()));
+      throw Error(
+          fmt::format("all {} points are ground; give a scan with a tree, or the ground's height", points_.size()));
     lowest_ = std::numeric_limits<double>::infinity();
     for (const Vec3& p : points_) lowest_ = std::min(lowest_, p.z);
   }
@@ -117,9 +117,10 @@ class Division {
 
  private:
   std::string no_tree() const {
-    return fmt::format("no tree found among {} points: nothing narrow rises from the ground; leave out --scene to take "
-                       "all points for one tree",
-                       points_.size());
+    return fmt::format(
+        "no tree found among {} points: nothing narrow rises from the ground; leave out --scene to take "
+        "all points for one tree",
+        points_.size());
   }
 
   // Above the ground, or the lowest point.
@@ -165,9 +166,7 @@ class Division {
 
 }  // namespace
 
-double SceneDivision::ground_at(const Vec3& p) const {
-  return surface.heights.empty() ? height : surface.at(p.x, p.y);
-}
+double SceneDivision::ground_at(const Vec3& p) const { return surface.heights.empty() ? height : surface.at(p.x, p.y); }
 
 SceneDivision divide_scene(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
   Division division(points, options);

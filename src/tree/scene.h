@@ -12,11 +12,11 @@
 namespace bisector {
 
 struct SceneDivision {
-  std::vector<ScanPart> part;    // of each point
-  std::vector<Index> tree;       // of each point of a tree; kNone: of the others
-  std::vector<Index> base;       // of each tree a point at the foot of its stem; kNone: no stem was found
-  HeightField surface;           // of the ground, if it was found
-  double height = 0;             // of the ground, if it was given; NaN: it is not known
+  std::vector<ScanPart> part;  // of each point
+  std::vector<Index> tree;     // of each point of a tree; kNone: of the others
+  std::vector<Index> base;     // of each tree a point at the foot of its stem; kNone: no stem was found
+  HeightField surface;         // of the ground, if it was found
+  double height = 0;           // of the ground, if it was given; NaN: it is not known
   std::size_t walls = 0;
   double ground_noise = 0;
 

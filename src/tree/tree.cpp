@@ -403,9 +403,9 @@ void append(TreeResult tree, const std::vector<Index>& ids, TreeResult& result) 
     result.noise = tree.noise;
   }
   result.bridges.insert(result.bridges.end(), tree.bridges.begin(), tree.bridges.end());
-  for (const auto count : {&TreeResult::clusters, &TreeResult::fixed_clusters, &TreeResult::components,
-                           &TreeResult::duplicate_points, &TreeResult::small_component_points,
-                           &TreeResult::leaf_points, &TreeResult::unexplained_points})
+  for (const auto count :
+       {&TreeResult::clusters, &TreeResult::fixed_clusters, &TreeResult::components, &TreeResult::duplicate_points,
+        &TreeResult::small_component_points, &TreeResult::leaf_points, &TreeResult::unexplained_points})
     result.*count += tree.*count;
   for (const auto seconds : {&TreeSeconds::graph, &TreeSeconds::clusters, &TreeSeconds::skeleton, &TreeSeconds::refine,
                              &TreeSeconds::surfaces})

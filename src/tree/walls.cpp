@@ -108,8 +108,8 @@ double hull_area(const std::vector<std::pair<double, double>>& places) {
 class WallFinder {
  public:
   WallFinder(const std::vector<Vec3>& points, double height, double width)
-      : points_(points), least_(kLargeness * kStoutest * height), width_(width), means_(means_of_cubes(points, width)),
-        set_{means_}, tree_(3, set_) {
+      : points_(points), least_(kLargeness * kStoutest * height), width_(width),
+        means_(means_of_cubes(points, width)), set_{means_}, tree_(3, set_) {
     near_.resize(means_.size());
     around_.resize(means_.size());
     parallel_each(

@@ -39,8 +39,8 @@
 #include "mesh/topology.h"
 #include "support/featured.h"
 #include "support/models.h"
-#include "support/solids.h"
 #include "support/scene_scan.h"
+#include "support/solids.h"
 #include "support/tree_model.h"
 #include "tetmesh/tetgen.h"
 
@@ -1963,9 +1963,9 @@ TEST_F(CliTree, TellsTheTreesOfAScene) {
   while (std::getline(table, line)) last = line;
   EXPECT_TRUE(last.ends_with(",0,2")) << last;
 
-  ASSERT_EQ(run({"tree", in("scene.xyz"), "-o", in("out.ply"), "--ground", "auto", "--report", in("r.json"), "--quiet"})
-                .code,
-            0);
+  ASSERT_EQ(
+      run({"tree", in("scene.xyz"), "-o", in("out.ply"), "--ground", "auto", "--report", in("r.json"), "--quiet"}).code,
+      0);
   EXPECT_EQ(Json::parse(read_text(in("r.json")))["input"]["ground_points"], input["ground_points"]);
   expect_failure(2, {"tree", in("scene.xyz"), "-o", in("t.obj"), "--scene", "--ground", "auto"}, "leave out auto");
   expect_failure(2, {"tree", in("scene.xyz"), "-o", in("t.obj"), "--scene", "--components", "separate"}, "--scene");

@@ -13,11 +13,11 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
-constexpr double kCarHeight = 2;         // m
-constexpr double kProfileDistance = 3;   // of the car's profiles, in the distance of points on them
-constexpr double kMargin = 3;            // of the ground around the trees, m
-constexpr double kWallHeight = 6;        // m
-constexpr double kBreadth = 0.45;        // of a crown to one side, of the tree's height: wide enough for all
+constexpr double kCarHeight = 2;        // m
+constexpr double kProfileDistance = 3;  // of the car's profiles, in the distance of points on them
+constexpr double kMargin = 3;           // of the ground around the trees, m
+constexpr double kWallHeight = 6;       // m
+constexpr double kBreadth = 0.45;       // of a crown to one side, of the tree's height: wide enough for all
 constexpr std::size_t kBushLeaves = 250;
 constexpr std::size_t kPilotPulses = 10'000;
 constexpr std::size_t kGrain = 4096;  // pulses of a chunk
@@ -78,12 +78,12 @@ struct Scene {
   Terrain terrain;
   TreeScene solids;  // branches, leaves of trees and of bushes
   std::size_t tree_leaves = 0;
-  double first = 0, last = 0;        // along the street, x
+  double first = 0, last = 0;            // along the street, x
   double street = 0, wall = 0, far = 0;  // y
 
   bool answer(const Vec3& origin, const Vec3& direction, SplitMix64& random, Echo& echo) const {
-    const Vec3 drawn =
-        unit(direction + 0.5 * options.divergence * std::sqrt(random.unit()) * across(direction, random.range(0, 2 * kPi)));
+    const Vec3 drawn = unit(direction + 0.5 * options.divergence * std::sqrt(random.unit()) *
+                                            across(direction, random.range(0, 2 * kPi)));
     const SceneHit hit = solids.first_hit(origin, drawn);
     double range = hit.range;
     echo.kind = hit.leaf != kNone && hit.leaf >= tree_leaves ? ScenePoint::bush : ScenePoint::tree;

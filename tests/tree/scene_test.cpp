@@ -127,7 +127,7 @@ TEST(Walls, AreLargeUprightPlanes) {
   std::vector<Vec3> points = plane(9, 5, 0, 20'000, random);
   const std::size_t wall = points.size();
   for (const Vec3& p : cylinder({4, -2, 0}, 0.5, 6, 6000, random)) points.push_back(p);  // the stoutest trunk
-  for (int i = 0; i < 6000; ++i)                                                          // a crown of leaves
+  for (int i = 0; i < 6000; ++i)                                                         // a crown of leaves
     points.push_back({4 * random.uniform(), -5 + 3 * random.uniform(), 3 + 4 * random.uniform()});
   const Walls walls = find_walls(points, kHeight);
   EXPECT_EQ(walls.count, 1u);
@@ -186,8 +186,8 @@ TEST(PartTrees, WithoutAStemThereIsNone) {
 }
 
 test::SceneScan small_scene(std::uint64_t seed, bool wall) {
-  return test::scan_scene({.trees = 3, .points = 20'000, .slope = 0.25, .bumps = 0.1, .wall = wall, .bushes = 2,
-                           .random_seed = seed});
+  return test::scan_scene(
+      {.trees = 3, .points = 20'000, .slope = 0.25, .bumps = 0.1, .wall = wall, .bushes = 2, .random_seed = seed});
 }
 
 TreeOptions scene_options() {
@@ -260,8 +260,8 @@ TEST(Scene, SameForAnyNumberOfThreads) {
 }
 
 TEST(Scene, WithoutGroundAndFarFromTheOriginTheTreesAreTheSame) {
-  test::SceneScan scan = test::scan_scene({.trees = 2, .points = 8'000, .ground = false, .slope = 0.1,
-                                           .random_seed = 64});
+  test::SceneScan scan =
+      test::scan_scene({.trees = 2, .points = 8'000, .ground = false, .slope = 0.1, .random_seed = 64});
   TreeResult result = reconstruct_tree(scan.points, scene_options());
   EXPECT_EQ(result.ground_points, 0u);
   EXPECT_TRUE(std::isnan(result.trees[0].ground));
