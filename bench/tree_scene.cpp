@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -26,11 +27,18 @@ using namespace bisector;
 struct Row {
   double trees = 0, found = 0, right_tree = 0, bushes = 0;
   test::Shares ground, wall;
-  double right = 0, alone = 0;          // share of branches with the right parent; made from its points alone
-  double volume = 0, alone_volume = 0;  // mean size of the trees' relative errors
+  double right = 0, alone = 0;               // share of branches with the right parent; made from its points alone
+  std::vector<double> volume, alone_volume;  // sizes of the trees' relative errors
   double base = 0;                      // mean distance of the bases' heights from the true ones, m
   double scene_seconds = 0, seconds = 0;
 };
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 const char* const kHead =
     "| scene | points | trees | found | right tree | ground P | R | wall P | R | bushes in trees | right parent | "
@@ -43,8 +51,8 @@ void print_row(const std::string& name, std::size_t points, const Row& r) {
       "| {} | {} | {:.3g} | {:.3g} | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | {:.1f} % | "
       "{:.1f} % | {:.1f} % | {:.1f} % | {:.3f} m | {:.2f} | {:.2f} |\n",
       name, points, r.trees, r.found, 100 * r.right_tree, 100 * r.ground.precision, 100 * r.ground.recall,
-      100 * r.wall.precision, 100 * r.wall.recall, 100 * r.bushes, 100 * r.right, 100 * r.alone, 100 * r.volume,
-      100 * r.alone_volume, r.base, r.scene_seconds, r.seconds);
+      100 * r.wall.precision, 100 * r.wall.recall, 100 * r.bushes, 100 * r.right, 100 * r.alone, 100 * median(r.volume),
+      100 * median(r.alone_volume), r.base, r.scene_seconds, r.seconds);
   std::fflush(stdout);
 }
 
@@ -87,14 +95,14 @@ Row measure(const test::SceneScan& scan, const TreeOptions& options) {
     const test::ScanScore best = test::score_scan(truth, test::axes_of(single));
     branches += static_cast<double>(best.branches);
     alone += static_cast<double>(best.right_parent);
-    row.alone_volume += std::abs(best.volume_error) / row.trees;
+    row.alone_volume.push_back(std::abs(best.volume_error));
     if (score.match[t] == kNone) {
-      row.volume += 1 / row.trees;
+      row.volume.push_back(1);
       continue;
     }
     const test::ScanScore own = test::score_scan(truth, test::axes_of_tree(result, score.match[t]));
     right += static_cast<double>(own.right_parent);
-    row.volume += std::abs(own.volume_error) / row.trees;
+    row.volume.push_back(std::abs(own.volume_error));
     row.base += std::abs(result.trees[score.match[t]].ground - scan.branches[t][0].axis[0].z) / row.trees;
   }
   row.right = right / branches;
@@ -108,8 +116,10 @@ Row mean(const std::vector<Row>& rows) {
   const double share = 1 / static_cast<double>(rows.size());
   for (const Row& r : rows) {
     for (const auto value : {&Row::trees, &Row::found, &Row::right_tree, &Row::bushes, &Row::right, &Row::alone,
-                             &Row::volume, &Row::alone_volume, &Row::base, &Row::scene_seconds, &Row::seconds})
+                             &Row::base, &Row::scene_seconds, &Row::seconds})
       result.*value += share * (r.*value);
+    result.volume.insert(result.volume.end(), r.volume.begin(), r.volume.end());
+    result.alone_volume.insert(result.alone_volume.end(), r.alone_volume.begin(), r.alone_volume.end());
     for (const auto part : {&Row::ground, &Row::wall}) {
       (result.*part).precision += share * (r.*part).precision;
       (result.*part).recall += share * (r.*part).recall;

@@ -32,6 +32,8 @@ constexpr std::uint8_t kGroundClass = 2;  // of LAS
 // A block of cells shows the ground if points lie in at least three of its quarters, the layer is thin beside its width
 // and holds more points than what is above it as far as half a block.
 constexpr std::size_t kLeastPoints = 4, kLeastQuarters = 3;
+constexpr double kPointsPerBlock = 10;  // of the layer, if they were spread evenly
+constexpr std::size_t kWidest = 8;      // blocks, in cells
 constexpr double kThin = 0.15;            // of kBand deviations in the block's width
 constexpr std::size_t kLeastBlocks = 25;  // that hang together
 constexpr std::size_t kFewBlocks = 4;     // that do, beside them
@@ -179,21 +181,25 @@ std::vector<Vec3> without_lone_points(const std::vector<Vec3>& points) {
 // A grid of wider cells over a field, to look at what lies in each.
 class Blocks {
  public:
-  explicit Blocks(const HeightField& field) : field_(field) {
-    columns_ = (field.columns + kWidth - 1) / kWidth;
-    rows_ = (field.rows + kWidth - 1) / kWidth;
+  // So wide that `points`, evenly spread, would be some to a block.
+  Blocks(const HeightField& field, std::size_t points) : field_(field) {
+    const double cells = kPointsPerBlock * static_cast<double>(field.heights.size()) / static_cast<double>(points);
+    width_ = std::clamp<std::size_t>(static_cast<std::size_t>(std::ceil(std::sqrt(cells))), 2, kWidest);
+    columns_ = (field.columns + width_ - 1) / width_;
+    rows_ = (field.rows + width_ - 1) / width_;
   }
   std::size_t size() const { return columns_ * rows_; }
   std::size_t columns() const { return columns_; }
-  double width() const { return kWidth * field_.cell; }
+  double width() const { return static_cast<double>(width_) * field_.cell; }
   std::size_t of(const Vec3& p) const {
     const Place place = place_in(field_, p.x, p.y);
-    return place.row / kWidth * columns_ + place.column / kWidth;
+    return place.row / width_ * columns_ + place.column / width_;
   }
   // 0 to 3: which quarter of its block a point lies in.
   std::size_t quarter(const Vec3& p) const {
     const Place place = place_in(field_, p.x, p.y);
-    return 2 * (place.row % kWidth) + place.column % kWidth;
+    const auto half = [&](std::size_t cell) { return static_cast<std::size_t>(2 * (cell % width_) >= width_); };
+    return 2 * half(place.row) + half(place.column);
   }
   template <class Visit>
   void visit_around(std::size_t block, std::ptrdiff_t reach, const Visit& visit) const {
@@ -205,8 +211,8 @@ class Blocks {
   }
 
  private:
-  static constexpr std::size_t kWidth = 2;  // cells
   const HeightField& field_;
+  std::size_t width_ = 2;  // in cells
   std::size_t columns_ = 0, rows_ = 0;
 };
 
@@ -326,7 +332,8 @@ Ground find_ground(const std::vector<Vec3>& points, const std::vector<std::uint8
   context.check();
 
   const std::vector<double> above = heights_above(points, field);
-  const Blocks blocks(field);
+  const auto near_plate = std::count_if(above.begin(), above.end(), [&](double r) { return std::abs(r) < kBand * ground.noise; });
+  const Blocks blocks(field, std::max<std::size_t>(static_cast<std::size_t>(near_plate), 1));
   const std::vector<double> noise = local_noise(points, above, ground.noise, blocks);
   const std::vector<char> near = blocks_of_ground(points, above, noise, blocks);
   ground.found = !near.empty();

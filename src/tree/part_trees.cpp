@@ -29,7 +29,7 @@ constexpr double kLean = 0.5;            // tangent of a stem's angle off the ve
 constexpr double kBeside = 2;            // radii of a stem, off its middle
 constexpr std::size_t kSteps = 5;        // of height, in which it shows
 constexpr double kFlare = 3;             // radii of the stem that its base spreads to
-constexpr std::size_t kLeastPoints = 8;  // of a stem
+constexpr std::size_t kLeastInStep = 4;  // points that tell where it is
 
 struct Minimum {
   Index point = kNone;
@@ -41,7 +41,7 @@ struct Stem {
   Vec3 centre;
   double radius = 0;
   bool rises = false;         // steeply, at every height over which a stem stands by itself
-  std::vector<Index> points;  // of its lowest part
+  std::vector<Index> points;  // where it is narrowest
 };
 
 class Parting {
@@ -111,7 +111,7 @@ class Parting {
       const Index low = minimum.point;
       if (minimum.held - heights_[low] < kHolding * size_ || !is_low(low)) continue;
       Stem stem = stem_from(low);
-      if (!stem.rises || stem.points.size() < kLeastPoints || stem.radius > kStoutest * size_ || continues(stem))
+      if (!stem.rises || stem.radius > kStoutest * size_ || continues(stem))
         continue;
       stems_.push_back(std::move(stem));
     }
@@ -150,28 +150,48 @@ class Parting {
         stem.points.push_back(*j);
       }
     }
-    // Its lower part tells where it is and how thick: boughs may begin soon.
-    std::sort(stem.points.begin(), stem.points.end(),
-              [&](Index a, Index b) { return std::pair(heights_[a], a) < std::pair(heights_[b], b); });
-    const std::vector<Index> all = stem.points;
-    if (stem.points.size() > kLeastPoints) stem.points.resize(std::max(kLeastPoints, stem.points.size() / 4));
-    std::vector<double> x, y, off;
+    // Boughs, leaves and bushes may be around some of its height: the narrowest steps tell where it is and how thick.
+    std::vector<std::vector<Index>> steps(kSteps);
     for (const Index i : stem.points) {
-      x.push_back(points_[i].x);
-      y.push_back(points_[i].y);
+      const double up = (heights_[i] - heights_[low]) / (kHolding * size_);
+      steps[std::min(kSteps - 1, static_cast<std::size_t>(up * kSteps))].push_back(i);
     }
-    stem.centre = {quantile(x, 0.5), quantile(y, 0.5), points_[low].z};
-    for (std::size_t k = 0; k < x.size(); ++k) off.push_back(std::hypot(x[k] - stem.centre.x, y[k] - stem.centre.y));
-    stem.radius = quantile(off, 0.75);
+    std::vector<Stem> sections;
+    for (const std::vector<Index>& step : steps)
+      if (step.size() >= kLeastInStep) sections.push_back(section_of(step));
+    if (sections.size() < 2) return stem;
+    std::stable_sort(sections.begin(), sections.end(), [](const Stem& a, const Stem& b) { return a.radius < b.radius; });
+    stem.centre = sections[0].centre;
+    stem.radius = sections[1].radius;
     std::vector<char> occupied(kSteps, 0);
-    for (const Index i : all) {
-      const double up = heights_[i] - heights_[low];
-      const double away = std::hypot(points_[i].x - stem.centre.x, points_[i].y - stem.centre.y);
-      const auto step = std::min(kSteps - 1, static_cast<std::size_t>(up / (kHolding * size_) * kSteps));
-      if (away <= kBeside * stem.radius + kLean * up) occupied[step] = 1;
-    }
+    for (std::size_t k = 0; k < kSteps; ++k)
+      for (const Index i : steps[k]) {
+        const Vec3 off = points_[i] - stem.centre;
+        if (std::hypot(off.x, off.y) <= kBeside * stem.radius + kLean * std::abs(off.z)) occupied[k] = 1;
+      }
+    stem.points = sections[0].points;
+    std::erase_if(stem.points, [&](Index i) {
+      return std::hypot(points_[i].x - stem.centre.x, points_[i].y - stem.centre.y) > kBeside * stem.radius;
+    });
     stem.rises = std::count(occupied.begin(), occupied.end(), 1) == static_cast<std::ptrdiff_t>(kSteps);
     return stem;
+  }
+
+  // Of points at about one height.
+  Stem section_of(const std::vector<Index>& points) const {
+    Stem section;
+    section.points = points;
+    std::vector<double> x, y, z, off;
+    for (const Index i : points) {
+      x.push_back(points_[i].x);
+      y.push_back(points_[i].y);
+      z.push_back(points_[i].z);
+    }
+    section.centre = {quantile(x, 0.5), quantile(y, 0.5), quantile(z, 0.5)};
+    for (std::size_t k = 0; k < x.size(); ++k)
+      off.push_back(std::hypot(x[k] - section.centre.x, y[k] - section.centre.y));
+    section.radius = quantile(off, 0.75);
+    return section;
   }
 
   // From what is near the ground beside the stems, along short steps.

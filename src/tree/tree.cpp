@@ -284,8 +284,8 @@ struct Foot {
   const SceneDivision* scene = nullptr;  // that knows the ground, or not
 };
 
-// Trunks begin where their axes meet the ground: those that were led on below it are cut, and those whose foot is not
-// seen are led on down to it, by kMostHidden of the tree's height at most.
+// Trunks begin at the ground: axes that were led on below it are cut, and trunks whose foot is not seen go straight down
+// to it, by kMostHidden of the tree's height at most.
 void plant_trunks(const SceneDivision& scene, double height, std::vector<Limb>& limbs) {
   for (Limb& limb : limbs) {
     if (limb.parent != kNone || std::isnan(scene.ground_at(limb.axis.front()))) continue;
@@ -301,8 +301,10 @@ void plant_trunks(const SceneDivision& scene, double height, std::vector<Limb>& 
       const double t = low / (low - high);
       limb.axis[0] += t * (limb.axis[1] - limb.axis[0]);
       limb.radii[0] += t * (limb.radii[1] - limb.radii[0]);
-    } else if (low > 0 && low <= kMostHidden * height && high > low) {
-      limb.axis[0] -= low / (high - low) * (limb.axis[1] - limb.axis[0]);
+    } else if (low > 0 && low <= kMostHidden * height) {
+      limb.axis.insert(limb.axis.begin(), limb.axis[0] - Vec3{0, 0, low});
+      limb.radii.insert(limb.radii.begin(), limb.radii[0]);
+      limb.fitted.insert(limb.fitted.begin(), 0);
     }
   }
 }
