@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -24,11 +25,23 @@ enum class TreeLeaves {
   apart  // points of no branch are told from wood and left out
 };
 
+// What a point of a scan shows.
+enum class ScanPart : std::uint8_t {
+  tree,       // a branch or a leaf
+  ground,     // or what is below it
+  wall,       // a large upright plane, or what a LAS file says is a building
+  low_plant,  // what is low and at no stem: grass, bushes
+  stray       // what no short steps lead to from a tree, or too little for one
+};
+
 struct TreeOptions {
   std::size_t clusters = 0;            // at most; 0: as many as it takes
   double delta = 0.004;                // a cluster is a cylinder if its points lie so near one, rms, in the unit cube
   std::size_t max_cluster_points = 0;  // larger clusters are split; 0: only those that are no cylinders
   double ground = -std::numeric_limits<double>::infinity();  // points below this height (z) are left out
+  bool find_ground = false;           // find the ground, unless `ground` gives it, and leave it out, with low plants
+  bool scene = false;                 // find it, walls and low plants, leave them out, and make each tree for itself
+  std::vector<std::uint8_t> classes;  // of each point, of a LAS file (2: ground, 6: building); empty: not known
   TreeComponents components = TreeComponents::bridge;
   TreeLeaves leaves = TreeLeaves::keep;
   double tip_radius = 0;  // of the thinnest twigs, in the points' unit; 0: 0.0003 of the largest extent
@@ -83,26 +96,45 @@ struct TreeBranch {
   BranchSurface surface;
 };
 
+// One of the trees of a scan.
+struct ScannedTree {
+  Index trunk = 0;  // branch; that of the next tree, or the end, ends its branches
+  Vec3 base;        // where the trunk's axis begins
+  double ground = std::numeric_limits<double>::quiet_NaN();  // height (z) of the ground there; NaN: not known
+  double height = 0;  // of its highest point above the ground, or, where that is not known, above its lowest point
+  std::size_t points = 0, branches = 0;
+  double length = 0, volume = 0, area = 0;  // of its branches
+  double noise = 0, pipe_exponent = 0;      // as in TreeResult
+  bool pipe_fitted = false;
+};
+
 struct TreeSeconds {
-  double graph = 0, clusters = 0, skeleton = 0, refine = 0, surfaces = 0, total = 0;
+  double scene = 0, graph = 0, clusters = 0, skeleton = 0, refine = 0, surfaces = 0, total = 0;
 };
 
 struct TreeResult {
   // Of each point; kNone: none. A duplicate has its twin's.
   std::vector<Index> cluster, branch;
+  std::vector<ScanPart> part;                    // of each point; empty: with neither find_ground nor scene
+  std::vector<Index> tree;                       // of a scene's points, in `trees`; kNone: none; empty: no scene
   std::vector<char> leaf;                        // whether each point is a leaf; empty: leaves were not looked for
   std::size_t clusters = 0, fixed_clusters = 0;  // in all; tight cylinders
   std::vector<TreeNode> skeleton;
   std::vector<TreeBranch> branches;        // parents before children
   std::size_t components = 0;              // of the scan
   std::vector<double> bridges;             // lengths of the shortest gaps between them, if they were bridged
-  std::size_t ground_points = 0;           // below the ground, left out
+  std::vector<ScannedTree> trees;          // one; of a scene, or with components apart, one for each trunk
+  std::size_t ground_points = 0;           // of the ground or below it, left out
+  std::size_t walls = 0, wall_points = 0;  // left out
+  std::size_t low_plant_points = 0, stray_points = 0;  // left out
+  double ground_noise = 0;                 // standard deviation of the ground's points off it, if it was looked for
   std::size_t duplicate_points = 0;        // at the place of another
   std::size_t small_component_points = 0;  // in components too small for a tree of their own, left out
   std::size_t leaf_points = 0;             // with TreeLeaves::apart, left out
   std::size_t unexplained_points = 0;      // near no branch: strays, and leaves where they are not left out
   // p of the pipe model: at a fork r^p of what comes in is the sum over what goes out. `pipe_fitted`: from this tree's
-  // radii that rest on points; else there were too few, and it is 2.3.
+  // radii that rest on points; else there were too few, and it is 2.3. Of a scene, like `noise`, that of the first
+  // tree.
   double pipe_exponent = 0;
   bool pipe_fitted = false;
   double noise = 0;  // standard deviation of points off thick branches
@@ -110,8 +142,12 @@ struct TreeResult {
 };
 
 // `points`: z is up; any unit and origin. The same result for any number of threads. Throws Error for coordinates that
-// are not finite, fewer than 20 distinct points (above the ground), points that all lie on one line, and options out of
-// range.
+// are not finite, fewer than 20 distinct points (above the ground), points that all lie on one line, options out of
+// range, points that are all ground and, of a scene, where no tree is found.
+//
+// A scan whose ground is looked for and not found, since it is cut off, gives the result that it gives without. Trees
+// of a scene come by their number of points, largest first, and `components` is bridge; the branches of each follow
+// each other.
 BISECTOR_API TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options = {},
                                          const Context& context = {});
 
@@ -135,10 +171,12 @@ BISECTOR_API void write_skeleton(const std::string& path, const TreeResult& tree
 // trunk), position_in_branch and added (always 0: there are no cylinders but those of the axes). Lines, branches and
 // positions count from 1, and 0 stands for none; parents come before children, and branch K + 1 is branches[K]. A
 // cylinder has the length and volume of the cone frustum between its ends, so volumes sum to those of the branches.
-// TreeQSM's mad, SurfCov and UnmodRadius are left out. Numbers read back bit for bit. Throws Error.
+// TreeQSM's mad, SurfCov and UnmodRadius are left out. Of a scene there is a last column `tree`, from 1. Numbers read
+// back bit for bit. Throws Error.
 BISECTOR_API void write_cylinders(const std::string& path, const TreeResult& tree);
 
-// The points as binary PLY with `label`, their branch (-1: none, -2: a leaf), and its colour. Throws Error.
+// The points as binary PLY with `label`, their branch (-1: none, -2: a leaf, -3: ground, -4: a wall, -5: a low plant),
+// and its colour; of a scene also `tree` (-1: none). Throws Error.
 BISECTOR_API void write_tree_labels(const std::string& path, const std::vector<Vec3>& points, const TreeResult& tree);
 
 // Points and surfaces side by side, seen from the side, as PNG; branches have the same colours in both. Throws Error.

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "bisector/error.h"
 #include "bisector/io.h"
 #include "bisector/tree.h"
 #include "commands.h"
@@ -29,10 +31,25 @@ namespace {
 constexpr std::size_t kFewUnexplained = 20;  // one point in so many may be near no branch without a warning
 constexpr double kTipMetres = 0.002;         // radius of the thinnest twigs where the file tells its unit
 
+// Where the ground is: below a height, or where it is found.
+struct GroundOption {
+  double height = -std::numeric_limits<double>::infinity();
+  bool find = false;
+};
+
+GroundOption parse_ground(const std::string& text) {
+  GroundOption ground;
+  ground.find = text == "auto";
+  if (!ground.find && !(CLI::detail::lexical_cast(text, ground.height) && std::isfinite(ground.height)))
+    throw Error("'" + text + "' is neither a height nor auto");
+  return ground;
+}
+
 struct TreeCommand {
   std::string input, output, skeleton, cylinders, labels, preview;
   IgesUnit unit = IgesUnit::metre;
   bool has_unit = false;  // asked for
+  GroundOption ground;
   TreeOptions options;
   CommonOptions common;
 };
@@ -53,8 +70,14 @@ void add_options(CLI::App* app, TreeCommand& command) {
   add_words(app, "--unit", command.unit, kUnitWords,
             "of the points, for .igs: mm, cm, m, in or ft; default: what\na LAS file says, else m")
       ->group("Output");
-  app->add_option("--ground", command.options.ground, "leave out points with z below this")
-      ->type_name("Z")
+  add_parsed(app, "--ground", command.ground, parse_ground,
+             "leave out points with z below Z; auto: the ground is\n"
+             "found, sloping or not, and left out with low plants")
+      ->type_name("Z|auto")
+      ->group("Scan");
+  app->add_flag("--scene", command.options.scene,
+                "several trees with ground and walls: leave out the\n"
+                "ground, walls and low plants, and make each tree for itself")
       ->group("Scan");
   add_words(app, "--components", command.options.components, kComponentWords,
             "parts of the scan that are apart: bridge (join them over\n"
@@ -95,6 +118,10 @@ bool is_iges(const TreeCommand& command) {
 void check_usage(const TreeCommand& command, const Usage& usage) {
   if (usage.given("--unit") && !is_iges(command))
     throw CLI::ValidationError("--unit: only .igs files tell a unit; leave it out");
+  if (command.options.scene && command.options.components == TreeComponents::separate)
+    throw CLI::ValidationError("--components: --scene tells the trees from each other; leave out separate");
+  if (command.options.scene && command.ground.find)
+    throw CLI::ValidationError("--ground: --scene finds the ground by itself; leave out auto");
 }
 
 // Of the coordinates: as asked for, or as the file says, which is `metres` (0: nothing).
@@ -119,7 +146,7 @@ struct Measures {
   double length = 0, fitted_length = 0, volume = 0, area = 0, height = 0;
   int order = 0;
   std::size_t trunks = 0, unassigned = 0;
-  std::vector<PointCoverage> coverage;  // of the points above the ground that are no leaves
+  std::vector<PointCoverage> coverage;  // of the points that are not left out
   double bare = 0;                      // share of the surface farther than 2 % of the height from them
 };
 
@@ -138,12 +165,17 @@ Measures measure(const std::vector<Vec3>& points, const TreeOptions& options, co
   }
   std::vector<Vec3> above;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (points[i].z < options.ground || (!tree.leaf.empty() && tree.leaf[i])) continue;
+    if (points[i].z < options.ground || (!tree.part.empty() && tree.part[i] != ScanPart::tree)) continue;
+    if (!tree.leaf.empty() && tree.leaf[i]) continue;
     above.push_back(points[i]);
     measures.unassigned += tree.branch[i] == kNone;
   }
   const Box box = bounding_box(above);
   measures.height = box.hi.z - box.lo.z;
+  if (!tree.tree.empty()) {  // what stands on a slope is no higher for that
+    measures.height = 0;
+    for (const ScannedTree& t : tree.trees) measures.height = std::max(measures.height, t.height);
+  }
   measures.coverage = cover_points(above, surfaces, mesh);
   measures.bare = bare_area(mesh, above, 0.02 * measures.height);
   return measures;
@@ -163,11 +195,31 @@ Json branch_json(const TreeBranch& branch) {
           {"points", branch.points}};
 }
 
+Json scanned_tree_json(const ScannedTree& tree) {
+  return {{"trunk", tree.trunk},
+          {"base", {tree.base.x, tree.base.y, tree.base.z}},
+          {"ground", std::isnan(tree.ground) ? Json(nullptr) : Json(tree.ground)},
+          {"height", tree.height},
+          {"points", tree.points},
+          {"branches", tree.branches},
+          {"length", tree.length},
+          {"volume", tree.volume},
+          {"area", tree.area},
+          {"noise", tree.noise},
+          {"exponent", tree.pipe_exponent},
+          {"exponent_from", tree.pipe_fitted ? "points" : "default"}};
+}
+
 Json tree_report(const PointCloud& cloud, const TreeResult& tree, const Measures& measures) {
   Json report = start_report("tree");
   report["input"] = {{"points", cloud.points.size()},
                      {"unit", cloud.unit > 0 ? Json(cloud.unit) : Json(nullptr)},
                      {"ground_points", tree.ground_points},
+                     {"ground_noise", tree.ground_noise},
+                     {"walls", tree.walls},
+                     {"wall_points", tree.wall_points},
+                     {"low_plant_points", tree.low_plant_points},
+                     {"stray_points", tree.stray_points},
                      {"duplicate_points", tree.duplicate_points},
                      {"small_component_points", tree.small_component_points},
                      {"unassigned_points", measures.unassigned},
@@ -188,6 +240,8 @@ Json tree_report(const PointCloud& cloud, const TreeResult& tree, const Measures
   report["radii"] = {{"fitted_length", measures.fitted_length},
                      {"exponent", tree.pipe_exponent},
                      {"exponent_from", tree.pipe_fitted ? "points" : "default"}};
+  report["trees"] = Json::array();
+  for (const ScannedTree& t : tree.trees) report["trees"].push_back(scanned_tree_json(t));
   report["branches"] = Json::array();
   for (const TreeBranch& branch : tree.branches) report["branches"].push_back(branch_json(branch));
   report["seconds"] = nullptr;
@@ -195,9 +249,9 @@ Json tree_report(const PointCloud& cloud, const TreeResult& tree, const Measures
 }
 
 Json tree_seconds(const TreeSeconds& seconds) {
-  return {{"total", seconds.total},       {"graph", seconds.graph},   {"clusters", seconds.clusters},
-          {"skeleton", seconds.skeleton}, {"refine", seconds.refine}, {"surfaces", seconds.surfaces},
-          {"tree", seconds.total}};
+  return {{"total", seconds.total},       {"scene", seconds.scene},       {"graph", seconds.graph},
+          {"clusters", seconds.clusters}, {"skeleton", seconds.skeleton}, {"refine", seconds.refine},
+          {"surfaces", seconds.surfaces}, {"tree", seconds.total}};
 }
 
 void warn_of_points(Console& console, const TreeResult& tree, const Measures& measures) {
@@ -209,14 +263,26 @@ void warn_of_points(Console& console, const TreeResult& tree, const Measures& me
                              counted(tree.unexplained_points, "point", "points")));
 }
 
+std::string tree_line(std::size_t number, const ScannedTree& tree) {
+  return fmt::format("tree {:<5} {} at ({:.6g}, {:.6g}, {:.6g}), height {:.4g}, {}, volume {:.4g}", number,
+                     counted(tree.points, "point", "points"), tree.base.x, tree.base.y, tree.base.z, tree.height,
+                     counted(tree.branches, "branch", "branches"), tree.volume);
+}
+
 void print_summary(Console& console, const TreeCommand& command, const std::vector<Vec3>& points,
                    const TreeResult& tree, const Measures& measures, const Json& seconds) {
-  console.print(
-      fmt::format("input      {}: {} in {}{}", command.input, counted(points.size(), "point", "points"),
-                  counted(tree.components, "component", "components"),
-                  tree.ground_points > 0 ? fmt::format("; {} below the ground left out", tree.ground_points) : ""));
+  console.print(fmt::format("input      {}: {} in {}{}", command.input, counted(points.size(), "point", "points"),
+                            counted(tree.components, "component", "components"),
+                            tree.part.empty() && tree.ground_points > 0
+                                ? fmt::format("; {} below the ground left out", tree.ground_points)
+                                : ""));
+  if (!tree.part.empty())
+    console.print(fmt::format("left out   {} of the ground, {} of {}, {} of low plants, {} strays", tree.ground_points,
+                              tree.wall_points, counted(tree.walls, "wall", "walls"), tree.low_plant_points,
+                              tree.stray_points));
   console.print(
       fmt::format("clusters   {}, {} of them cylinders; noise {:.3g}", tree.clusters, tree.fixed_clusters, tree.noise));
+  for (std::size_t t = 0; !tree.tree.empty() && t < tree.trees.size(); ++t) console.print(tree_line(t, tree.trees[t]));
   console.print(fmt::format(
       "tree       {} of order 0 to {}; {} in all", counted(tree.branches.size(), "branch", "branches"), measures.order,
       fmt::format("length {:.4g}, volume {:.4g}, area {:.4g}", measures.length, measures.volume, measures.area)));
@@ -255,6 +321,9 @@ void run(const TreeCommand& command) {
   double io = reading.seconds();
 
   TreeOptions options = command.options;
+  options.ground = command.ground.height;
+  options.find_ground = command.ground.find;
+  options.classes = cloud.classification;
   if (options.tip_radius == 0 && cloud.unit > 0) options.tip_radius = kTipMetres / cloud.unit;
   const TreeResult tree = reconstruct_tree(points, options, console.context());
   const Stopwatch meshing;
@@ -264,7 +333,7 @@ void run(const TreeCommand& command) {
 
   console.phase("measuring the distance of the points");
   const Stopwatch measuring;
-  const Measures measures = measure(points, command.options, tree, mesh);
+  const Measures measures = measure(points, options, tree, mesh);
   seconds["quality"] = measuring.seconds();
   warn_of_points(console, tree, measures);
 
@@ -297,7 +366,8 @@ Command add_tree(CLI::App& program) {
                               "bisector tree POINTS -o OUT [options]",
                               "Examples:\n"
                               "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
-                              "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n\n"
+                              "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n"
+                              "  bisector tree street.las -o trees.obj --scene --cylinders trees.csv\n\n"
                               "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
                               "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written.");
   add_options(app, *command);

@@ -82,7 +82,9 @@ double radius_of(const Frustum& f) {
   return std::sqrt((r * r + r * q + q * q) / 3);
 }
 
-void append_row(std::string& out, const TreeResult& tree, const Cylinder& cylinder) {
+// `trees`: of each branch, from 1; empty: not told.
+void append_row(std::string& out, const TreeResult& tree, const std::vector<std::size_t>& trees,
+                const Cylinder& cylinder) {
   const Frustum& f = cylinder.frustum;
   const Vec3 axis = unit(f.end - f.start);
   for (const double x : {radius_of(f), f.height, f.start.x, f.start.y, f.start.z, axis.x, axis.y, axis.z}) {
@@ -95,7 +97,19 @@ void append_row(std::string& out, const TreeResult& tree, const Cylinder& cylind
     io::append_index(out, n);
     out += ',';
   }
-  out += "0\n";
+  out += '0';
+  if (!trees.empty()) {
+    out += ',';
+    io::append_index(out, trees[cylinder.branch]);
+  }
+  out += '\n';
+}
+
+std::vector<std::size_t> trees_of_branches(const TreeResult& tree) {
+  std::vector<std::size_t> trees;
+  for (const TreeBranch& branch : tree.branches)
+    trees.push_back(branch.parent != kNone ? trees[branch.parent] : trees.empty() ? 1 : trees.back() + 1);
+  return trees;
 }
 
 }  // namespace
@@ -103,9 +117,12 @@ void append_row(std::string& out, const TreeResult& tree, const Cylinder& cylind
 void write_cylinders(const std::string& path, const TreeResult& tree) {
   std::string out =
       "radius,length,start_x,start_y,start_z,axis_x,axis_y,axis_z,parent,extension,branch,branch_order,"
-      "position_in_branch,added\n";
+      "position_in_branch,added";
+  const bool is_scene = !tree.tree.empty();
+  out += is_scene ? ",tree\n" : "\n";
+  const std::vector<std::size_t> trees = is_scene ? trees_of_branches(tree) : std::vector<std::size_t>{};
   const Cylinders cylinders(tree);
-  for (const Cylinder& cylinder : cylinders.all()) append_row(out, tree, cylinder);
+  for (const Cylinder& cylinder : cylinders.all()) append_row(out, tree, trees, cylinder);
   write_file(path, out);
 }
 

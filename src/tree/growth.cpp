@@ -15,7 +15,6 @@
 #include "tree/near_axis.h"
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
-#include "voronoi/delaunay.h"
 
 namespace bisector {
 namespace {
@@ -33,14 +32,6 @@ constexpr double kStiffness = 2;       // of an axis' second differences, beside
 
 double squared(double x) { return x * x; }
 
-Csr<Index> make_graph(const std::vector<Vec3>& points) {
-  if (auto graph = delaunay_neighbours(points)) return std::move(*graph);
-  const PointGraph near = build_point_graph(points);
-  std::vector<std::array<Index, 2>> edges;
-  for (const Bridge& b : shortest_bridges(points, near)) edges.push_back({b.from, b.to});
-  return add_edges(near.neighbours, edges);
-}
-
 // The tree of shortest ways.
 struct Ways {
   std::vector<Index> previous;  // of each point; a source's is itself
@@ -57,7 +48,7 @@ class Growth {
         limb_of_(limb_of), set_{points}, tree_(3, set_) {}
 
   void find_ways() {
-    const Csr<Index> graph = make_graph(points_);
+    const Csr<Index> graph = ways_graph(points_);
     std::vector<double> shortest(points_.size(), std::numeric_limits<double>::infinity());
     for (std::size_t i = 0; i < graph.rows(); ++i)
       for (const Index* j = graph.begin(i); j != graph.end(i); ++j)

@@ -7,12 +7,14 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "bisector/error.h"
 #include "core/grouping.h"
 #include "core/parallel.h"
 #include "spatial/kd_tree.h"
 #include "tree/polyline.h"
+#include "voronoi/delaunay.h"
 
 namespace bisector {
 namespace {
@@ -243,6 +245,14 @@ Csr<Index> add_edges(const Csr<Index>& neighbours, const std::vector<Edge>& edge
     rows.offsets.push_back(rows.values.size());
   }
   return rows;
+}
+
+Csr<Index> ways_graph(const std::vector<Vec3>& points) {
+  if (auto graph = delaunay_neighbours(points)) return std::move(*graph);
+  const PointGraph near = build_point_graph(points);
+  std::vector<Edge> edges;
+  for (const Bridge& b : shortest_bridges(points, near)) edges.push_back({b.from, b.to});
+  return add_edges(near.neighbours, edges);
 }
 
 }  // namespace bisector

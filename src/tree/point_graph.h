@@ -33,4 +33,8 @@ std::vector<Bridge> shortest_bridges(const std::vector<Vec3>& points, const Poin
 // The graph with edges added.
 Csr<Index> add_edges(const Csr<Index>& neighbours, const std::vector<std::array<Index, 2>>& edges);
 
+// A connected graph over distinct points that holds all shortest ways by the sum of squared steps: Delaunay's
+// neighbours, or where there are none, as of points in a plane, the nearest ones with bridges.
+Csr<Index> ways_graph(const std::vector<Vec3>& points);
+
 }  // namespace bisector

@@ -18,6 +18,7 @@
 #include "tree/point_graph.h"
 #include "tree/polyline.h"
 #include "tree/refine.h"
+#include "tree/scene.h"
 #include "tree/skeleton.h"
 
 namespace bisector {
@@ -30,6 +31,8 @@ constexpr double kThicker = 1.3;        // ratio of the slices' thickness to the
 constexpr double kSlender = 4;          // radius of a cluster over its rms from which on the rms is taken for the noise
 constexpr double kAxisTolerance = 0.3;  // distance of fitted axes from the nodes, in the branch's median radius
 constexpr double kLeastTip = 0.3;  // of the base radius: what tolerances of a pointed branch's mesh go by, at least
+
+constexpr double kMostHidden = 0.1;  // of a tree's largest extent: what may be hidden of a trunk above the ground
 
 constexpr double kTipRadius = 3e-4;  // of the thinnest twigs, in the unit cube: 3 mm of a tree of 10 m
 
@@ -45,12 +48,20 @@ struct Scan {
   double unit = 1;  // length in the input of 1 here
 };
 
-void check_options(const TreeOptions& options) {
+void check_options(const std::vector<Vec3>& points, const TreeOptions& options) {
   if (!(options.delta > 0 && options.delta < 1))
     throw Error(fmt::format("delta is {}; give a number above 0 and below 1", options.delta));
   if (!(options.tip_radius >= 0 && std::isfinite(options.tip_radius)))
     throw Error(fmt::format("the tips' radius is {}; give a positive length, or 0", options.tip_radius));
   if (std::isnan(options.ground)) throw Error("the ground's height is not a number; give its z");
+  if (!options.classes.empty() && options.classes.size() != points.size())
+    throw Error(fmt::format("{} classes for {} points; give one for each", options.classes.size(), points.size()));
+  if (options.scene && options.components == TreeComponents::separate)
+    throw Error("the trees of a scene are told from each other; leave their components bridged");
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(points[i][k]))
+        throw Error(fmt::format("point {}: a coordinate is not finite; remove the point", i));
 }
 
 bool on_one_line(const std::vector<Vec3>& points) {
@@ -67,9 +78,6 @@ Scan prepare(const std::vector<Vec3>& input, const TreeOptions& options, TreeRes
   scan.of_input.assign(input.size(), kNone);
   std::vector<Index> order;
   for (std::size_t i = 0; i < input.size(); ++i) {
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(input[i][k]))
-        throw Error(fmt::format("point {}: a coordinate is not finite; remove the point", i));
     if (input[i].z < options.ground) ++result.ground_points;
     else order.push_back(static_cast<Index>(i));
   }
@@ -115,7 +123,7 @@ void warn_of_ground(const Scan& scan, const Context& context) {
   if (kPlateShare * low.size() > scan.points.size() && wide > kPlateWidth * std::max(box.hi.x, box.hi.y))
     context.warn(
         fmt::format("the lowest 2 % of the height hold {} of {} points, as wide as the tree: if they are the "
-                    "ground, give its height",
+                    "ground, have it found or give its height",
                     low.size(), scan.points.size()));
 }
 
@@ -125,7 +133,8 @@ struct Network {
   std::vector<Index> lowest;  // point of each tree
 };
 
-Network connect(const Scan& scan, const TreeOptions& options, TreeResult& result) {
+// The root is a point of the scan, kNone: the lowest.
+Network connect(const Scan& scan, const TreeOptions& options, Index root, TreeResult& result) {
   Network network;
   network.graph = build_point_graph(scan.points);
   result.components = network.graph.components;
@@ -146,7 +155,7 @@ Network connect(const Scan& scan, const TreeOptions& options, TreeResult& result
       result.bridges.push_back(scan.unit * b.length);
     }
     network.neighbours = add_edges(network.neighbours, edges);
-    network.lowest = {*std::min_element(lowest.begin(), lowest.end(), higher)};
+    network.lowest = {root != kNone ? root : *std::min_element(lowest.begin(), lowest.end(), higher)};
     return network;
   }
   for (std::size_t c = 0; c < size.size(); ++c) {
@@ -269,10 +278,40 @@ void loft(const std::vector<Limb>& limbs, TreeResult& result) {
       1);
 }
 
-}  // namespace
+// Where a tree stands.
+struct Foot {
+  Index root = kNone;                    // number of the point that it grows from; kNone: the lowest
+  const SceneDivision* scene = nullptr;  // that knows the ground, or not
+};
 
-TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
-  check_options(options);
+// Trunks begin at the ground: axes that were led on below it are cut, and trunks whose foot is not seen go straight down
+// to it, by kMostHidden of the tree's height at most.
+void plant_trunks(const SceneDivision& scene, double height, std::vector<Limb>& limbs) {
+  for (Limb& limb : limbs) {
+    if (limb.parent != kNone || std::isnan(scene.ground_at(limb.axis.front()))) continue;
+    const auto above = [&](const Vec3& p) { return p.z - scene.ground_at(p); };
+    std::size_t first = 0;
+    while (first + 2 < limb.axis.size() && above(limb.axis[first + 1]) <= 0) ++first;
+    const auto erased = static_cast<std::ptrdiff_t>(first);
+    limb.axis.erase(limb.axis.begin(), limb.axis.begin() + erased);
+    limb.radii.erase(limb.radii.begin(), limb.radii.begin() + erased);
+    limb.fitted.erase(limb.fitted.begin(), limb.fitted.begin() + erased);
+    const double low = above(limb.axis[0]), high = above(limb.axis[1]);
+    if (low < 0 && high > 0) {
+      const double t = low / (low - high);
+      limb.axis[0] += t * (limb.axis[1] - limb.axis[0]);
+      limb.radii[0] += t * (limb.radii[1] - limb.radii[0]);
+    } else if (low > 0 && low <= kMostHidden * height) {
+      limb.axis.insert(limb.axis.begin(), limb.axis[0] - Vec3{0, 0, low});
+      limb.radii.insert(limb.radii.begin(), limb.radii[0]);
+      limb.fitted.insert(limb.fitted.begin(), 0);
+    }
+  }
+}
+
+// All points as one tree, or its parts as one each.
+TreeResult reconstruct(const std::vector<Vec3>& points, const TreeOptions& options, const Foot& foot,
+                       const Context& context) {
   TreeResult result;
   Stopwatch watch;
   const auto phase = [&](const char* name, double fraction) {
@@ -281,8 +320,8 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   };
   phase("connecting points", 0);
   const Scan scan = prepare(points, options, result);
-  if (result.ground_points == 0) warn_of_ground(scan, context);
-  const Network network = connect(scan, options, result);
+  if (result.ground_points == 0 && foot.root == kNone) warn_of_ground(scan, context);
+  const Network network = connect(scan, options, foot.root == kNone ? kNone : scan.of_input[foot.root], result);
   result.seconds.graph = watch.lap();
 
   phase("clusters", 0.15);
@@ -313,6 +352,7 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
     for (Vec3& p : limb.axis) p = scan.origin + scan.unit * p;
     for (double& r : limb.radii) r *= scan.unit;
   }
+  if (foot.scene) plant_trunks(*foot.scene, scan.unit, limbs);
   describe_branches(limbs, result);
   loft(limbs, result);
   result.noise = scan.unit * noise;
@@ -331,6 +371,155 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
     }
   result.seconds.surfaces = watch.lap();
   result.seconds.total = watch.seconds();
+  return result;
+}
+
+void offset(std::vector<Index>& values, std::size_t by) {
+  for (Index& v : values)
+    if (v != kNone) v += static_cast<Index>(by);
+}
+
+// Adds the tree of the points `ids`.
+void append(TreeResult tree, const std::vector<Index>& ids, TreeResult& result) {
+  const auto branches = static_cast<Index>(result.branches.size()), nodes = static_cast<Index>(result.skeleton.size());
+  offset(tree.cluster, result.clusters);
+  offset(tree.branch, branches);
+  for (std::size_t k = 0; k < ids.size(); ++k) {
+    result.cluster[ids[k]] = tree.cluster[k];
+    result.branch[ids[k]] = tree.branch[k];
+    if (!tree.leaf.empty()) result.leaf[ids[k]] = tree.leaf[k];
+  }
+  for (TreeNode& node : tree.skeleton) {
+    if (node.parent != kNone) node.parent += nodes;
+    node.branch += branches;
+    result.skeleton.push_back(node);
+  }
+  for (TreeBranch& branch : tree.branches) {
+    offset(branch.nodes, nodes);
+    if (branch.parent != kNone) branch.parent += branches;
+    result.branches.push_back(std::move(branch));
+  }
+  if (branches == 0) {
+    result.pipe_exponent = tree.pipe_exponent;
+    result.pipe_fitted = tree.pipe_fitted;
+    result.noise = tree.noise;
+  }
+  result.bridges.insert(result.bridges.end(), tree.bridges.begin(), tree.bridges.end());
+  for (const auto count :
+       {&TreeResult::clusters, &TreeResult::fixed_clusters, &TreeResult::components, &TreeResult::duplicate_points,
+        &TreeResult::small_component_points, &TreeResult::leaf_points, &TreeResult::unexplained_points})
+    result.*count += tree.*count;
+  for (const auto seconds : {&TreeSeconds::graph, &TreeSeconds::clusters, &TreeSeconds::skeleton, &TreeSeconds::refine,
+                             &TreeSeconds::surfaces})
+    result.seconds.*seconds += tree.seconds.*seconds;
+}
+
+// What follows from the branches of each trunk and their points.
+std::vector<ScannedTree> describe_trees(const std::vector<Vec3>& points, const TreeResult& result) {
+  std::vector<ScannedTree> trees;
+  std::vector<std::size_t> tree_of(result.branches.size());
+  for (std::size_t b = 0; b < result.branches.size(); ++b) {
+    const TreeBranch& branch = result.branches[b];
+    tree_of[b] = branch.parent == kNone ? trees.size() : tree_of[branch.parent];
+    if (branch.parent == kNone) {
+      trees.emplace_back();
+      trees.back().trunk = static_cast<Index>(b);
+      trees.back().base = result.skeleton[branch.nodes.front()].position;
+      trees.back().noise = result.noise;
+      trees.back().pipe_exponent = result.pipe_exponent;
+      trees.back().pipe_fitted = result.pipe_fitted;
+    }
+    ScannedTree& tree = trees[tree_of[b]];
+    ++tree.branches;
+    tree.points += branch.points;
+    tree.length += branch.length;
+    tree.volume += branch.volume;
+    tree.area += branch.area;
+  }
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  std::vector<double> low(trees.size(), kFar), high(trees.size(), -kFar);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (result.branch[i] == kNone) continue;
+    const std::size_t t = tree_of[result.branch[i]];
+    low[t] = std::min(low[t], points[i].z);
+    high[t] = std::max(high[t], points[i].z);
+  }
+  for (std::size_t t = 0; t < trees.size(); ++t) trees[t].height = std::max(high[t] - low[t], 0.0);
+  return trees;
+}
+
+// Says which of several trees is at work.
+Context context_of_tree(const Context& context, std::size_t tree, std::size_t trees) {
+  constexpr double kBefore = 0.1;  // share of the run
+  Context own = context;
+  if (context.progress)
+    own.progress = [&context, tree, trees](Progress p) {
+      if (trees > 1) p.phase = fmt::format("tree {}/{}: {}", tree + 1, trees, p.phase);
+      p.fraction = kBefore + (1 - kBefore) * (static_cast<double>(tree) + p.fraction) / static_cast<double>(trees);
+      context.report(p);
+    };
+  return own;
+}
+
+// The trees of what the points show.
+TreeResult reconstruct_scene(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
+  TreeResult result;
+  Stopwatch watch;
+  context.check();
+  context.report({.phase = options.scene ? "ground, walls and trees" : "ground", .fraction = 0});
+  SceneDivision division = divide_scene(points, options, context);
+  result.seconds.scene = watch.lap();
+  result.cluster.assign(points.size(), kNone);
+  result.branch.assign(points.size(), kNone);
+  if (options.leaves == TreeLeaves::apart) result.leaf.assign(points.size(), 0);
+
+  TreeOptions of_tree = options;
+  of_tree.ground = -std::numeric_limits<double>::infinity();
+  const std::size_t trees = division.base.size();
+  std::vector<std::vector<Index>> ids(trees);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (const Index t = division.tree[i]; t != kNone) ids[t].push_back(static_cast<Index>(i));
+  for (std::size_t t = 0; t < trees; ++t) {
+    std::vector<Vec3> own;
+    for (const Index i : ids[t]) own.push_back(points[i]);
+    Foot foot{kNone, &division};
+    if (const Index base = division.base[t]; base != kNone)
+      foot.root = static_cast<Index>(std::lower_bound(ids[t].begin(), ids[t].end(), base) - ids[t].begin());
+    TreeResult tree = reconstruct(own, of_tree, foot, context_of_tree(context, t, trees));
+    for (ScannedTree found : describe_trees(own, tree)) {
+      found.trunk += static_cast<Index>(result.branches.size());
+      found.ground = division.ground_at(found.base);
+      if (!std::isnan(found.ground)) {
+        double top = found.ground;
+        for (const Vec3& p : own) top = std::max(top, p.z);
+        found.height = top - found.ground;
+      }
+      result.trees.push_back(found);
+    }
+    append(std::move(tree), ids[t], result);
+  }
+  const auto count = [&](ScanPart part) {
+    return static_cast<std::size_t>(std::count(division.part.begin(), division.part.end(), part));
+  };
+  result.ground_points = count(ScanPart::ground);
+  result.walls = division.walls;
+  result.wall_points = count(ScanPart::wall);
+  result.low_plant_points = count(ScanPart::low_plant);
+  result.stray_points = count(ScanPart::stray);
+  result.ground_noise = division.ground_noise;
+  result.part = std::move(division.part);
+  if (options.scene) result.tree = std::move(division.tree);
+  result.seconds.total = watch.seconds();
+  return result;
+}
+
+}  // namespace
+
+TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options, const Context& context) {
+  check_options(points, options);
+  if (options.find_ground || options.scene) return reconstruct_scene(points, options, context);
+  TreeResult result = reconstruct(points, options, {}, context);
+  result.trees = describe_trees(points, result);
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "bisector/error.h"
 #include "bisector/io.h"
@@ -24,15 +25,19 @@ using Colour = std::array<unsigned char, 3>;
 constexpr Colour kNoBranch{150, 150, 150};
 constexpr Colour kLeafColour{120, 180, 90};
 constexpr std::int32_t kLeafLabel = -2;
+constexpr double kGoldenSection = 0.6180339887498949;
 constexpr double kPointSize = 5e-4;  // half the edge of a drawn point, in the points' diagonal
 constexpr double kApart = 1.1;       // of the two views, in widths of the tree
 
-// Bark brown for trunks, other hues for what grows on them.
-Colour branch_colour(const TreeResult& tree, Index branch) {
-  if (branch == kNone) return kNoBranch;
-  if (tree.branches[branch].parent == kNone) return {142, 112, 86};
-  Random random(1, branch);
-  const double hue = 6 * random.uniform(), bright = 0.65 + 0.25 * random.uniform();
+// The trees' trunks are in ascending order.
+std::size_t tree_of_branch(const TreeResult& tree, std::size_t branch) {
+  const auto next = std::upper_bound(tree.trees.begin(), tree.trees.end(), branch,
+                                     [](std::size_t b, const ScannedTree& t) { return b < t.trunk; });
+  return static_cast<std::size_t>(next - tree.trees.begin()) - 1;
+}
+
+// `hue` in [0, 6).
+Colour colour_of(double hue, double bright) {
   Colour colour{};
   for (int k = 0; k < 3; ++k) {
     const double off = std::abs(std::remainder(hue - 2 * k, 6.0));
@@ -40,6 +45,36 @@ Colour branch_colour(const TreeResult& tree, Index branch) {
         static_cast<unsigned char>(255 * bright * (0.35 + 0.65 * std::clamp(2 - off, 0.0, 1.0)));
   }
   return colour;
+}
+
+// Bark brown for trunks, other hues for what grows on them; in a scene a hue for each tree.
+Colour branch_colour(const TreeResult& tree, Index branch) {
+  if (branch == kNone) return kNoBranch;
+  if (!tree.tree.empty()) {
+    const double turns = kGoldenSection * static_cast<double>(tree_of_branch(tree, branch));
+    return colour_of(6 * (turns - std::floor(turns)), 0.65 + 0.25 * Random(1, branch).uniform());
+  }
+  if (tree.branches[branch].parent == kNone) return {142, 112, 86};
+  Random random(1, branch);
+  const double hue = 6 * random.uniform(), bright = 0.65 + 0.25 * random.uniform();
+  return colour_of(hue, bright);
+}
+
+// What a point that is left out is called and drawn like; nothing: it is not.
+struct PointLook {
+  std::int32_t label = 0;
+  Colour colour{};
+};
+std::optional<PointLook> left_out(const TreeResult& tree, std::size_t point) {
+  if (tree.part.empty()) return std::nullopt;
+  switch (tree.part[point]) {
+    case ScanPart::ground: return PointLook{-3, {190, 165, 120}};
+    case ScanPart::wall: return PointLook{-4, {130, 140, 165}};
+    case ScanPart::low_plant: return PointLook{-5, {150, 170, 60}};
+    case ScanPart::tree:
+    case ScanPart::stray: break;
+  }
+  return std::nullopt;
 }
 
 std::string branch_name(std::size_t branch) { return fmt::format("branch_{}", branch); }
@@ -75,14 +110,17 @@ struct Scene {
 void write_tree(const std::string& path, const TreeResult& tree, const TriangleMesh& mesh, IgesUnit unit) {
   const std::string extension = io::lower_extension(path);
   if (extension != ".igs" && extension != ".iges") {
-    write_mesh(path, mesh, {"branch", {}});
+    std::vector<std::string> names;
+    for (std::size_t b = 0; !tree.tree.empty() && b < tree.branches.size(); ++b)
+      names.push_back(fmt::format("tree_{}", tree_of_branch(tree, b)));
+    write_mesh(path, mesh, {"branch", names});
     return;
   }
   std::vector<BranchSurface> surfaces;
   std::vector<std::string> names;
   for (std::size_t b = 0; b < tree.branches.size(); ++b) {
     surfaces.push_back(tree.branches[b].surface);
-    names.push_back(branch_name(b));
+    names.push_back(branch_name(b) + (tree.tree.empty() ? "" : fmt::format("_tree_{}", tree_of_branch(tree, b))));
   }
   write_iges(path, surfaces, names, unit);
 }
@@ -117,13 +155,17 @@ void write_tree_labels(const std::string& path, const std::vector<Vec3>& points,
   std::string out = fmt::format(
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
       "z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int label\nend_header\n",
-      points.size());
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int label\n{}end_header\n",
+      points.size(), tree.tree.empty() ? "" : "property int tree\n");
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (int k = 0; k < 3; ++k) io::append_bytes(out, points[i][k]);
     const bool is_leaf = !tree.leaf.empty() && tree.leaf[i];
-    for (const unsigned char c : is_leaf ? kLeafColour : branch_colour(tree, tree.branch[i])) io::append_bytes(out, c);
-    io::append_bytes(out, is_leaf ? kLeafLabel : static_cast<std::int32_t>(tree.branch[i]));
+    PointLook look{static_cast<std::int32_t>(tree.branch[i]), branch_colour(tree, tree.branch[i])};
+    if (is_leaf) look = {kLeafLabel, kLeafColour};
+    if (const auto special = left_out(tree, i)) look = *special;
+    for (const unsigned char c : look.colour) io::append_bytes(out, c);
+    io::append_bytes(out, look.label);
+    if (!tree.tree.empty()) io::append_bytes(out, static_cast<std::int32_t>(tree.tree[i]));
   }
   write_file(path, out);
 }
@@ -141,7 +183,9 @@ void write_tree_preview(const std::string& path, const std::vector<Vec3>& points
   const Vec3 centre = 0.5 * (box.lo + box.hi), apart{kApart * (box.hi.x - box.lo.x), 0, 0};
   Scene scene;
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (const Index b = tree.branch[i]; b != kNone)
+    if (const auto other = left_out(tree, i))
+      scene.add_point(upright(points[i] - centre), kPointSize * box.diagonal(), other->colour);
+    else if (const Index b = tree.branch[i]; b != kNone)
       scene.add_point(upright(points[i] - centre), kPointSize * box.diagonal(), colours[b]);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     std::array<Vec3, 3> corners;

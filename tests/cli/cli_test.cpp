@@ -39,6 +39,7 @@
 #include "mesh/topology.h"
 #include "support/featured.h"
 #include "support/models.h"
+#include "support/scene_scan.h"
 #include "support/solids.h"
 #include "support/tree_model.h"
 #include "tetmesh/tetgen.h"
@@ -1818,7 +1819,7 @@ TEST_F(CliTree, WritesWhatItSays) {
   EXPECT_GT(report["coverage"]["within_1_percent_of_height"], 0.9);
   EXPECT_GE(report["coverage"]["within_2_radii"], report["coverage"]["within_1_radius"].get<double>());
   for (const char* phase :
-       {"graph", "clusters", "skeleton", "refine", "surfaces", "tree", "mesh", "quality", "io", "total"})
+       {"scene", "graph", "clusters", "skeleton", "refine", "surfaces", "tree", "mesh", "quality", "io", "total"})
     EXPECT_GE(report["seconds"][phase], 0) << phase;
   const TriangleMesh mesh = read_mesh(in("out.obj"));
   EXPECT_EQ(std::set<std::int32_t>(mesh.labels.begin(), mesh.labels.end()).size(), branches);
@@ -1920,6 +1921,57 @@ TEST_F(CliTree, LeavesOutTheGround) {
                 .code,
             0);
   EXPECT_GT(Json::parse(read_text(in("r.json")))["input"]["ground_points"], 0);
+}
+
+TEST_F(CliTree, TellsTheTreesOfAScene) {
+  const test::SceneScan scan = test::scan_scene({.trees = 2, .points = 12'000, .bushes = 1, .random_seed = 3});
+  std::string text;
+  for (const Vec3& p : scan.points)
+    text += std::to_string(p.x) + ' ' + std::to_string(p.y) + ' ' + std::to_string(p.z) + '\n';
+  write_text("scene.xyz", text);
+  const Result result = run({"tree", in("scene.xyz"), "-o", in("out.obj"), "--scene", "--cylinders", in("c.csv"),
+                             "--labels", in("l.ply"), "--preview", in("p.png"), "--report", in("r.json")});
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("of the ground"), std::string::npos);
+  EXPECT_NE(result.out.find("tree 1"), std::string::npos);
+  const Json report = Json::parse(read_text(in("r.json")));
+  const Json& input = report["input"];
+  ASSERT_EQ(report["trees"].size(), 2u);
+  std::size_t points = 0, branches = 0;
+  for (const Json& tree : report["trees"]) {
+    EXPECT_EQ(tree["trunk"], branches);
+    points += tree["points"].get<std::size_t>();
+    branches += tree["branches"].get<std::size_t>();
+    EXPECT_NEAR(tree["base"][2], tree["ground"].get<double>(), 0.5);
+  }
+  EXPECT_EQ(report["branches"].size(), branches);
+  for (const char* part : {"ground_points", "wall_points", "low_plant_points", "stray_points", "unexplained_points"})
+    points += input[part].get<std::size_t>();
+  EXPECT_EQ(points, scan.points.size());
+  EXPECT_EQ(input["walls"], 0);
+  const std::vector<double> labels = read_vertex_attribute(in("l.ply"), "label"),
+                            trees = read_vertex_attribute(in("l.ply"), "tree");
+  EXPECT_EQ(std::count(labels.begin(), labels.end(), -3), input["ground_points"]);
+  EXPECT_EQ(*std::max_element(trees.begin(), trees.end()), 1);
+  EXPECT_NE(read_text(in("out.obj")).find("g branch_0_tree_0\n"), std::string::npos);
+  const TriangleMesh mesh = read_mesh(in("out.obj"));
+  EXPECT_EQ(std::set<std::int32_t>(mesh.labels.begin(), mesh.labels.end()).size(), branches);
+  std::istringstream table(read_text(in("c.csv")));
+  std::string line, last;
+  std::getline(table, line);
+  EXPECT_TRUE(line.ends_with(",added,tree")) << line;
+  while (std::getline(table, line)) last = line;
+  EXPECT_TRUE(last.ends_with(",0,2")) << last;
+
+  ASSERT_EQ(
+      run({"tree", in("scene.xyz"), "-o", in("out.ply"), "--ground", "auto", "--report", in("r.json"), "--quiet"}).code,
+      0);
+  EXPECT_EQ(Json::parse(read_text(in("r.json")))["input"]["ground_points"], input["ground_points"]);
+  expect_failure(2, {"tree", in("scene.xyz"), "-o", in("t.obj"), "--scene", "--ground", "auto"}, "leave out auto");
+  expect_failure(2, {"tree", in("scene.xyz"), "-o", in("t.obj"), "--scene", "--components", "separate"}, "--scene");
+  expect_failure(2, {"tree", in("scene.xyz"), "-o", in("t.obj"), "--ground", "low"}, "neither a height nor auto");
+  write_text("bush.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0.1\n");
+  expect_failure(1, {"tree", in("bush.xyz"), "-o", in("t.obj"), "--scene"}, "no tree found");
 }
 
 TEST_F(CliTree, BadUsageAndInput) {

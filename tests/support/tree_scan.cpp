@@ -108,31 +108,6 @@ std::vector<Sweep> sweeps_of(ScanPath path, const std::vector<AxisBranch>& branc
   return sweeps;
 }
 
-// Around thin twigs, in no order.
-std::vector<LeafDisc> grow_leaves(const std::vector<AxisBranch>& branches, std::size_t count, SplitMix64& random) {
-  std::vector<double> length;  // up to each piece
-  std::vector<std::pair<std::size_t, std::size_t>> pieces;
-  for (std::size_t b = 0; b < branches.size(); ++b)
-    for (std::size_t i = 0; i + 1 < branches[b].axis.size(); ++i)
-      if (branches[b].radii[i] < kLeafTwig * branches[0].radii[0]) {
-        length.push_back((length.empty() ? 0 : length.back()) + norm(branches[b].axis[i + 1] - branches[b].axis[i]));
-        pieces.push_back({b, i});
-      }
-  if (pieces.empty()) return {};
-  std::vector<LeafDisc> leaves(count);
-  for (LeafDisc& leaf : leaves) {
-    const auto at = std::upper_bound(length.begin(), length.end(), random.unit() * length.back());
-    const auto [b, i] = pieces[std::min(static_cast<std::size_t>(at - length.begin()), pieces.size() - 1)];
-    const Vec3 from = branches[b].axis[i], along = branches[b].axis[i + 1] - from;
-    leaf.radius = random.range(0.02, 0.05);
-    const double stalk = branches[b].radii[i] + leaf.radius + random.range(0, 0.3);
-    leaf.centre = from + random.unit() * along + stalk * across(along, random.range(0, 2 * kPi));
-    const double z = random.range(-1, 1), azimuth = random.range(0, 2 * kPi), r = std::sqrt(1 - z * z);
-    leaf.normal = {r * std::cos(azimuth), r * std::sin(azimuth), z};
-  }
-  return leaves;
-}
-
 struct Return {
   Vec3 point, origin;
   PointKind kind = PointKind::wood;
@@ -287,6 +262,30 @@ std::vector<AxisBranch> grow_neighbour(const TreeGrowth& tree, std::uint64_t ran
 }
 
 }  // namespace
+
+std::vector<LeafDisc> grow_leaves(const std::vector<AxisBranch>& branches, std::size_t count, SplitMix64& random) {
+  std::vector<double> length;  // up to each piece
+  std::vector<std::pair<std::size_t, std::size_t>> pieces;
+  for (std::size_t b = 0; b < branches.size(); ++b)
+    for (std::size_t i = 0; i + 1 < branches[b].axis.size(); ++i)
+      if (branches[b].radii[i] < kLeafTwig * branches[0].radii[0]) {
+        length.push_back((length.empty() ? 0 : length.back()) + norm(branches[b].axis[i + 1] - branches[b].axis[i]));
+        pieces.push_back({b, i});
+      }
+  if (pieces.empty()) return {};
+  std::vector<LeafDisc> leaves(count);
+  for (LeafDisc& leaf : leaves) {
+    const auto at = std::upper_bound(length.begin(), length.end(), random.unit() * length.back());
+    const auto [b, i] = pieces[std::min(static_cast<std::size_t>(at - length.begin()), pieces.size() - 1)];
+    const Vec3 from = branches[b].axis[i], along = branches[b].axis[i + 1] - from;
+    leaf.radius = random.range(0.02, 0.05);
+    const double stalk = branches[b].radii[i] + leaf.radius + random.range(0, 0.3);
+    leaf.centre = from + random.unit() * along + stalk * across(along, random.range(0, 2 * kPi));
+    const double z = random.range(-1, 1), azimuth = random.range(0, 2 * kPi), r = std::sqrt(1 - z * z);
+    leaf.normal = {r * std::cos(azimuth), r * std::sin(azimuth), z};
+  }
+  return leaves;
+}
 
 TreeScan scan_tree(const TreeScanOptions& options) {
   SplitMix64 random(options.random_seed);

@@ -51,4 +51,7 @@ struct TreeScan {
 // scan.
 TreeScan scan_tree(const TreeScanOptions& options);
 
+// Leaves around thin twigs, in no order.
+std::vector<LeafDisc> grow_leaves(const std::vector<AxisBranch>& branches, std::size_t count, SplitMix64& random);
+
 }  // namespace bisector::test
