@@ -29,7 +29,7 @@ struct Row {
   test::Shares ground, wall;
   double right = 0, alone = 0;               // share of branches with the right parent; made from its points alone
   std::vector<double> volume, alone_volume;  // sizes of the trees' relative errors
-  double base = 0;                      // mean distance of the bases' heights from the true ones, m
+  double base = 0;                           // mean distance of the bases' heights from the true ones, m
   double scene_seconds = 0, seconds = 0;
 };
 

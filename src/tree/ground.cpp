@@ -32,8 +32,8 @@ constexpr std::uint8_t kGroundClass = 2;  // of LAS
 // A block of cells shows the ground if points lie in at least three of its quarters, the layer is thin beside its width
 // and holds more points than what is above it as far as half a block.
 constexpr std::size_t kLeastPoints = 4, kLeastQuarters = 3;
-constexpr double kPointsPerBlock = 10;  // of the layer, if they were spread evenly
-constexpr std::size_t kWidest = 8;      // blocks, in cells
+constexpr double kPointsPerBlock = 10;    // of the layer, if they were spread evenly
+constexpr std::size_t kWidest = 8;        // blocks, in cells
 constexpr double kThin = 0.15;            // of kBand deviations in the block's width
 constexpr std::size_t kLeastBlocks = 25;  // that hang together
 constexpr std::size_t kFewBlocks = 4;     // that do, beside them
@@ -332,7 +332,8 @@ Ground find_ground(const std::vector<Vec3>& points, const std::vector<std::uint8
   context.check();
 
   const std::vector<double> above = heights_above(points, field);
-  const auto near_plate = std::count_if(above.begin(), above.end(), [&](double r) { return std::abs(r) < kBand * ground.noise; });
+  const auto near_plate =
+      std::count_if(above.begin(), above.end(), [&](double r) { return std::abs(r) < kBand * ground.noise; });
   const Blocks blocks(field, std::max<std::size_t>(static_cast<std::size_t>(near_plate), 1));
   const std::vector<double> noise = local_noise(points, above, ground.noise, blocks);
   const std::vector<char> near = blocks_of_ground(points, above, noise, blocks);

@@ -111,8 +111,7 @@ class Parting {
       const Index low = minimum.point;
       if (minimum.held - heights_[low] < kHolding * size_ || !is_low(low)) continue;
       Stem stem = stem_from(low);
-      if (!stem.rises || stem.radius > kStoutest * size_ || continues(stem))
-        continue;
+      if (!stem.rises || stem.radius > kStoutest * size_ || continues(stem)) continue;
       stems_.push_back(std::move(stem));
     }
   }
@@ -160,7 +159,8 @@ class Parting {
     for (const std::vector<Index>& step : steps)
       if (step.size() >= kLeastInStep) sections.push_back(section_of(step));
     if (sections.size() < 2) return stem;
-    std::stable_sort(sections.begin(), sections.end(), [](const Stem& a, const Stem& b) { return a.radius < b.radius; });
+    std::stable_sort(sections.begin(), sections.end(),
+                     [](const Stem& a, const Stem& b) { return a.radius < b.radius; });
     stem.centre = sections[0].centre;
     stem.radius = sections[1].radius;
     std::vector<char> occupied(kSteps, 0);

@@ -284,8 +284,8 @@ struct Foot {
   const SceneDivision* scene = nullptr;  // that knows the ground, or not
 };
 
-// Trunks begin at the ground: axes that were led on below it are cut, and trunks whose foot is not seen go straight down
-// to it, by kMostHidden of the tree's height at most.
+// Trunks begin at the ground: axes that were led on below it are cut, and trunks whose foot is not seen go straight
+// down to it, by kMostHidden of the tree's height at most.
 void plant_trunks(const SceneDivision& scene, double height, std::vector<Limb>& limbs) {
   for (Limb& limb : limbs) {
     if (limb.parent != kNone || std::isnan(scene.ground_at(limb.axis.front()))) continue;

@@ -231,9 +231,10 @@ TEST(Scene, EveryPointIsOneThingAndEveryTreeIsFoundOnce) {
     for (std::size_t t = 0; t < 3; ++t) {
       const ScannedTree& tree = result.trees[score.match[t]];
       const Vec3 base = scan.branches[t][0].axis[0];
-      EXPECT_NEAR(tree.ground, base.z, 0.05);
+      const double off = std::hypot(tree.base.x - base.x, tree.base.y - base.y);
+      EXPECT_LT(off, 0.4);
+      EXPECT_NEAR(tree.ground, base.z, 0.02 + 0.4 * off);  // the steepest slope of this ground
       EXPECT_NEAR(tree.base.z, tree.ground, 0.05);
-      EXPECT_LT(std::hypot(tree.base.x - base.x, tree.base.y - base.y), 0.4);
       std::vector<double> above;
       for (const Vec3& p : scan.tree_alone(static_cast<Index>(t)).points) above.push_back(p.z - base.z);
       std::sort(above.begin(), above.end());
@@ -261,7 +262,7 @@ TEST(Scene, SameForAnyNumberOfThreads) {
 
 TEST(Scene, WithoutGroundAndFarFromTheOriginTheTreesAreTheSame) {
   test::SceneScan scan =
-      test::scan_scene({.trees = 2, .points = 8'000, .ground = false, .slope = 0.1, .random_seed = 64});
+      test::scan_scene({.trees = 2, .points = 5'000, .ground = false, .slope = 0.1, .random_seed = 64});
   TreeResult result = reconstruct_tree(scan.points, scene_options());
   EXPECT_EQ(result.ground_points, 0u);
   EXPECT_TRUE(std::isnan(result.trees[0].ground));
