@@ -118,8 +118,8 @@ class Division {
  private:
   std::string no_tree() const {
     return fmt::format(
-        "no tree found among {} points: nothing narrow rises from the ground; leave out --scene to take "
-        "all points for one tree",
+        "no tree found among {} points: nothing narrow rises from the ground; give a scan with stems, or "
+        "make no scene of it, and all points are one tree",
         points_.size());
   }
 
