@@ -28,7 +28,7 @@ constexpr double kTilt = 0.94;          // cosine of the angle between the surro
 constexpr double kOff = 0.3;            // distance of means from the plane, in a cube's width
 constexpr double kFilled = 0.5;         // share of the rectangle around
 constexpr double kNear = 0.5;           // of a cube's width off the plane: points that tell the noise
-constexpr double kBand = 3;             // deviations
+constexpr double kBand = 3;             // deviations, at least: points that are the wall's
 constexpr std::size_t kLeastCubes = 8;  // that a plane is grown to before it is looked at
 
 using Cube = std::array<std::int64_t, 3>;
@@ -144,28 +144,39 @@ class WallFinder {
     return walls;
   }
 
-  // The points of a wall.
+  // The points of a wall. Those at its cubes tell the noise, by which all in its rectangle are judged: of what is
+  // behind a crown pieces are seen that hang on nothing.
   std::vector<Index> points_of(const std::vector<Index>& region) const {
     Plane plane = fit_plane(means_, region);
     const Axes axes(plane.normal);
     const Cells cells(*this, region, plane, axes);
-    std::vector<Index> own;
-    std::vector<double> off;
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    std::pair<double, double> lo{kInfinity, kInfinity}, hi{-kInfinity, -kInfinity};
+    for (const Index i : region) {
+      const auto [u, v] = axes.of(means_[i] - plane.centre);
+      lo = {std::min(lo.first, u - width_), std::min(lo.second, v - width_)};
+      hi = {std::max(hi.first, u + width_), std::max(hi.second, v + width_)};
+    }
+    std::vector<Index> inside;
+    std::vector<double> off, own;
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Vec3 d = points_[i] - plane.centre;
-      if (const double away = std::abs(dot(d, plane.normal)); away <= kNear * width_ && cells.near(axes.of(d))) {
-        own.push_back(static_cast<Index>(i));
-        off.push_back(dot(d, plane.normal));
-      }
+      const double away = dot(d, plane.normal);
+      const auto [u, v] = axes.of(d);
+      if (std::abs(away) > kNear * width_ || u < lo.first || u > hi.first || v < lo.second || v > hi.second) continue;
+      inside.push_back(static_cast<Index>(i));
+      off.push_back(away);
+      if (cells.near({u, v})) own.push_back(away);
     }
-    if (own.empty()) return own;
-    const double middle = quantile(off, 0.5);
-    std::vector<double> away;
-    for (const double d : off) away.push_back(std::abs(d - middle));
-    const double band = kBand * 1.4826 * quantile(away, 0.5);
+    if (own.empty()) return {};
+    const double middle = quantile(own, 0.5);
+    for (double& d : own) d = std::abs(d - middle);
+    // Of so many points, hardly one is farther off than this (the expected maximum of normal deviates).
+    const double deviations = std::sqrt(2 * std::log(static_cast<double>(own.size())));
+    const double band = std::max(kBand, deviations) * 1.4826 * quantile(own, 0.5);
     std::vector<Index> result;
-    for (std::size_t k = 0; k < own.size(); ++k)
-      if (away[k] <= band) result.push_back(own[k]);
+    for (std::size_t k = 0; k < inside.size(); ++k)
+      if (std::abs(off[k] - middle) <= band) result.push_back(inside[k]);
     return result;
   }
 
