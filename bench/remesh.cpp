@@ -57,7 +57,9 @@ void run(Options options) {
       const ThreadLimit limit(options.remesh.threads);
       const Surface surface(mesh);
       const auto backend = make_device_backend(surface, options.device, NeighbourSource::nearest);
-      s.last = remesh(*backend, {}, plan_of(options.remesh));
+      s.last = remesh(*backend, {}, plan_of(options.remesh), {}, [&](const Surface& other) {
+        return make_device_backend(other, options.device, NeighbourSource::nearest);
+      });
       s.total.push_back(watch.seconds());
       const double after = delaunay_seconds(seeds);
       const DiagramSeconds& phases = s.last.seconds.diagrams;

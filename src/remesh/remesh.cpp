@@ -18,6 +18,7 @@
 #include "core/stopwatch.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
+#include "remesh/coarse_surface.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/fit.h"
 #include "remesh/improve.h"
@@ -39,6 +40,8 @@ constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0
 // Where fewer have any, so much of the steps is added with them.
 constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
+// Triangles for each seed, from which on a stand-in with fewer may pay.
+constexpr std::size_t kManyFacets = 8;
 constexpr int kMendingRounds = 3;  // of features and topology
 // A run starts again with edges shorter by this where cells are no disks, or along broken curves; not if more than one
 // cell, or curve, in so many is such.
@@ -81,8 +84,9 @@ struct Spent {
 // of their dual.
 class Pipeline {
  public:
-  Pipeline(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context)
-      : surface_(backend.surface()), plan_(plan), curves_(features, surface_.mesh.vertices),
+  Pipeline(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context,
+           const MakeBackend& make_backend)
+      : backend_(backend), make_backend_(make_backend), surface_(backend.surface()), plan_(plan), curves_(features, surface_.mesh.vertices),
         measure_(surface_, curves_), trace_(surface_, curves_),
         wanted_(plan.seeds.empty() ? plan.vertices : plan.seeds.size()),
         input_topology_(analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size())),
@@ -125,6 +129,7 @@ class Pipeline {
   std::vector<std::size_t> choose_levels() const;
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
+  bool begin_on_stand_in(std::size_t count);
   void optimise_levels(const std::vector<std::size_t>& counts);
   bool can_localise() const;
   bool dual_suffices();
@@ -138,6 +143,15 @@ class Pipeline {
   void extract_features(const std::vector<Index>& vertex_of);
   void fit();
 
+  // A surface that stands in for the input's, and what computes its diagrams.
+  struct StandIn {
+    std::unique_ptr<Surface> surface;
+    std::unique_ptr<Backend> backend;
+  };
+
+  Backend& backend_;
+  const MakeBackend& make_backend_;
+  StandIn stand_in_;
   const Surface& surface_;
   const RemeshPlan& plan_;
   const FeatureCurves curves_;
@@ -184,6 +198,17 @@ void Pipeline::to_next_level(std::size_t count) {
   meet_count(run_, count);
 }
 
+// Whether there is a stand-in for that many seeds. Then the run is on it.
+bool Pipeline::begin_on_stand_in(std::size_t count) {
+  if (!make_backend_ || surface_.facets.size() < kManyFacets * count) return false;
+  std::unique_ptr<Surface> coarse = coarse_surface(surface_, curves_.graph(), measure_.scale(count));
+  if (!coarse) return false;
+  std::unique_ptr<Backend> backend = make_backend_(*coarse);
+  run_.change_backend(*backend);
+  stand_in_ = {std::move(coarse), std::move(backend)};
+  return true;
+}
+
 // With seeds for the first of these levels.
 void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
   // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
@@ -198,6 +223,7 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     const bool may_localise = level + 1 == counts.size() && can_localise();
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
+    if (level + 1 < counts.size()) begin_on_stand_in(counts[level]);
     optimise(run_, step_);
     if (may_localise) run_.localise(true);
     if (may_localise && run_.strays() == 0) run_.localise(false);
@@ -205,8 +231,12 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
       step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
       optimise(run_, step_);
     }
-    if (run_.has_features()) clear_features(run_, trace_, measure_, step_);
+    if (run_.has_features()) {
+      run_.change_backend(backend_);
+      clear_features(run_, trace_, measure_, step_);
+    }
     if (level + 1 < counts.size()) to_next_level(counts[level + 1]);
+    run_.change_backend(backend_);
   }
   if (plan_.constrained) {
     step_.constrained = true;
@@ -531,6 +561,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   if (options.threads) limit.emplace(options.threads);
   Preparation preparation(input, options, context);
   Compute compute(options.compute, context);
+  const MakeBackend make_backend = [&](const Surface& surface) { return compute.backend(surface); };
   double preparing = watch.seconds();
   // The run starts again once where cells are no disks, and some times for what is wrong with its result, with shorter
   // edges there.
@@ -550,7 +581,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     const Surface surface(std::move(prepared.mesh), prepared.density);
     preparing += laying_down.seconds();
     const std::unique_ptr<Backend> backend = compute.backend(surface);
-    Pipeline pipeline(*backend, prepared.features, plan, progress.context());
+    Pipeline pipeline(*backend, prepared.features, plan, progress.context(), make_backend);
     pipeline.count(before);
     if (earlier) pipeline.place_again(*earlier);
     else pipeline.place();
@@ -592,10 +623,11 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   return std::move(chosen);
 }
 
-RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context) {
+RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context,
+                    const MakeBackend& make_backend) {
   check_plan(plan);
   const Stopwatch watch;
-  Pipeline pipeline(backend, features, plan, context);
+  Pipeline pipeline(backend, features, plan, context, make_backend);
   pipeline.place();
   RemeshResult result = pipeline.finish();
   result.seconds.total = watch.seconds();

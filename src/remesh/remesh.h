@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "backend/backend.h"
@@ -28,9 +30,13 @@ struct RemeshPlan {
 // What of the options is left then. Energy::automatic means constrained.
 RemeshPlan plan_of(const RemeshOptions& options);
 
-// Throws as the public remesh(): for fewer than 4 vertices, a number of places other than that of seeds, DeviceError,
+// Makes a backend like the run's own for another surface, which must outlive it.
+using MakeBackend = std::function<std::unique_ptr<Backend>(const Surface&)>;
+
+// With `make_backend` seeds that are far from their final places are optimised on surfaces of fewer triangles. Throws
+// as the public remesh(): for fewer than 4 vertices, a number of places other than that of seeds, DeviceError,
 // Cancelled.
-RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan,
-                    const Context& context = {});
+RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context = {},
+                    const MakeBackend& make_backend = {});
 
 }  // namespace bisector

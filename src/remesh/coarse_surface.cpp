@@ -1,0 +1,193 @@
+#include "remesh/coarse_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <queue>
+#include <utility>
+#include <vector>
+
+#include "mesh/topology.h"
+
+namespace bisector {
+namespace {
+
+constexpr double kSpacing = 0.5;           // of the vertices, in edges
+constexpr double kNormals = 0.5;           // cosine of the angle between normals of vertices that become one, at least
+constexpr double kPerComponent = 4;        // edges are no longer than those of so many cells on a component
+constexpr double kPerCurve = 4;            // nor than such a part of a curve
+constexpr double kFewer = 0.6;             // triangles must be fewer than this share
+constexpr double kAreaTolerance = 0.05;    // relative
+
+// The vertices that become one are those with the same label, which is the index of the one that stays.
+class Clusters {
+ public:
+  Clusters(const Surface& surface, double edge_length);
+
+  void take_curves(const FeatureGraph& features);
+  void take_surface();
+  const std::vector<Index>& labels() const { return label_; }
+
+ private:
+  struct Front {
+    double distance;
+    Index vertex, label;
+    bool operator>(const Front& o) const {
+      if (distance != o.distance) return distance > o.distance;
+      return vertex != o.vertex ? vertex > o.vertex : label > o.label;
+    }
+  };
+
+  void find_normals();
+  void set_spacing(double edge_length);
+  void hold(Index vertex, Index label, double distance);
+  void take_curve(const FeatureCurve& curve);
+  void advance(Index vertex);
+  void spread();
+
+  const Surface& surface_;
+  const TriangleMesh& mesh_;
+  const Csr<Index> neighbours_;
+  std::vector<Vec3> normals_;
+  std::vector<double> spacing_, distance_;
+  std::vector<Index> label_;
+  std::vector<char> held_;  // on features, whose labels are theirs for good
+  std::priority_queue<Front, std::vector<Front>, std::greater<>> fronts_;
+};
+
+Clusters::Clusters(const Surface& surface, double edge_length)
+    : surface_(surface), mesh_(surface.mesh),
+      neighbours_(vertex_neighbours(mesh_.triangles, mesh_.vertices.size())), distance_(mesh_.vertices.size(), std::numeric_limits<double>::infinity()),
+      label_(mesh_.vertices.size(), kNone), held_(mesh_.vertices.size(), 0) {
+  find_normals();
+  set_spacing(edge_length);
+}
+
+void Clusters::find_normals() {
+  normals_.assign(mesh_.vertices.size(), {});
+  for (const Facet& facet : surface_.facets) {
+    const std::size_t k = static_cast<std::size_t>(&facet - surface_.facets.data());
+    const Vec3 area = cross(facet.corners[1] - facet.corners[0], facet.corners[2] - facet.corners[0]);
+    for (const Index v : mesh_.triangles[surface_.summaries[k].triangle]) normals_[v] += area;
+  }
+  for (Vec3& n : normals_) {
+    const double length = norm(n);
+    if (length > 0) n *= 1 / length;
+  }
+}
+
+void Clusters::set_spacing(double edge_length) {
+  const std::vector<Index> component = label_components(mesh_.triangles, mesh_.vertices.size());
+  std::vector<double> area;
+  for (std::size_t k = 0; k < surface_.facets.size(); ++k) {
+    const Facet& f = surface_.facets[k];
+    const Index c = component[mesh_.triangles[surface_.summaries[k].triangle][0]];
+    if (c >= area.size()) area.resize(c + 1, 0);
+    area[c] += 0.5 * dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
+  }
+  spacing_.assign(mesh_.vertices.size(), 0);
+  for (const Index v : surface_.used_vertices) {
+    const double most = std::sqrt(2 / std::numbers::sqrt3 * area[component[v]] / kPerComponent);
+    const double density = surface_.density.empty() ? 1 : surface_.density[v];
+    spacing_[v] = kSpacing * std::min(most, edge_length / std::sqrt(std::sqrt(density)));
+  }
+}
+
+void Clusters::hold(Index vertex, Index label, double distance) {
+  held_[vertex] = 1;
+  label_[vertex] = label;
+  distance_[vertex] = distance;
+  advance(vertex);
+}
+
+void Clusters::take_curve(const FeatureCurve& curve) {
+  const std::size_t n = curve.vertices.size(), segments = curve.closed ? n : n - 1;
+  std::vector<double> at(segments + 1, 0);
+  const auto vertex = [&](std::size_t k) { return curve.vertices[k % n]; };
+  for (std::size_t k = 0; k < segments; ++k)
+    at[k + 1] = at[k] + norm(mesh_.vertices[vertex(k + 1)] - mesh_.vertices[vertex(k)]);
+  const double most = at.back() / kPerCurve;
+  std::size_t last = 0;
+  for (std::size_t k = 1; k <= segments; ++k) {
+    const double spacing = std::min(most, spacing_[vertex(k)]);
+    const bool stays = k == segments || (at[k] - at[last] >= spacing && at.back() - at[k] >= 0.5 * spacing);
+    if (!stays) continue;
+    for (std::size_t m = last; m <= k; ++m) {
+      if (held_[vertex(m)]) continue;
+      const bool to_last = at[m] - at[last] <= at[k] - at[m];
+      hold(vertex(m), vertex(to_last ? last : k), to_last ? at[m] - at[last] : at[k] - at[m]);
+    }
+    last = k;
+  }
+}
+
+void Clusters::take_curves(const FeatureGraph& features) {
+  for (const Index v : features.corners) hold(v, v, 0);
+  for (const FeatureCurve& curve : features.curves) take_curve(curve);
+  spread();
+}
+
+void Clusters::advance(Index vertex) {
+  for (const Index* to = neighbours_.begin(vertex); to != neighbours_.end(vertex); ++to) {
+    if (held_[*to]) continue;
+    const double distance = distance_[vertex] + norm(mesh_.vertices[*to] - mesh_.vertices[vertex]);
+    if (distance < distance_[*to] && distance <= spacing_[*to]) fronts_.push({distance, *to, label_[vertex]});
+  }
+}
+
+// Every front goes on as far as it is nearer than others, and no farther than the spacing there.
+void Clusters::spread() {
+  while (!fronts_.empty()) {
+    const Front front = fronts_.top();
+    fronts_.pop();
+    const Index v = front.vertex;
+    if (held_[v] || front.distance >= distance_[v] || front.distance > spacing_[v]) continue;
+    if (!held_[front.label] && dot(normals_[v], normals_[front.label]) < kNormals) continue;
+    distance_[v] = front.distance;
+    label_[v] = front.label;
+    advance(v);
+  }
+}
+
+void Clusters::take_surface() {
+  for (const Index v : surface_.used_vertices) {
+    if (label_[v] != kNone) continue;
+    fronts_.push({0, v, v});
+    spread();
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Surface> coarse_surface(const Surface& fine, const FeatureGraph& features, double edge_length) {
+  Clusters clusters(fine, edge_length);
+  clusters.take_curves(features);
+  clusters.take_surface();
+  const std::vector<Index>& label = clusters.labels();
+  TriangleMesh mesh;
+  std::vector<double> density;
+  std::vector<Index> renamed(label.size(), kNone);
+  const std::size_t most = static_cast<std::size_t>(kFewer * static_cast<double>(fine.facets.size()));
+  for (const FacetSummary& facet : fine.summaries) {
+    const Triangle& t = fine.mesh.triangles[facet.triangle];
+    Triangle image{label[t[0]], label[t[1]], label[t[2]]};
+    if (image[0] == image[1] || image[1] == image[2] || image[2] == image[0]) continue;
+    if (mesh.triangles.size() == most) return nullptr;
+    for (Index& v : image) {
+      if (renamed[v] == kNone) {
+        renamed[v] = static_cast<Index>(mesh.vertices.size());
+        mesh.vertices.push_back(fine.mesh.vertices[v]);
+        if (!fine.density.empty()) density.push_back(fine.density[v]);
+      }
+      v = renamed[v];
+    }
+    mesh.triangles.push_back(image);
+  }
+  if (mesh.triangles.empty()) return nullptr;
+  auto coarse = std::make_unique<Surface>(std::move(mesh), std::move(density));
+  if (std::abs(coarse->area - fine.area) > kAreaTolerance * fine.area) return nullptr;
+  return coarse;
+}
+
+}  // namespace bisector
