@@ -42,6 +42,8 @@ constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
 // Triangles for each seed, from which on a stand-in with fewer may pay.
 constexpr std::size_t kManyFacets = 8;
+// Of the steps of the finest level, those that are made on the input after all.
+constexpr double kOnInputShare = 0.3;
 constexpr int kMendingRounds = 3;  // of features and topology
 // A run starts again with edges shorter by this where cells are no disks, or along broken curves; not if more than one
 // cell, or curve, in so many is such.
@@ -220,11 +222,18 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     const double share = steps_share(level, counts.size());
     step_.done += std::exchange(step_.share, share * cost(counts[level]) / total);
     const int steps = share_of(plan_.iterations, share);
-    const bool may_localise = level + 1 == counts.size() && can_localise();
+    const bool finest = level + 1 == counts.size();
+    const bool may_localise = finest && can_localise();
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
-    if (level + 1 < counts.size()) begin_on_stand_in(counts[level]);
-    optimise(run_, step_);
+    if (begin_on_stand_in(counts[level])) {
+      const int on_input = finest ? share_of(step_.iterations, kOnInputShare) : 0;
+      step_.iterations -= on_input;
+      optimise(run_, step_);
+      step_.iterations = on_input;
+      if (finest) run_.change_backend(backend_);
+    }
+    if (step_.iterations > 0) optimise(run_, step_);
     if (may_localise) run_.localise(true);
     if (may_localise && run_.strays() == 0) run_.localise(false);
     if (many || run_.localises()) {
