@@ -8,11 +8,25 @@
 namespace bisector {
 namespace {
 
+constexpr std::size_t kPairsAtOnce = 8192;  // of a parallel loop
+
 struct Triple {
   Triangle ascending;
   Index mesh_triangle;
   bool flipped;  // the oriented triple is an odd permutation of `ascending`
 };
+
+// What list(k, found) appends for all k below n, in the order of k.
+template <class T, class List>
+std::vector<T> collect(std::size_t n, const List& list) {
+  std::vector<std::vector<T>> of_chunk((n + kPairsAtOnce - 1) / kPairsAtOnce);
+  parallel_chunks(n, kPairsAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) list(k, of_chunk[c]);
+  });
+  std::vector<T> all;
+  for (const std::vector<T>& found : of_chunk) all.insert(all.end(), found.begin(), found.end());
+  return all;
+}
 
 bool operator<(const Triple& a, const Triple& b) {
   return a.ascending != b.ascending ? a.ascending < b.ascending : a.mesh_triangle < b.mesh_triangle;
@@ -21,18 +35,19 @@ bool operator<(const Triple& a, const Triple& b) {
 }  // namespace
 
 Dual extract_dual(const RestrictedPolygons& polygons) {
-  std::vector<Triple> triples;
-  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+  std::vector<Triple> triples = collect<Triple>(polygons.pairs.size(), [&](std::size_t k, std::vector<Triple>& found) {
     const auto [triangle, cell] = polygons.pairs[k];
-    const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
-    for (std::size_t e = 0; e < size; ++e) {
-      const Index b = polygons.labels[first + (e + size - 1) % size], c = polygons.labels[first + e];
-      // Each vertex is seen from its three cells; the lowest reports it.
-      if (is_edge(b) || is_edge(c) || b < cell || c < cell) continue;
-      // Walking around the cell, the neighbour before the vertex precedes the one after it.
-      triples.push_back({{cell, std::min(b, c), std::max(b, c)}, triangle, b > c});
+    const std::size_t first = polygons.offsets[k], end = polygons.offsets[k + 1];
+    Index b = polygons.labels[end - 1];
+    for (std::size_t e = first; e < end; ++e) {
+      const Index c = polygons.labels[e];
+      // Each vertex is seen from its three cells; the lowest reports it. Walking around the cell, the neighbour before
+      // the vertex precedes the one after it.
+      if (!is_edge(b) && !is_edge(c) && b > cell && c > cell)
+        found.push_back({{cell, std::min(b, c), std::max(b, c)}, triangle, b > c});
+      b = c;
     }
-  }
+  });
   sort_in_parallel(triples, [](const Triple& a, const Triple& b) { return a < b; });
   Dual dual;
   for (std::size_t k = 0; k < triples.size(); ++k) {
@@ -63,8 +78,7 @@ std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, con
     DualEdge edge;
     double squared;  // from the middle of the seeds
   };
-  std::vector<Piece> pieces;
-  for (std::size_t k = 0; k < polygons.pairs.size(); ++k) {
+  std::vector<Piece> pieces = collect<Piece>(polygons.pairs.size(), [&](std::size_t k, std::vector<Piece>& found) {
     const Index cell = polygons.pairs[k].cell;
     const std::size_t first = polygons.offsets[k], size = polygons.offsets[k + 1] - first;
     for (std::size_t e = 0; e < size; ++e) {
@@ -75,9 +89,9 @@ std::vector<DualEdge> extract_dual_edges(const RestrictedPolygons& polygons, con
       const double length2 = norm2(along);
       if (length2 == 0) continue;
       const Vec3 nearest = p + std::clamp(dot(middle - p, along) / length2, 0.0, 1.0) * along;
-      pieces.push_back({{cell, label, nearest}, norm2(nearest - middle)});
+      found.push_back({{cell, label, nearest}, norm2(nearest - middle)});
     }
-  }
+  });
   sort_in_parallel(pieces, [](const Piece& x, const Piece& y) {
     const auto key = [](const Piece& p) {
       return std::tie(p.edge.a, p.edge.b, p.squared, p.edge.crossing.x, p.edge.crossing.y, p.edge.crossing.z);

@@ -7,14 +7,15 @@ namespace bisector {
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
                     RestrictedPolygons& out) {
   out.pairs.push_back({triangle, seeds.id[slot]});
-  const std::size_t first = clipper.first_corner();
-  for (std::size_t e = 0; e < clipper.size(); ++e) {
-    const std::size_t k = (first + e) % clipper.size();
+  const std::size_t size = clipper.size(), begin = out.labels.size();
+  out.labels.resize(begin + size);
+  out.vertices.resize(begin + size);
+  for (std::size_t e = 0, k = clipper.first_corner(); e < size; ++e, k = k + 1 == size ? 0 : k + 1) {
     const Index label = clipper.label(k);
-    out.labels.push_back(is_edge(label) ? label : seeds.id[label]);
-    out.vertices.push_back(seeds.x[slot] + clipper.vertex(k));
+    out.labels[begin + e] = is_edge(label) ? label : seeds.id[label];
+    out.vertices[begin + e] = seeds.x[slot] + clipper.vertex(k);
   }
-  out.offsets.push_back(out.labels.size());
+  out.offsets.push_back(begin + size);
 }
 
 std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles) {

@@ -1,6 +1,7 @@
 #include "voronoi/restricted.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "core/marks.h"
 #include "core/parallel.h"
@@ -17,7 +18,7 @@ namespace {
 constexpr std::size_t kMostRemembered = 64;                    // pairs of a facet that are searched for an earlier one
 constexpr std::size_t kRanges = 8;                             // of triangles, in the sort by cells
 constexpr std::size_t kMostFacets = 512, kFewestChunks = 256;  // of a chunk; and chunks, where facets are few and large
-constexpr std::size_t kPointsAtOnce = 256, kCellsAtOnce = 256;  // of a parallel loop
+constexpr std::size_t kPointsAtOnce = 256, kCellsAtOnce = 256, kTrianglesAtOnce = 4096;  // of a parallel loop
 
 // The moments of a pair whose cell holds all of the facet are left to the facet's summary.
 constexpr Index kWhole = kNone;
@@ -309,33 +310,56 @@ DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Ne
 }
 
 // Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of
-// triangles, then cells.
+// triangles, then cells. Blocks of triangles are counted first, so that each has its place.
 void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
-  polygons = {};
-  polygons.pairs.reserve(items.size());
-  polygons.offsets.reserve(items.size() + 1);
-  std::size_t entries = 0;
-  for (const Chunk& chunk : chunks) entries += chunk.polygons.labels.size();
-  polygons.labels.reserve(entries);
-  polygons.vertices.reserve(entries);
-  std::vector<std::size_t> order;
-  for (const Index facet : surface.facet_of) {
-    if (facet == kNone) continue;
-    const Chunk& chunk = chunks[facet / chunk_size];
-    const RestrictedPolygons& from = chunk.polygons;
-    order.clear();
-    for (std::size_t k = first_entry[facet]; k < entries_end(facet, chunk, first_entry); ++k) order.push_back(k);
-    std::sort(order.begin(), order.end(),
-              [&](std::size_t a, std::size_t b) { return from.pairs[a].cell < from.pairs[b].cell; });
-    for (const std::size_t k : order) {
-      polygons.pairs.push_back(from.pairs[k]);
-      const auto begin = static_cast<std::ptrdiff_t>(from.offsets[k]),
-                 end = static_cast<std::ptrdiff_t>(from.offsets[k + 1]);
-      polygons.labels.insert(polygons.labels.end(), from.labels.begin() + begin, from.labels.begin() + end);
-      polygons.vertices.insert(polygons.vertices.end(), from.vertices.begin() + begin, from.vertices.begin() + end);
-      polygons.offsets.push_back(polygons.labels.size());
+  struct Place {
+    std::size_t pair = 0, corner = 0;
+  };
+  const std::size_t triangles = surface.facet_of.size();
+  std::vector<Place> places(triangles / kTrianglesAtOnce + 2);
+  parallel_chunks(triangles, kTrianglesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    Place& count = places[block + 1];
+    for (std::size_t t = begin; t < end; ++t) {
+      const Index facet = surface.facet_of[t];
+      if (facet == kNone) continue;
+      const Chunk& chunk = chunks[facet / chunk_size];
+      const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk, first_entry);
+      count.pair += stop - first;
+      count.corner += chunk.polygons.offsets[stop] - chunk.polygons.offsets[first];
     }
+  });
+  for (std::size_t block = 1; block < places.size(); ++block) {
+    places[block].pair += places[block - 1].pair;
+    places[block].corner += places[block - 1].corner;
   }
+  polygons.pairs.resize(places.back().pair);
+  polygons.offsets.resize(places.back().pair + 1);
+  polygons.offsets[0] = 0;
+  polygons.labels.resize(places.back().corner);
+  polygons.vertices.resize(places.back().corner);
+  parallel_chunks(triangles, kTrianglesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    Place at = places[block];
+    std::vector<std::size_t> order;
+    for (std::size_t t = begin; t < end; ++t) {
+      const Index facet = surface.facet_of[t];
+      if (facet == kNone) continue;
+      const Chunk& chunk = chunks[facet / chunk_size];
+      const RestrictedPolygons& from = chunk.polygons;
+      order.resize(entries_end(facet, chunk, first_entry) - first_entry[facet]);
+      std::iota(order.begin(), order.end(), std::size_t{first_entry[facet]});
+      if (order.size() > 1)
+        std::sort(order.begin(), order.end(),
+                  [&](std::size_t a, std::size_t b) { return from.pairs[a].cell < from.pairs[b].cell; });
+      for (const std::size_t k : order) {
+        polygons.pairs[at.pair++] = from.pairs[k];
+        for (std::size_t e = from.offsets[k]; e < from.offsets[k + 1]; ++e, ++at.corner) {
+          polygons.labels[at.corner] = from.labels[e];
+          polygons.vertices[at.corner] = from.vertices[e];
+        }
+        polygons.offsets[at.pair] = at.corner;
+      }
+    }
+  });
 }
 
 RestrictedVoronoi::RestrictedVoronoi(const Surface& surface, ListLength lists)
