@@ -275,9 +275,7 @@ void Descent::minimise() {
 void optimise(CvtRun& run, const OptimiseOptions& options) {
   const Stopwatch watch;
   const DiagramSeconds before = run.totals.seconds;
-  const int it0=run.totals.iterations, ev0=run.totals.evaluations;
   Descent(run, options).minimise();
-  if (getenv("DBG")) fprintf(stderr,"opt %s n %zu its %d evals %d s %.3f\n",options.phase.c_str(),run.seeds.size(),run.totals.iterations-it0,run.totals.evaluations-ev0,watch.seconds());
   const DiagramSeconds& after = run.totals.seconds;
   run.totals.seconds_lbfgs += watch.seconds() - (after.delaunay - before.delaunay) -
                               (after.neighbours - before.neighbours) - (after.pairs - before.pairs) -

@@ -338,9 +338,7 @@ void Pipeline::improve_quality() {
   const Stopwatch watch;
   const bool held = !topology_.sheets.empty() && divide_sheets().ball.holds;
   const PlacedSeeds before = run_.seeds;
-  const RunTotals t0=run_.totals;
   result_.improved = improve(run_, trace_, {plan_.min_angle, kMaxAngle, wanted_});
-  if (getenv("DBG")) fprintf(stderr,"improve evals %d s %.3f diagrams %.3f\n",run_.totals.evaluations-t0.evaluations,watch.seconds(),run_.totals.seconds.clip+run_.totals.seconds.pairs+run_.totals.seconds.neighbours-t0.seconds.clip-t0.seconds.pairs-t0.seconds.neighbours);
   if (held && !divide_sheets().ball.holds) {
     run_.seeds = before;
     complete(run_, plan_.constrained);
