@@ -1,0 +1,134 @@
+// Surfaces that stand in for finer ones: fewer triangles, the same shape, topology and features.
+#include "remesh/coarse_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "mesh/topology.h"
+#include "support/featured.h"
+#include "support/models.h"
+
+namespace bisector::test {
+namespace {
+
+std::set<std::array<double, 3>> points_of(const TriangleMesh& mesh) {
+  std::set<std::array<double, 3>> points;
+  for (const Vec3& v : mesh.vertices) points.insert({v.x, v.y, v.z});
+  return points;
+}
+
+void expect_stands_in(const Surface& fine, const Surface* coarse) {
+  ASSERT_TRUE(coarse);
+  EXPECT_LT(coarse->facets.size(), 0.6 * static_cast<double>(fine.facets.size()));
+  EXPECT_NEAR(coarse->area, fine.area, 0.05 * fine.area);
+  const std::set<std::array<double, 3>> points = points_of(fine.mesh);
+  for (const Vec3& v : coarse->mesh.vertices) EXPECT_TRUE(points.contains({v.x, v.y, v.z}));
+}
+
+TEST(CoarseSurface, HasTheTopologyOfAClosedSurface) {
+  for (const TriangleMesh& mesh : {icosphere(5), torus(120, 80)}) {
+    const Surface fine(mesh);
+    const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.2);
+    expect_stands_in(fine, coarse.get());
+    const MeshTopology found = topology_of(coarse->mesh), want = topology_of(mesh);
+    EXPECT_TRUE(found.closed);
+    EXPECT_TRUE(found.oriented);
+    EXPECT_EQ(found.euler, want.euler);
+    EXPECT_EQ(found.components, want.components);
+  }
+}
+
+// Vertices half an edge apart: with equilateral triangles some 4 for each seed, and fewer as they are.
+TEST(CoarseSurface, HasAFewTrianglesForEachSeed) {
+  const Surface fine(icosphere(6));
+  for (const double edge : {0.1, 0.2, 0.4}) {
+    const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, edge);
+    expect_stands_in(fine, coarse.get());
+    const double seeds = 2 / std::sqrt(3) * fine.area / (edge * edge);
+    const double per_seed = static_cast<double>(coarse->facets.size()) / seeds;
+    EXPECT_GT(per_seed, 3);
+    EXPECT_LT(per_seed, 9);
+  }
+}
+
+TEST(CoarseSurface, KeepsFeaturesAsChainsOfEdges) {
+  const TriangleMesh mesh = box(32);
+  const FeatureGraph graph = sharp_graph(mesh);
+  const Surface fine(mesh);
+  const std::unique_ptr<Surface> coarse = coarse_surface(fine, graph, 0.25);
+  expect_stands_in(fine, coarse.get());
+  // The faces are flat and their borders straight, so that a triangulation of them without folds has all their area.
+  EXPECT_NEAR(coarse->area, fine.area, 1e-12);
+  const std::set<std::array<double, 3>> points = points_of(coarse->mesh);
+  for (const Index corner : graph.corners) {
+    const Vec3& v = mesh.vertices[corner];
+    EXPECT_TRUE(points.contains({v.x, v.y, v.z}));
+  }
+  double length = 0;
+  for (const auto& [a, b] : sharp_graph(coarse->mesh).edges)
+    length += norm(coarse->mesh.vertices[a] - coarse->mesh.vertices[b]);
+  EXPECT_NEAR(length, 12, 1e-12);
+}
+
+TEST(CoarseSurface, KeepsBordersThatAreFeatures) {
+  const TriangleMesh mesh = wavy_patch(64);
+  const Surface fine(mesh);
+  const std::unique_ptr<Surface> coarse = coarse_surface(fine, sharp_graph(mesh), 0.15);
+  expect_stands_in(fine, coarse.get());
+  const MeshTopology found = topology_of(coarse->mesh);
+  EXPECT_FALSE(found.closed);
+  EXPECT_EQ(found.euler, 1);
+}
+
+TEST(CoarseSurface, LosesNoComponent) {
+  TriangleMesh small = icosphere(3);
+  for (Vec3& v : small.vertices) v *= 0.01;
+  const TriangleMesh mesh = joined(icosphere(5), small, {5, 0, 0});
+  const Surface fine(mesh);
+  const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.3);
+  expect_stands_in(fine, coarse.get());
+  const MeshTopology found = topology_of(coarse->mesh);
+  EXPECT_EQ(found.components, 2u);
+  EXPECT_EQ(found.euler, 4);
+}
+
+// A limb thinner than the vertices are apart would else become a line, and have no seeds.
+TEST(CoarseSurface, KeepsThinLimbs) {
+  TriangleMesh limb = torus(600, 12);  // radii 1 and 0.02
+  for (Vec3& v : limb.vertices) {
+    const double radius = std::hypot(v.x, v.y), factor = (1 + (radius - 1) * 0.02 / 0.375) / radius;
+    v = {v.x * factor, v.y * factor, v.z * 0.02 / 0.375};
+  }
+  const Surface fine(limb);
+  const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.2);
+  if (coarse) expect_stands_in(fine, coarse.get());
+}
+
+TEST(CoarseSurface, IsFinerWhereTheDensityIsHigher) {
+  const TriangleMesh mesh = icosphere(6);
+  std::vector<double> density;
+  for (const Vec3& v : mesh.vertices) density.push_back(v.z > 0 ? 256 : 1);  // edges a quarter as long
+  const Surface fine(mesh, density);
+  const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.4);
+  expect_stands_in(fine, coarse.get());
+  ASSERT_EQ(coarse->density.size(), coarse->mesh.vertices.size());
+  const auto above = std::count_if(coarse->mesh.vertices.begin(), coarse->mesh.vertices.end(),
+                                   [](const Vec3& v) { return v.z > 0; });
+  const auto below = static_cast<std::ptrdiff_t>(coarse->mesh.vertices.size()) - above;
+  EXPECT_GT(above, 8 * below);
+  EXPECT_LT(above, 32 * below);
+}
+
+TEST(CoarseSurface, IsThereOnlyIfItSavesTriangles) {
+  EXPECT_FALSE(coarse_surface(Surface(icosphere(3)), {}, 0.1));
+  // Pieces that are not joined have nothing that could become one.
+  EXPECT_FALSE(coarse_surface(Surface(soup(200, 1)), {}, 10));
+}
+
+}  // namespace
+}  // namespace bisector::test
