@@ -36,13 +36,14 @@ double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double reach =
       std::max({std::abs(u.x), std::abs(u.y), std::abs(u.z), std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (reach == 0 || collinear(a, b, c)) return 0;
+  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  if (reach > 1e-60 && reach < 1e60) return std::max(0.5 * norm(cross(u, v)), kLeast);
   // The fourth power of a length leaves the range of doubles long before its square does; powers of two are exact.
   int exponent = 0;
-  if (reach > 1e60 || reach < 1e-60) std::frexp(reach, &exponent);
+  std::frexp(reach, &exponent);
   exponent = std::max(exponent, -1000);
   const double scale = std::ldexp(1.0, -exponent);
-  const double area = std::ldexp(0.5 * norm(cross(scale * u, scale * v)), 2 * exponent);
-  return std::max(area, std::numeric_limits<double>::denorm_min());
+  return std::max(std::ldexp(0.5 * norm(cross(scale * u, scale * v)), 2 * exponent), kLeast);
 }
 
 }  // namespace bisector

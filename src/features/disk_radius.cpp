@@ -46,12 +46,20 @@ class Balls {
     long long half_edges = 0, vertices = 0;
     for (std::size_t i = 0; i < visit.queue.size(); ++i) {
       const Index t = visit.queue[i];
-      for (Index k = 0; k < 3; ++k) {
-        const Index v = mesh_.triangles[t][k], w = mesh_.triangles[t][(k + 1) % 3];
-        const Vec3 &a = mesh_.vertices[v], &b = mesh_.vertices[w];
-        if (!on_border_[v] && norm2(a - centre.point) <= squared && visit.vertices.mark(v)) ++vertices;
+      const Triangle& corners = mesh_.triangles[t];
+      bool inside[3];
+      for (int k = 0; k < 3; ++k) {
+        const Index v = corners[k];
+        inside[k] = norm2(mesh_.vertices[v] - centre.point) <= squared;
+        if (inside[k] && !on_border_[v] && visit.vertices.mark(v)) ++vertices;
+      }
+      for (Index k = 0, next = 1; k < 3; ++k, next = next == 2 ? 0 : next + 1) {
         const Index twin = twin_[3 * t + k];
-        if (twin == kNone || norm2(nearest_on_segment(centre.point, a, b) - centre.point) > squared) continue;
+        if (twin == kNone) continue;
+        if (!inside[k] && !inside[next]) {
+          const Vec3 &a = mesh_.vertices[corners[k]], &b = mesh_.vertices[corners[next]];
+          if (norm2(nearest_on_segment(centre.point, a, b) - centre.point) > squared) continue;
+        }
         ++half_edges;
         if (visit.triangles.mark(twin / 3)) visit.queue.push_back(twin / 3);
       }
