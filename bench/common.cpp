@@ -28,6 +28,20 @@ std::vector<Vec3> random_seeds(const TriangleMesh& mesh, std::size_t count) {
   return seeds;
 }
 
+namespace {
+
+// In quotes, with `escape` before each quote in the text and before each of itself.
+std::string quoted(const std::string& text, const std::string& escape) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || escape[0] == c) result += escape;
+    result += c;
+  }
+  return result + '"';
+}
+
+}  // namespace
+
 std::string Table::markdown() const {
   std::vector<std::size_t> width;
   for (const std::string& name : columns) width.push_back(name.size());
@@ -48,25 +62,25 @@ std::string Table::markdown() const {
 }
 
 std::string Table::csv() const {
-  std::string text = fmt::format("{}\n", fmt::join(columns, ","));
-  for (const auto& row : rows) text += fmt::format("{}\n", fmt::join(row, ","));
+  std::string text;
+  const auto line = [&](const std::vector<std::string>& cells) {
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      const bool plain = cells[c].find_first_of(",\"") == std::string::npos;
+      text += (c ? "," : "") + (plain ? cells[c] : quoted(cells[c], "\""));
+    }
+    text += '\n';
+  };
+  line(columns);
+  for (const auto& row : rows) line(row);
   return text;
 }
 
 std::string Table::json() const {
-  const auto quoted = [](const std::string& text) {
-    std::string result = "\"";
-    for (const char c : text) {
-      if (c == '"' || c == '\\') result += '\\';
-      result += c;
-    }
-    return result + '"';
-  };
   std::string text = "[";
   for (const auto& row : rows) {
     text += text.size() > 1 ? ",\n {" : "\n {";
     for (std::size_t c = 0; c < row.size(); ++c)
-      text += fmt::format("{}{}: {}", c ? ", " : "", quoted(columns[c]), quoted(row[c]));
+      text += fmt::format("{}{}: {}", c ? ", " : "", quoted(columns[c], "\\"), quoted(row[c], "\\"));
     text += '}';
   }
   return text + "\n]\n";

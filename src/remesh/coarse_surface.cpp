@@ -13,7 +13,7 @@
 namespace bisector {
 namespace {
 
-constexpr double kSpacing = 0.5;           // of the vertices, in edges
+constexpr double kSpacing = 0.6;           // of the vertices, in edges
 constexpr double kNormals = 0.5;           // cosine of the angle between normals of vertices that become one, at least
 constexpr double kPerComponent = 4;        // edges are no longer than those of so many cells on a component
 constexpr double kPerCurve = 4;            // nor than such a part of a curve
