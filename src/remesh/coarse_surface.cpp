@@ -13,12 +13,13 @@
 namespace bisector {
 namespace {
 
-constexpr double kSpacing = 0.6;           // of the vertices, in edges
-constexpr double kNormals = 0.5;           // cosine of the angle between normals of vertices that become one, at least
-constexpr double kPerComponent = 4;        // edges are no longer than those of so many cells on a component
-constexpr double kPerCurve = 4;            // nor than such a part of a curve
-constexpr double kFewer = 0.6;             // triangles must be fewer than this share
-constexpr double kAreaTolerance = 0.05;    // relative
+constexpr double kSpacing = 0.5;         // of the vertices, in edges
+constexpr double kReachAfter = 1.5;      // of fronts that start in the middle of a cluster, in spacings
+constexpr double kNormals = 0.5;         // cosine of the angle between normals of vertices that become one, at least
+constexpr double kPerComponent = 4;      // edges are no longer than those of so many cells on a component
+constexpr double kPerCurve = 4;          // nor than such a part of a curve
+constexpr double kFewer = 0.6;           // triangles must be fewer than this share
+constexpr double kAreaTolerance = 0.05;  // relative
 
 // The vertices that become one are those with the same label, which is the index of the one that stays.
 class Clusters {
@@ -27,6 +28,7 @@ class Clusters {
 
   void take_curves(const FeatureGraph& features);
   void take_surface();
+  void even_out();
   const std::vector<Index>& labels() const { return label_; }
 
  private:
@@ -52,14 +54,15 @@ class Clusters {
   std::vector<Vec3> normals_;
   std::vector<double> spacing_, distance_;
   std::vector<Index> label_;
+  double reach_ = 1;        // of fronts, in spacings
   std::vector<char> held_;  // on features, whose labels are theirs for good
   std::priority_queue<Front, std::vector<Front>, std::greater<>> fronts_;
 };
 
 Clusters::Clusters(const Surface& surface, double edge_length)
-    : surface_(surface), mesh_(surface.mesh),
-      neighbours_(vertex_neighbours(mesh_.triangles, mesh_.vertices.size())), distance_(mesh_.vertices.size(), std::numeric_limits<double>::infinity()),
-      label_(mesh_.vertices.size(), kNone), held_(mesh_.vertices.size(), 0) {
+    : surface_(surface), mesh_(surface.mesh), neighbours_(vertex_neighbours(mesh_.triangles, mesh_.vertices.size())),
+      distance_(mesh_.vertices.size(), std::numeric_limits<double>::infinity()), label_(mesh_.vertices.size(), kNone),
+      held_(mesh_.vertices.size(), 0) {
   find_normals();
   set_spacing(edge_length);
 }
@@ -132,7 +135,7 @@ void Clusters::advance(Index vertex) {
   for (const Index* to = neighbours_.begin(vertex); to != neighbours_.end(vertex); ++to) {
     if (held_[*to]) continue;
     const double distance = distance_[vertex] + norm(mesh_.vertices[*to] - mesh_.vertices[vertex]);
-    if (distance < distance_[*to] && distance <= spacing_[*to]) fronts_.push({distance, *to, label_[vertex]});
+    if (distance < distance_[*to] && distance <= reach_ * spacing_[*to]) fronts_.push({distance, *to, label_[vertex]});
   }
 }
 
@@ -142,7 +145,7 @@ void Clusters::spread() {
     const Front front = fronts_.top();
     fronts_.pop();
     const Index v = front.vertex;
-    if (held_[v] || front.distance >= distance_[v] || front.distance > spacing_[v]) continue;
+    if (held_[v] || front.distance >= distance_[v] || front.distance > reach_ * spacing_[v]) continue;
     if (!held_[front.label] && dot(normals_[v], normals_[front.label]) < kNormals) continue;
     distance_[v] = front.distance;
     label_[v] = front.label;
@@ -158,12 +161,49 @@ void Clusters::take_surface() {
   }
 }
 
+// A step of Lloyd's: the vertex nearest to the middle of its cluster stays instead of the one that was first.
+void Clusters::even_out() {
+  struct Cluster {
+    Vec3 sum;
+    double count = 0;
+    Index middle = kNone;
+    double squared = 0;  // of the middle's distance from the mean, times the count
+  };
+  std::vector<Cluster> clusters(label_.size());
+  for (const Index v : surface_.used_vertices) {
+    Cluster& cluster = clusters[label_[v]];
+    cluster.sum += mesh_.vertices[v];
+    ++cluster.count;
+  }
+  for (const Index v : surface_.used_vertices) {
+    if (held_[label_[v]]) continue;
+    Cluster& cluster = clusters[label_[v]];
+    const double squared = norm2(cluster.count * mesh_.vertices[v] - cluster.sum);
+    if (cluster.middle != kNone && squared >= cluster.squared) continue;
+    cluster.middle = v;
+    cluster.squared = squared;
+  }
+  for (const Index v : surface_.used_vertices) {
+    if (held_[v]) continue;
+    label_[v] = kNone;
+    distance_[v] = std::numeric_limits<double>::infinity();
+  }
+  for (const Index v : surface_.used_vertices)
+    if (held_[v]) advance(v);
+  for (const Cluster& cluster : clusters)
+    if (cluster.middle != kNone) fronts_.push({0, cluster.middle, cluster.middle});
+  reach_ = kReachAfter;
+  spread();
+  take_surface();
+}
+
 }  // namespace
 
 std::unique_ptr<Surface> coarse_surface(const Surface& fine, const FeatureGraph& features, double edge_length) {
   Clusters clusters(fine, edge_length);
   clusters.take_curves(features);
   clusters.take_surface();
+  clusters.even_out();
   const std::vector<Index>& label = clusters.labels();
   TriangleMesh mesh;
   std::vector<double> density;

@@ -41,7 +41,7 @@ constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0
 constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
 // Triangles for each seed, from which on a stand-in with fewer may pay.
-constexpr std::size_t kManyFacets = 6;
+constexpr std::size_t kManyFacets = 8;
 // Of the steps of the finest level, those that are made on the input after all.
 constexpr double kOnInputShare = 0.3;
 constexpr int kMendingRounds = 3;  // of features and topology
@@ -88,8 +88,8 @@ class Pipeline {
  public:
   Pipeline(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context,
            const MakeBackend& make_backend)
-      : backend_(backend), make_backend_(make_backend), surface_(backend.surface()), plan_(plan), curves_(features, surface_.mesh.vertices),
-        measure_(surface_, curves_), trace_(surface_, curves_),
+      : backend_(backend), make_backend_(make_backend), surface_(backend.surface()), plan_(plan),
+        curves_(features, surface_.mesh.vertices), measure_(surface_, curves_), trace_(surface_, curves_),
         wanted_(plan.seeds.empty() ? plan.vertices : plan.seeds.size()),
         input_topology_(analyse_topology(surface_.mesh.triangles, surface_.mesh.vertices.size())),
         localises_(plan.topology != TopologyControl::off && (plan.seeds.empty() || !plan.places.empty())),

@@ -84,8 +84,9 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     const double twice_area = dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
     // The area of a facet that is all but collinear may come out as nothing.
     if (twice_area != 0)
-      f.gradient = (1 / twice_area) * cross(f.normal, (f.density[1] - f.density[0]) * (f.corners[0] - f.corners[2]) +
-                                                          (f.density[2] - f.density[0]) * (f.corners[1] - f.corners[0]));
+      f.gradient =
+          (1 / twice_area) * cross(f.normal, (f.density[1] - f.density[0]) * (f.corners[0] - f.corners[2]) +
+                                                 (f.density[2] - f.density[0]) * (f.corners[1] - f.corners[0]));
     f.anchor = static_cast<unsigned char>(std::min_element(v.begin(), v.end()) - v.begin());
     const Vec3 origin = summary.anchor = f.corners[f.anchor];
     summary.moments = triangle_moments(f.corners[0] - origin, f.corners[1] - origin, f.corners[2] - origin,

@@ -195,8 +195,8 @@ TEST_P(RemeshRuns, AreTheCpus) {
   });
   EXPECT_EQ(stand_ins > 0, model.stands_in);
   const std::unique_ptr<Backend> backend = make_backend(problem.surface, options_of(setup));
-  const RemeshResult found = problem.run_on(
-      *backend, [&](const Surface& surface) { return make_backend(surface, options_of(setup)); });
+  const RemeshResult found =
+      problem.run_on(*backend, [&](const Surface& surface) { return make_backend(surface, options_of(setup)); });
   EXPECT_EQ(found.device.fallback, "");
   EXPECT_EQ(found.untiled, 0u);
   EXPECT_EQ(found.divided, 0u);

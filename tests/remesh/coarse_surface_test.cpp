@@ -43,7 +43,7 @@ TEST(CoarseSurface, HasTheTopologyOfAClosedSurface) {
   }
 }
 
-// Vertices 0.6 edges apart: with equilateral triangles 5.6 for each seed, and fewer as they are.
+// Vertices half an edge apart: with equilateral triangles 8 for each seed, and fewer as they are.
 TEST(CoarseSurface, HasAFewTrianglesForEachSeed) {
   const Surface fine(icosphere(6));
   for (const double edge : {0.1, 0.2, 0.4}) {
@@ -51,8 +51,8 @@ TEST(CoarseSurface, HasAFewTrianglesForEachSeed) {
     expect_stands_in(fine, coarse.get());
     const double seeds = 2 / std::sqrt(3) * fine.area / (edge * edge);
     const double per_seed = static_cast<double>(coarse->facets.size()) / seeds;
-    EXPECT_GT(per_seed, 2);
-    EXPECT_LT(per_seed, 6);
+    EXPECT_GT(per_seed, 3);
+    EXPECT_LT(per_seed, 8);
   }
 }
 
@@ -117,8 +117,8 @@ TEST(CoarseSurface, IsFinerWhereTheDensityIsHigher) {
   const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.4);
   expect_stands_in(fine, coarse.get());
   ASSERT_EQ(coarse->density.size(), coarse->mesh.vertices.size());
-  const auto above = std::count_if(coarse->mesh.vertices.begin(), coarse->mesh.vertices.end(),
-                                   [](const Vec3& v) { return v.z > 0; });
+  const auto above =
+      std::count_if(coarse->mesh.vertices.begin(), coarse->mesh.vertices.end(), [](const Vec3& v) { return v.z > 0; });
   const auto below = static_cast<std::ptrdiff_t>(coarse->mesh.vertices.size()) - above;
   EXPECT_GT(above, 8 * below);
   EXPECT_LT(above, 32 * below);
