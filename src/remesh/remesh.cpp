@@ -226,14 +226,14 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     const bool may_localise = finest && can_localise();
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
-    if (begin_on_stand_in(counts[level])) {
-      const int on_input = finest ? share_of(step_.iterations, kOnInputShare) : 0;
+    if (step_.iterations > 0 && begin_on_stand_in(counts[level]) && finest) {
+      const int on_input = share_of(step_.iterations, kOnInputShare);
       step_.iterations -= on_input;
       optimise(run_, step_);
       step_.iterations = on_input;
-      if (finest) run_.change_backend(backend_);
+      run_.change_backend(backend_);
     }
-    if (step_.iterations > 0) optimise(run_, step_);
+    optimise(run_, step_);
     if (may_localise) run_.localise(true);
     if (may_localise && run_.strays() == 0) run_.localise(false);
     if (many || run_.localises()) {
