@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <queue>
@@ -35,14 +37,10 @@ class Clusters {
   struct Front {
     double distance;
     Index vertex, label;
-    bool operator>(const Front& o) const {
-      if (distance != o.distance) return distance > o.distance;
-      return vertex != o.vertex ? vertex > o.vertex : label > o.label;
-    }
+    friend auto operator<=>(const Front&, const Front&) = default;
   };
 
-  void find_normals();
-  void set_spacing(double edge_length);
+  void find_normals_and_spacing(double edge_length);
   void hold(Index vertex, Index label, double distance);
   void take_curve(const FeatureCurve& curve);
   void advance(Index vertex);
@@ -63,32 +61,21 @@ Clusters::Clusters(const Surface& surface, double edge_length)
     : surface_(surface), mesh_(surface.mesh), neighbours_(vertex_neighbours(mesh_.triangles, mesh_.vertices.size())),
       distance_(mesh_.vertices.size(), std::numeric_limits<double>::infinity()), label_(mesh_.vertices.size(), kNone),
       held_(mesh_.vertices.size(), 0) {
-  find_normals();
-  set_spacing(edge_length);
+  find_normals_and_spacing(edge_length);
 }
 
-void Clusters::find_normals() {
-  normals_.assign(mesh_.vertices.size(), {});
-  for (const Facet& facet : surface_.facets) {
-    const std::size_t k = static_cast<std::size_t>(&facet - surface_.facets.data());
-    const Vec3 area = cross(facet.corners[1] - facet.corners[0], facet.corners[2] - facet.corners[0]);
-    for (const Index v : mesh_.triangles[surface_.summaries[k].triangle]) normals_[v] += area;
-  }
-  for (Vec3& n : normals_) {
-    const double length = norm(n);
-    if (length > 0) n *= 1 / length;
-  }
-}
-
-void Clusters::set_spacing(double edge_length) {
+void Clusters::find_normals_and_spacing(double edge_length) {
   const std::vector<Index> component = label_components(mesh_.triangles, mesh_.vertices.size());
-  std::vector<double> area;
+  std::vector<double> area(mesh_.vertices.size(), 0);  // of components
+  normals_.assign(mesh_.vertices.size(), {});
   for (std::size_t k = 0; k < surface_.facets.size(); ++k) {
     const Facet& f = surface_.facets[k];
-    const Index c = component[mesh_.triangles[surface_.summaries[k].triangle][0]];
-    if (c >= area.size()) area.resize(c + 1, 0);
-    area[c] += 0.5 * dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
+    const Triangle& t = mesh_.triangles[surface_.summaries[k].triangle];
+    const Vec3 normal = twice_area_normal(f.corners[0], f.corners[1], f.corners[2]);
+    area[component[t[0]]] += 0.5 * norm(normal);
+    for (const Index v : t) normals_[v] += normal;
   }
+  for (Vec3& n : normals_) n = unit(n);
   spacing_.assign(mesh_.vertices.size(), 0);
   for (const Index v : surface_.used_vertices) {
     const double most = std::sqrt(2 / std::numbers::sqrt3 * area[component[v]] / kPerComponent);
@@ -139,14 +126,15 @@ void Clusters::advance(Index vertex) {
   }
 }
 
-// Every front goes on as far as it is nearer than others, and no farther than the spacing there.
+// Every front goes on as far as it is nearer than others. A vertex whose triangles' normals cancel is a cluster of its
+// own.
 void Clusters::spread() {
   while (!fronts_.empty()) {
     const Front front = fronts_.top();
     fronts_.pop();
     const Index v = front.vertex;
-    if (held_[v] || front.distance >= distance_[v] || front.distance > reach_ * spacing_[v]) continue;
-    if (!held_[front.label] && dot(normals_[v], normals_[front.label]) < kNormals) continue;
+    if (held_[v] || front.distance >= distance_[v]) continue;
+    if (v != front.label && !held_[front.label] && dot(normals_[v], normals_[front.label]) < kNormals) continue;
     distance_[v] = front.distance;
     label_[v] = front.label;
     advance(v);

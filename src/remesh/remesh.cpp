@@ -132,6 +132,7 @@ class Pipeline {
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
   bool begin_on_stand_in(std::size_t count);
+  void return_to_input();
   void optimise_levels(const std::vector<std::size_t>& counts);
   bool can_localise() const;
   bool dual_suffices();
@@ -203,12 +204,17 @@ void Pipeline::to_next_level(std::size_t count) {
 // Whether there is a stand-in for that many seeds. Then the run is on it.
 bool Pipeline::begin_on_stand_in(std::size_t count) {
   if (!make_backend_ || surface_.facets.size() < kManyFacets * count) return false;
-  std::unique_ptr<Surface> coarse = coarse_surface(surface_, curves_.graph(), measure_.scale(count));
-  if (!coarse) return false;
-  std::unique_ptr<Backend> backend = make_backend_(*coarse);
-  run_.change_backend(*backend);
-  stand_in_ = {std::move(coarse), std::move(backend)};
+  stand_in_.surface = coarse_surface(surface_, curves_.graph(), measure_.scale(count));
+  if (!stand_in_.surface) return false;
+  stand_in_.backend = make_backend_(*stand_in_.surface);
+  run_.change_backend(*stand_in_.backend);
   return true;
+}
+
+void Pipeline::return_to_input() {
+  run_.change_backend(backend_);
+  stand_in_.backend.reset();
+  stand_in_.surface.reset();
 }
 
 // With seeds for the first of these levels.
@@ -226,12 +232,13 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     const bool may_localise = finest && can_localise();
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
-    if (step_.iterations > 0 && begin_on_stand_in(counts[level]) && finest) {
+    const bool stands_in = step_.iterations > 0 && begin_on_stand_in(counts[level]);
+    if (stands_in && finest) {
       const int on_input = share_of(step_.iterations, kOnInputShare);
       step_.iterations -= on_input;
       optimise(run_, step_);
       step_.iterations = on_input;
-      run_.change_backend(backend_);
+      return_to_input();
     }
     optimise(run_, step_);
     if (may_localise) run_.localise(true);
@@ -241,11 +248,11 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
       optimise(run_, step_);
     }
     if (run_.has_features()) {
-      run_.change_backend(backend_);
+      return_to_input();
       clear_features(run_, trace_, measure_, step_);
     }
     if (level + 1 < counts.size()) to_next_level(counts[level + 1]);
-    run_.change_backend(backend_);
+    return_to_input();
   }
   if (plan_.constrained) {
     step_.constrained = true;

@@ -97,16 +97,35 @@ TEST(CoarseSurface, LosesNoComponent) {
   EXPECT_EQ(found.euler, 4);
 }
 
-// A limb thinner than the vertices are apart would else become a line, and have no seeds.
+// A limb thinner than the vertices are apart would else become a line, and have no seeds. The sphere beside it has so
+// much area that a lost limb would not be noticed there.
 TEST(CoarseSurface, KeepsThinLimbs) {
-  TriangleMesh limb = torus(600, 12);  // radii 1 and 0.02
+  TriangleMesh limb = torus(600, 24);  // radii 1 and 0.02
   for (Vec3& v : limb.vertices) {
     const double radius = std::hypot(v.x, v.y), factor = (1 + (radius - 1) * 0.02 / 0.375) / radius;
     v = {v.x * factor, v.y * factor, v.z * 0.02 / 0.375};
   }
-  const Surface fine(limb);
-  const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.2);
-  if (coarse) expect_stands_in(fine, coarse.get());
+  const Surface fine(joined(icosphere(6), limb, {5, 0, 0}));
+  const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.3);
+  expect_stands_in(fine, coarse.get());
+  const auto limb_area = [](const Surface& surface) {
+    double sum = 0;
+    for (const Facet& f : surface.facets)
+      if (f.corners[0].x > 2) sum += 0.5 * norm(twice_area_normal(f.corners[0], f.corners[1], f.corners[2]));
+    return sum;
+  };
+  EXPECT_GT(limb_area(*coarse), 0.75 * limb_area(fine));
+}
+
+// Their normals cancel at every vertex, so that none can become one with another.
+TEST(CoarseSurface, RefusesSheetsWithTwoSides) {
+  TriangleMesh mesh = grid_patch(20, 20);
+  const std::size_t count = mesh.triangles.size();
+  for (std::size_t t = 0; t < count; ++t) {
+    const Triangle& v = mesh.triangles[t];
+    mesh.triangles.push_back({v[0], v[2], v[1]});
+  }
+  EXPECT_FALSE(coarse_surface(Surface(mesh), {}, 20));
 }
 
 TEST(CoarseSurface, IsFinerWhereTheDensityIsHigher) {

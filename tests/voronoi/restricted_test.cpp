@@ -441,6 +441,17 @@ TEST(RestrictedMoments, StepMassesAreAtLeastTheMassesAndPositiveBesideMass) {
   for (std::size_t i = 0; i < seeds.size(); ++i) EXPECT_GE(d.moments.step_mass[i], d.moments.cells[i].mass);
 }
 
+// The corners are not collinear, but the products that make up the area round to the same.
+TEST(Surface, TakesFacetsWhoseAreaRoundsToNothing) {
+  constexpr double e = 0x1p-30;
+  TriangleMesh mesh{{{0, 0, 0}, {1 + e, 1, 0}, {1, 1 - e, 0}, {0, 0, 1}}, {{0, 1, 2}, {0, 2, 3}}, {}};
+  ASSERT_EQ(twice_area_normal(mesh.vertices[0], mesh.vertices[1], mesh.vertices[2]), Vec3{});
+  const Surface surface(mesh, {1, 2, 3, 4});
+  ASSERT_EQ(surface.facets.size(), 2u);
+  const Diagram diagram = diagram_of(surface, {{0, 0, 0.3}, {0.6, 0.6, 0}}, NeighbourSource::nearest);
+  EXPECT_NEAR(diagram.moments.mass, surface.mass, 1e-12 * surface.mass);
+}
+
 TEST(Surface, RejectsWhatItCannotIntegrate) {
   EXPECT_THROW(Surface(TriangleMesh{}), Error);
   EXPECT_THROW(Surface({{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}}, {{0, 1, 2}}, {}}), Error);
