@@ -34,7 +34,7 @@ TEST(CoarseSurface, HasTheTopologyOfAClosedSurface) {
   for (const TriangleMesh& mesh : {icosphere(5), torus(120, 80)}) {
     const Surface fine(mesh);
     const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.2);
-    expect_stands_in(fine, coarse.get());
+    ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
     const MeshTopology found = topology_of(coarse->mesh), want = topology_of(mesh);
     EXPECT_TRUE(found.closed);
     EXPECT_TRUE(found.oriented);
@@ -48,7 +48,7 @@ TEST(CoarseSurface, HasAFewTrianglesForEachSeed) {
   const Surface fine(icosphere(6));
   for (const double edge : {0.1, 0.2, 0.4}) {
     const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, edge);
-    expect_stands_in(fine, coarse.get());
+    ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
     const double seeds = 2 / std::sqrt(3) * fine.area / (edge * edge);
     const double per_seed = static_cast<double>(coarse->facets.size()) / seeds;
     EXPECT_GT(per_seed, 3);
@@ -61,7 +61,7 @@ TEST(CoarseSurface, KeepsFeaturesAsChainsOfEdges) {
   const FeatureGraph graph = sharp_graph(mesh);
   const Surface fine(mesh);
   const std::unique_ptr<Surface> coarse = coarse_surface(fine, graph, 0.25);
-  expect_stands_in(fine, coarse.get());
+  ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
   // The faces are flat and their borders straight, so that a triangulation of them without folds has all their area.
   EXPECT_NEAR(coarse->area, fine.area, 1e-12);
   const std::set<std::array<double, 3>> points = points_of(coarse->mesh);
@@ -79,7 +79,7 @@ TEST(CoarseSurface, KeepsBordersThatAreFeatures) {
   const TriangleMesh mesh = wavy_patch(64);
   const Surface fine(mesh);
   const std::unique_ptr<Surface> coarse = coarse_surface(fine, sharp_graph(mesh), 0.15);
-  expect_stands_in(fine, coarse.get());
+  ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
   const MeshTopology found = topology_of(coarse->mesh);
   EXPECT_FALSE(found.closed);
   EXPECT_EQ(found.euler, 1);
@@ -91,7 +91,7 @@ TEST(CoarseSurface, LosesNoComponent) {
   const TriangleMesh mesh = joined(icosphere(5), small, {5, 0, 0});
   const Surface fine(mesh);
   const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.3);
-  expect_stands_in(fine, coarse.get());
+  ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
   const MeshTopology found = topology_of(coarse->mesh);
   EXPECT_EQ(found.components, 2u);
   EXPECT_EQ(found.euler, 4);
@@ -107,7 +107,7 @@ TEST(CoarseSurface, KeepsThinLimbs) {
   }
   const Surface fine(joined(icosphere(6), limb, {5, 0, 0}));
   const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.3);
-  expect_stands_in(fine, coarse.get());
+  ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
   const auto limb_area = [](const Surface& surface) {
     double sum = 0;
     for (const Facet& f : surface.facets)
@@ -134,7 +134,7 @@ TEST(CoarseSurface, IsFinerWhereTheDensityIsHigher) {
   for (const Vec3& v : mesh.vertices) density.push_back(v.z > 0 ? 256 : 1);  // edges a quarter as long
   const Surface fine(mesh, density);
   const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.4);
-  expect_stands_in(fine, coarse.get());
+  ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
   ASSERT_EQ(coarse->density.size(), coarse->mesh.vertices.size());
   const auto above =
       std::count_if(coarse->mesh.vertices.begin(), coarse->mesh.vertices.end(), [](const Vec3& v) { return v.z > 0; });
