@@ -14,6 +14,7 @@
 #include "core/geometry.h"
 #include "core/grouping.h"
 #include "core/parallel.h"
+#include "features/planar_reduction.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -654,6 +655,45 @@ std::vector<std::uint8_t> classify_edges(const TriangleMesh& mesh, const Feature
   return kinds;
 }
 
+// The graph of a mesh whose triangles are those given.
+FeatureGraph find_graph(const TriangleMesh& mesh, const std::vector<Triangle>& triangles,
+                        const std::vector<std::int32_t>& labels, const FeatureOptions& options) {
+  const Folds folds(mesh.vertices, triangles);
+  const Csr<std::size_t> at_vertex = items_at_vertices<std::size_t>(folds.table.edges, mesh.vertices.size());
+  const std::vector<std::uint8_t> kinds = classify_edges(mesh, options, folds, labels, at_vertex);
+  return GraphBuilder(folds, at_vertex, kinds, labels, options.corner_angle * kRadiansPerDegree)
+      .build(triangles, options.mode != FeatureMode::none);
+}
+
+std::vector<Edge> given_edges(const TriangleMesh& mesh, const FeatureOptions& options) {
+  std::vector<Edge> edges;
+  for (const std::vector<Edge>* list : {&options.given, &mesh.feature_edges})
+    for (const Edge& e : *list) edges.push_back({std::min(e[0], e[1]), std::max(e[0], e[1])});
+  return edges;
+}
+
+// Puts the vertices back that the mesh has along the edges of the graph.
+void restore_chains(const PlanarReduction& reduced, FeatureGraph& graph) {
+  std::vector<Edge> edges;
+  for (const Edge& e : graph.edges) {
+    const std::vector<Index> chain = reduced.chain(e[0], e[1]);
+    for (std::size_t k = 0; k + 1 < chain.size(); ++k)
+      edges.push_back({std::min(chain[k], chain[k + 1]), std::max(chain[k], chain[k + 1])});
+  }
+  std::sort(edges.begin(), edges.end());
+  graph.edges = std::move(edges);
+  for (FeatureCurve& curve : graph.curves) {
+    std::vector<Index> vertices;
+    const std::size_t count = curve.vertices.size();
+    for (std::size_t k = 0; k + (curve.closed ? 0 : 1) < count; ++k) {
+      const std::vector<Index> chain = reduced.chain(curve.vertices[k], curve.vertices[(k + 1) % count]);
+      vertices.insert(vertices.end(), chain.begin(), chain.end() - 1);
+    }
+    if (!curve.closed) vertices.push_back(curve.vertices.back());
+    curve.vertices = std::move(vertices);
+  }
+}
+
 }  // namespace
 
 FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& options) {
@@ -666,11 +706,17 @@ FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& opt
     triangles.push_back(t);
     if (!mesh.labels.empty()) labels.push_back(mesh.labels[i]);
   }
-  const Folds folds(mesh.vertices, triangles);
-  const Csr<std::size_t> at_vertex = items_at_vertices<std::size_t>(folds.table.edges, mesh.vertices.size());
-  const std::vector<std::uint8_t> kinds = classify_edges(mesh, options, folds, labels, at_vertex);
-  return GraphBuilder(folds, at_vertex, kinds, labels, options.corner_angle * kRadiansPerDegree)
-      .build(triangles, options.mode != FeatureMode::none);
+  if (options.mode != FeatureMode::automatic) return find_graph(mesh, triangles, labels, options);
+  // What makes a crease is judged by what lies beside it and around it. On a mesh divided into smaller triangles that
+  // would be flat everywhere.
+  const PlanarReduction reduced(mesh.vertices, triangles, labels, given_edges(mesh, options));
+  if (!reduced.removed_any()) return find_graph(mesh, triangles, labels, options);
+  std::vector<std::int32_t> left;
+  for (const Index t : reduced.origin)
+    if (!labels.empty()) left.push_back(labels[t]);
+  FeatureGraph graph = find_graph(mesh, reduced.triangles, left, options);
+  restore_chains(reduced, graph);
+  return graph;
 }
 
 }  // namespace bisector
