@@ -13,6 +13,8 @@
 #include "core/geometry.h"
 #include "features/normals.h"
 #include "features/wedges.h"
+#include "mesh/spatial_order.h"
+#include "mesh/topology.h"
 #include "mesh/touching.h"
 #include "remesh/detail.h"
 #include "remesh/sizing.h"
@@ -130,12 +132,38 @@ class Separation {
   std::vector<Index> original_;
 };
 
+void check_edges(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& edges) {
+  if (edges.empty()) return;
+  const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
+  for (const auto& [a, b] : edges)
+    if (!std::binary_search(table.edges.begin(), table.edges.end(), std::array{std::min(a, b), std::max(a, b)}))
+      throw Error(fmt::format("feature edge {} {} is not an edge of the mesh; remove it", a, b));
+}
+
 SizingTarget target_of(const RemeshOptions& options) {
   if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
   return {options.vertices, options.edge_length};
 }
 
 }  // namespace
+
+OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given) : options(given) {
+  const std::size_t vertices = input.vertices.size();
+  if (!input.labels.empty() && input.labels.size() != input.triangles.size())
+    throw Error(fmt::format("{} labels for {} triangles; give one each", input.labels.size(), input.triangles.size()));
+  std::vector<double>& density = options.sizing.attribute;
+  if (!density.empty() && density.size() != vertices)
+    throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex", density.size(), vertices));
+  check_edges(input, given.features.given);
+  check_edges(input, input.feature_edges);
+  OrderedMesh ordered = in_spatial_order(input);
+  mesh = std::move(ordered.mesh);
+  vertex_of = std::move(ordered.vertex_of);
+  for (auto& edge : options.features.given)
+    for (Index& v : edge) v = vertex_of[v];
+  if (density.empty()) return;
+  for (std::size_t v = 0; v < vertices; ++v) density[vertex_of[v]] = given.sizing.attribute[v];
+}
 
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
   if (tolerance) return weld(input, *tolerance);
@@ -158,21 +186,20 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   return best;
 }
 
-Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options, const Context& context)
-    : welded_(join_borders(input, options.weld)), mesh_(std::exchange(welded_.mesh, {})), sizing_(options.sizing),
-      target_(target_of(options)), given_seeds_(options.seeds.size()) {
+Preparation::Preparation(const OrderedInput& ordered, const Context& context)
+    : welded_(join_borders(ordered.mesh, ordered.options.weld)), mesh_(std::exchange(welded_.mesh, {})),
+      sizing_(ordered.options.sizing), target_(target_of(ordered.options)),
+      given_seeds_(ordered.options.seeds.size()) {
+  const TriangleMesh& input = ordered.mesh;
+  const RemeshOptions& options = ordered.options;
   const std::vector<Index>& vertex_of = welded_.vertex_of;
   warn_of_weld(welded_, options, context);
   orient_with_warning(mesh_, context);
 
   const std::size_t vertices = mesh_.vertices.size();
   FeatureOptions features = options.features;
-  for (auto& [a, b] : features.given) {
-    if (a >= vertex_of.size() || b >= vertex_of.size())
-      throw Error(fmt::format("feature edge {} {} is none of the mesh's; correct it", a, b));
-    a = vertex_of[a];
-    b = vertex_of[b];
-  }
+  for (auto& edge : features.given)
+    for (Index& v : edge) v = vertex_of[v];
   std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
   const Separation separation(mesh_, context);
   features.given = separation.edges(mesh_, features.given);
@@ -180,9 +207,6 @@ Preparation::Preparation(const TriangleMesh& input, const RemeshOptions& options
   features_ = detect_features(mesh_, features);
 
   if (!sizing_.attribute.empty()) {
-    if (sizing_.attribute.size() != input.vertices.size())
-      throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex",
-                              sizing_.attribute.size(), input.vertices.size()));
     std::vector<double> values(vertices);
     for (std::size_t v = input.vertices.size(); v-- > 0;) values[vertex_of[v]] = sizing_.attribute[v];
     sizing_.attribute = separation.values(std::move(values));

@@ -31,11 +31,22 @@ struct SizeBounds {
 // are there twice are then taken once.
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
 
+// An input as a run takes it: in spatial order, so that what is near in space is near in memory, and the result does not
+// depend on the order in which a file lists triangles and vertices.
+struct OrderedInput {
+  // Throws Error if labels or densities are not one for each triangle or vertex, or given edges are none of the mesh's.
+  OrderedInput(const TriangleMesh& input, const RemeshOptions& options);
+
+  TriangleMesh mesh;
+  RemeshOptions options;         // with feature edges and densities of `mesh`
+  std::vector<Index> vertex_of;  // of each vertex of the input
+};
+
 // What is done to an input before seeds are placed.
 class Preparation {
  public:
   // Welds and orients the input, finds its features and plans their details. Throws Error as remesh does.
-  Preparation(const TriangleMesh& input, const RemeshOptions& options, const Context& context);
+  Preparation(const OrderedInput& input, const Context& context);
 
   // Beside the bounds that there are already.
   void bound(const SizeBounds& bounds);

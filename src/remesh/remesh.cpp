@@ -575,7 +575,8 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   check_options(options);
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
-  Preparation preparation(input, options, context);
+  const OrderedInput ordered(input, options);
+  Preparation preparation(ordered, context);
   Compute compute(options.compute, context);
   const MakeBackend make_backend = [&](const Surface& surface) { return compute.backend(surface); };
   double preparing = watch.seconds();
@@ -636,6 +637,8 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   chosen.seconds.prepare = preparing;
   chosen.seconds.total = watch.seconds();
   chosen.welded = preparation.welded();
+  for (std::size_t v = 0; v < input.vertices.size(); ++v)
+    chosen.welded.vertex_of[v] = preparation.welded().vertex_of[ordered.vertex_of[v]];
   return std::move(chosen);
 }
 

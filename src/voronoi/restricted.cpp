@@ -16,6 +16,9 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kMostRemembered = 64;                    // pairs of a facet that are searched for an earlier one
+// Seeds changed one after the other beyond which another list of them is not related to the last; and places without
+// relation, from which on nothing is.
+constexpr std::size_t kMostChanges = 24, kMostLost = 64;
 constexpr std::size_t kRanges = 8;                             // of triangles, in the sort by cells
 constexpr std::size_t kMostFacets = 512, kFewestChunks = 256;  // of a chunk; and chunks, where facets are few and large
 constexpr std::size_t kPointsAtOnce = 256, kCellsAtOnce = 256, kTrianglesAtOnce = 4096;  // of a parallel loop
@@ -52,6 +55,7 @@ struct Walker {
   Clipper clipper;
   std::vector<Index> queue;
   Marks met;                     // slots
+  std::vector<Index> labels;     // of a pair of the last diagram
   std::uint64_t generation = 0;  // of the seeds that the clipper knows
 
   void begin(std::size_t slots) {
@@ -71,13 +75,13 @@ struct RestrictedVoronoi::Work {
   Neighbours neighbours;
   NeighbourSource built_source = NeighbourSource::nearest;
   std::vector<Index> owner;                // slot of each used vertex
-  std::vector<Index> hint;                 // owner's seed index in the last diagram
   std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
   std::uint64_t generation = 0;            // of `seeds`
   ThreadLocal<Walker> walkers;
   std::size_t chunk_size = 1;                        // facets
   std::vector<Index> first_entry, last_first_entry;  // of each facet, in its chunk
   bool followed = false;                             // the slots are those of the last diagram
+  std::vector<Index> slot_now;                       // else, of each of the last slots; kNone where that is unknown
   struct Item {
     Index facet, moments;
   };
@@ -87,33 +91,34 @@ struct RestrictedVoronoi::Work {
 
   Work(const Surface& s, ListLength lists) : surface(s), neighbours(lists) {}
 
-  void find_owners(std::size_t seed_count);
+  void find_owners();
   void clip_facets(bool want_polygons);
   void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
-  bool confirm_last(std::size_t facet, Index slot, Clipper& clipper) const;
+  bool confirm_last(std::size_t facet, Index slot, Walker& walker) const;
+  // What has become of a slot of the last diagram.
+  Index now(Index slot) const { return followed ? slot : slot < slot_now.size() ? slot_now[slot] : kNone; }
   std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
   void sort_items();
   PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
   void gather(RestrictedPolygons& polygons) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
+  void relate(const SortedSeeds& last, const std::vector<Vec3>& given);
   DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want,
                        Diagram& diagram);
 };
 
-void RestrictedVoronoi::Work::find_owners(std::size_t seed_count) {
+void RestrictedVoronoi::Work::find_owners() {
   const std::size_t n = surface.used_vertices.size();
-  owner.resize(n);
-  hint.resize(n, kNone);
+  owner.resize(n, kNone);
   parallel_chunks(n, kPointsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     Index last = kNone;
     for (std::size_t k = begin; k < end; ++k) {
       const Vec3& q = surface.mesh.vertices[surface.used_vertices[k]];
-      Index guess = hint[k] < seed_count ? seeds.slot[hint[k]] : kNone;
+      Index guess = owner[k] == kNone ? kNone : now(owner[k]);
       if (guess == kNone) guess = last;
       if (guess == kNone) guess = neighbours.nearest(q);
       last = owner[k] = find_owner(seeds, neighbours, q, guess);
-      hint[k] = seeds.id[last];
     }
   });
 }
@@ -138,7 +143,7 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
   for (const Index vertex : summary.vertex) walker.meet(owner[vertex]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index slot = walker.queue[head];
-    if (!confirm_last(index, slot, clipper)) {
+    if (!confirm_last(index, slot, walker)) {
       const bool found = clipper.clip(neighbours, slot);
       chunk.counts.add_doubts(clipper);
       if (!found) continue;
@@ -154,16 +159,24 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
 }
 
 // Whether the pair is bounded as it was in the last diagram.
-bool RestrictedVoronoi::Work::confirm_last(std::size_t facet, Index slot, Clipper& clipper) const {
-  if (!followed) return false;
+bool RestrictedVoronoi::Work::confirm_last(std::size_t facet, Index slot, Walker& walker) const {
+  if (!followed && slot_now.empty()) return false;
   const Chunk& chunk = last_chunks[facet / chunk_size];
   const std::size_t begin = last_first_entry[facet], end = entries_end(facet, chunk, last_first_entry);
   if (end - begin > kMostRemembered) return false;
   for (std::size_t k = begin; k < end; ++k) {
     const Entry& entry = chunk.entries[k];
-    if (entry.slot != slot || entry.moments == kWhole) continue;
-    const Index first = chunk.first_label[entry.moments];
-    return clipper.confirm(neighbours, slot, chunk.labels.data() + first, chunk.first_label[entry.moments + 1] - first);
+    if (entry.moments == kWhole || now(entry.slot) != slot) continue;
+    const Index* first = chunk.labels.data() + chunk.first_label[entry.moments];
+    const Index* last = chunk.labels.data() + chunk.first_label[entry.moments + 1];
+    const auto count = static_cast<std::size_t>(last - first);
+    if (followed) return walker.clipper.confirm(neighbours, slot, first, count);
+    walker.labels.assign(first, last);
+    for (Index& label : walker.labels) {
+      if (!is_edge(label)) label = now(label);
+      if (label == kNone) return false;
+    }
+    return walker.clipper.confirm(neighbours, slot, walker.labels.data(), count);
   }
   return false;
 }
@@ -287,6 +300,42 @@ bool RestrictedVoronoi::Work::follow(const std::vector<Vec3>& given, NeighbourSo
   return neighbours.update();
 }
 
+// Finds out which slots the seeds of the last diagram have now: between those that are where they were, some may have
+// been removed, added or moved. Where all moved, they are those of the same indices, if their number is the same.
+void RestrictedVoronoi::Work::relate(const SortedSeeds& last, const std::vector<Vec3>& given) {
+  const std::size_t before = last.slot.size(), count = given.size();
+  slot_now.assign(last.x.size(), kNone);
+  const auto pair = [&](std::size_t i, std::size_t j) {
+    if (last.slot[i] != kNone) slot_now[last.slot[i]] = seeds.slot[j];
+  };
+  const auto same = [&](std::size_t i, std::size_t j) {
+    return i < before && j < count && last.slot[i] != kNone && last.x[last.slot[i]] == given[j];
+  };
+  std::size_t i = 0, j = 0, lost = 0;
+  while (i < before && j < count) {
+    if (same(i, j)) {
+      pair(i++, j++);
+      continue;
+    }
+    // The nearest place where both go on alike.
+    std::size_t skip = 1, skip_there = 0;
+    bool found = false;
+    for (std::size_t both = 1; both <= kMostChanges && !found; ++both)
+      for (skip = 0; skip <= both && !found; ++skip) found = same(i + skip, j + (skip_there = both - skip));
+    if (found) --skip;
+    else skip = skip_there = 1;
+    lost += found ? 0 : 1;
+    if (lost > kMostLost) break;
+    for (std::size_t k = 0; k < std::min(skip, skip_there); ++k) pair(i + k, j + k);
+    i += skip;
+    j += skip_there;
+  }
+  if (lost <= kMostLost) return;
+  slot_now.assign(before == count ? last.x.size() : 0, kNone);
+  if (before == count)
+    for (std::size_t k = 0; k < count; ++k) pair(k, k);
+}
+
 DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments,
                                               Want want, Diagram& diagram) {
   const bool want_polygons = includes(want, Want::polygons);
@@ -294,12 +343,13 @@ DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Ne
   Stopwatch watch;
   followed = follow(given, source);
   if (!followed) {
-    seeds = sort_seeds(given);
+    const SortedSeeds last = std::exchange(seeds, sort_seeds(given));
+    relate(last, given);
     neighbours.build(seeds, source);
     built_source = source;
   }
   (source == NeighbourSource::delaunay ? work.delaunay : work.neighbours) = watch.lap();
-  find_owners(given.size());
+  find_owners();
   work.owners = watch.lap();
   clip_facets(want_polygons);
   work.counts = list_triangles(given.size(), diagram.moments);

@@ -89,7 +89,7 @@ struct PreparedCase {
     options.vertices = problem.vertices;
     options.sizing.kind = problem.density;
     if (problem.density == DensityKind::attribute) options.sizing.attribute = graded_density(problem.mesh);
-    return Preparation(problem.mesh, options, {}).lay_down();
+    return Preparation(OrderedInput(problem.mesh, options), {}).lay_down();
   }
 };
 

@@ -314,6 +314,35 @@ TEST(Restricted, FollowsSeedsThatMoveByAFractionOfTheirSpacing) {
   }
 }
 
+// Seeds that stay are recognised where others among them go, come or move, and what bounded their cells is tried first.
+TEST(Restricted, FollowsSeedsOfWhichSomeGoAndOthersCome) {
+  const TriangleMesh mesh = torus(96, 48);
+  const Surface surface(mesh);
+  RestrictedVoronoi used(surface);
+  std::vector<Vec3> seeds = random_seeds(mesh, 3000, 41);
+  SplitMix64 random(42);
+  for (int step = 0; step < 12; ++step) {
+    SCOPED_TRACE(step);
+    const Diagram d = diagram_of(used, seeds, NeighbourSource::nearest);
+    expect_sound(surface, d);
+    expect_same_diagram(d, diagram_of(surface, seeds, NeighbourSource::nearest));
+    if (HasFailure()) return;
+    // Single ones, runs, the first and the last, and all but a few.
+    const std::size_t most = step % 4 == 3 ? seeds.size() - 40 : step % 4 == 2 ? 60 : 3;
+    for (std::size_t changes = random.below(step % 4 == 3 ? 1 : 40) + 1; changes-- > 0;) {
+      const std::size_t count = random.below(most) + 1, at = random.below(seeds.size() - count + 1);
+      seeds.erase(seeds.begin() + static_cast<std::ptrdiff_t>(at), seeds.begin() + static_cast<std::ptrdiff_t>(at + count));
+      if (seeds.size() < 100) break;
+    }
+    for (int k = 0; k < 30; ++k)
+      seeds[random.below(seeds.size())] += 0.02 * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    const std::size_t missing = step % 2 ? 3000 - std::min<std::size_t>(3000, seeds.size()) : random.below(100);
+    const std::vector<Vec3> more = random_seeds(mesh, missing + 1, 43 + static_cast<std::uint64_t>(step));
+    seeds.insert(seeds.end(), more.begin(), more.end());
+    if (step == 8) seeds.insert(seeds.begin() + 7, seeds.back());
+  }
+}
+
 // --- Moments by quadrature ---
 
 // Six points, exact for polynomials of degree 4 (Dunavant 1985).

@@ -1,0 +1,88 @@
+// Meshes in spatial order: the same surface, whatever order it was listed in.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "core/random.h"
+#include "mesh/spatial_order.h"
+#include "support/models.h"
+
+namespace bisector::test {
+namespace {
+
+template <class T>
+void shuffle(std::vector<T>& values, SplitMix64& random) {
+  for (std::size_t k = values.size(); k > 1; --k) std::swap(values[k - 1], values[random.below(k)]);
+}
+
+// The mesh with vertices and triangles in another order, and triangles that begin with other corners.
+TriangleMesh shuffled(const TriangleMesh& mesh, std::uint64_t random_seed) {
+  SplitMix64 random(random_seed);
+  std::vector<Index> place(mesh.vertices.size());
+  std::iota(place.begin(), place.end(), Index{0});
+  shuffle(place, random);
+  TriangleMesh result;
+  result.vertices.resize(mesh.vertices.size());
+  for (std::size_t v = 0; v < place.size(); ++v) result.vertices[place[v]] = mesh.vertices[v];
+  std::vector<Index> order(mesh.triangles.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  shuffle(order, random);
+  for (const Index t : order) {
+    Triangle corners;
+    for (int k = 0; k < 3; ++k) corners[k] = place[mesh.triangles[t][k]];
+    std::rotate(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(random.below(3)), corners.end());
+    result.triangles.push_back(corners);
+    if (!mesh.labels.empty()) result.labels.push_back(mesh.labels[t]);
+  }
+  for (const auto& [a, b] : mesh.feature_edges) result.feature_edges.push_back({place[a], place[b]});
+  return result;
+}
+
+TEST(SpatialOrder, DoesNotDependOnTheOrderGiven) {
+  for (TriangleMesh mesh : {torus(40, 20), wavy_patch(12), pages()}) {
+    mesh.labels.resize(mesh.triangles.size());
+    for (std::size_t t = 0; t < mesh.labels.size(); ++t) mesh.labels[t] = static_cast<std::int32_t>(t % 5);
+    mesh.feature_edges = {{mesh.triangles[1][0], mesh.triangles[1][1]}};
+    const OrderedMesh a = in_spatial_order(mesh);
+    for (std::uint64_t trial = 1; trial <= 3; ++trial) {
+      const OrderedMesh b = in_spatial_order(shuffled(mesh, trial));
+      EXPECT_TRUE(a.mesh.vertices == b.mesh.vertices);
+      EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
+      EXPECT_EQ(a.mesh.labels, b.mesh.labels);
+      EXPECT_EQ(a.mesh.feature_edges, b.mesh.feature_edges);
+    }
+  }
+}
+
+TEST(SpatialOrder, IsTheSameMesh) {
+  const TriangleMesh mesh = shuffled(torus(24, 12), 9);
+  const OrderedMesh ordered = in_spatial_order(mesh);
+  ASSERT_EQ(ordered.vertex_of.size(), mesh.vertices.size());
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    EXPECT_TRUE(ordered.mesh.vertices[ordered.vertex_of[v]] == mesh.vertices[v]);
+  ASSERT_EQ(ordered.mesh.triangles.size(), mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle &got = ordered.mesh.triangles[t], &was = mesh.triangles[ordered.mesh.face_of_triangle[t]];
+    Triangle want{ordered.vertex_of[was[0]], ordered.vertex_of[was[1]], ordered.vertex_of[was[2]]};
+    std::rotate(want.begin(), std::find(want.begin(), want.end(), got[0]), want.end());
+    EXPECT_EQ(got, want);
+  }
+}
+
+TEST(SpatialOrder, TakesFacesFromTheInput) {
+  TriangleMesh mesh = grid_patch(3, 2);
+  mesh.face_of_triangle.resize(mesh.triangles.size());
+  for (Index t = 0; t < mesh.triangles.size(); ++t) mesh.face_of_triangle[t] = t / 2;
+  mesh.vertices.push_back({9, 9, 9});  // that no triangle uses
+  const OrderedMesh ordered = in_spatial_order(mesh);
+  EXPECT_EQ(ordered.mesh.vertices.size(), mesh.vertices.size());
+  std::vector<Index> faces = ordered.mesh.face_of_triangle, want = mesh.face_of_triangle;
+  std::sort(faces.begin(), faces.end());
+  EXPECT_EQ(faces, want);
+}
+
+}  // namespace
+}  // namespace bisector::test
