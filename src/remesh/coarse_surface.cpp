@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "features/curves.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -185,9 +186,28 @@ void Clusters::even_out() {
   take_surface();
 }
 
+// The curves along the vertices that are left of theirs; `image` is the new vertex of each, kNone if it is on no triangle.
+FeatureGraph images_of(const FeatureGraph& features, const std::vector<Index>& image) {
+  FeatureGraph graph;
+  for (const Index v : features.corners)
+    if (image[v] != kNone) graph.corners.push_back(image[v]);
+  std::sort(graph.corners.begin(), graph.corners.end());
+  for (const FeatureCurve& curve : features.curves) {
+    FeatureCurve left{{}, curve.closed, curve.kind};
+    for (const Index v : curve.vertices)
+      if (image[v] != kNone && (left.vertices.empty() || left.vertices.back() != image[v]))
+        left.vertices.push_back(image[v]);
+    if (left.closed && left.vertices.size() > 1 && left.vertices.front() == left.vertices.back())
+      left.vertices.pop_back();
+    if (left.vertices.size() > 1) graph.curves.push_back(std::move(left));
+  }
+  graph.edges = edges_of(graph.curves);
+  return graph;
+}
+
 }  // namespace
 
-std::unique_ptr<Surface> coarse_surface(const Surface& fine, const FeatureGraph& features, double edge_length) {
+CoarseSurface coarse_surface(const Surface& fine, const FeatureGraph& features, double edge_length) {
   Clusters clusters(fine, edge_length);
   clusters.take_curves(features);
   clusters.take_surface();
@@ -201,7 +221,7 @@ std::unique_ptr<Surface> coarse_surface(const Surface& fine, const FeatureGraph&
     const Triangle& t = fine.mesh.triangles[facet.triangle];
     Triangle image{label[t[0]], label[t[1]], label[t[2]]};
     if (image[0] == image[1] || image[1] == image[2] || image[2] == image[0]) continue;
-    if (mesh.triangles.size() == most) return nullptr;
+    if (mesh.triangles.size() == most) return {};
     for (Index& v : image) {
       if (renamed[v] == kNone) {
         renamed[v] = static_cast<Index>(mesh.vertices.size());
@@ -212,9 +232,14 @@ std::unique_ptr<Surface> coarse_surface(const Surface& fine, const FeatureGraph&
     }
     mesh.triangles.push_back(image);
   }
-  if (mesh.triangles.empty()) return nullptr;
-  auto coarse = std::make_unique<Surface>(std::move(mesh), std::move(density));
-  if (std::abs(coarse->area - fine.area) > kAreaTolerance * fine.area) return nullptr;
+  if (mesh.triangles.empty()) return {};
+  CoarseSurface coarse;
+  coarse.surface = std::make_unique<Surface>(std::move(mesh), std::move(density));
+  if (std::abs(coarse.surface->area - fine.area) > kAreaTolerance * fine.area) return {};
+  std::vector<Index> image(label.size(), kNone);
+  for (std::size_t v = 0; v < label.size(); ++v)
+    if (label[v] != kNone) image[v] = renamed[label[v]];
+  coarse.features = images_of(features, image);
   return coarse;
 }
 

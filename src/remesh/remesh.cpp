@@ -131,7 +131,8 @@ class Pipeline {
   std::vector<std::size_t> choose_levels() const;
   void place_on_features(std::size_t count);
   void to_next_level(std::size_t count);
-  bool begin_on_stand_in(std::size_t count);
+  void make_stand_ins(const std::vector<std::size_t>& counts);
+  bool begin_on_stand_in(std::size_t level);
   void return_to_input();
   void optimise_levels(const std::vector<std::size_t>& counts);
   bool can_localise() const;
@@ -146,15 +147,10 @@ class Pipeline {
   void extract_features(const std::vector<Index>& vertex_of);
   void fit();
 
-  // A surface that stands in for the input's, and what computes its diagrams.
-  struct StandIn {
-    std::unique_ptr<Surface> surface;
-    std::unique_ptr<Backend> backend;
-  };
-
   Backend& backend_;
   const MakeBackend& make_backend_;
-  StandIn stand_in_;
+  std::vector<CoarseSurface> stand_ins_;  // for the input's surface, by level
+  std::unique_ptr<Backend> on_stand_in_;  // what computes the diagrams of one
   const Surface& surface_;
   const RemeshPlan& plan_;
   const FeatureCurves curves_;
@@ -201,24 +197,37 @@ void Pipeline::to_next_level(std::size_t count) {
   meet_count(run_, count);
 }
 
-// Whether there is a stand-in for that many seeds. Then the run is on it.
-bool Pipeline::begin_on_stand_in(std::size_t count) {
-  if (!make_backend_ || surface_.facets.size() < kManyFacets * count) return false;
-  stand_in_.surface = coarse_surface(surface_, curves_.graph(), measure_.scale(count));
-  if (!stand_in_.surface) return false;
-  stand_in_.backend = make_backend_(*stand_in_.surface);
-  run_.change_backend(*stand_in_.backend);
+// Each is made of that for the next finer level, the finest of the input.
+void Pipeline::make_stand_ins(const std::vector<std::size_t>& counts) {
+  stand_ins_.clear();
+  stand_ins_.resize(counts.size());
+  if (!make_backend_) return;
+  const CoarseSurface* finer = nullptr;
+  for (std::size_t level = counts.size(); level-- > 0;) {
+    if (surface_.facets.size() < kManyFacets * counts[level]) continue;
+    CoarseSurface& coarse = stand_ins_[level];
+    coarse = coarse_surface(finer ? *finer->surface : surface_, finer ? finer->features : curves_.graph(),
+                            measure_.scale(counts[level]));
+    if (coarse.surface) finer = &coarse;
+  }
+}
+
+// Whether there is a stand-in for that level. Then the run is on it.
+bool Pipeline::begin_on_stand_in(std::size_t level) {
+  if (!stand_ins_[level].surface) return false;
+  on_stand_in_ = make_backend_(*stand_ins_[level].surface);
+  run_.change_backend(*on_stand_in_);
   return true;
 }
 
 void Pipeline::return_to_input() {
   run_.change_backend(backend_);
-  stand_in_.backend.reset();
-  stand_in_.surface.reset();
+  on_stand_in_.reset();
 }
 
 // With seeds for the first of these levels.
 void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
+  make_stand_ins(counts);
   // Shares of the work: an evaluation costs about as much as its facets and three times its seeds.
   double total = plan_.constrained ? kConstrainedShare * cost(counts.back()) : 0;
   for (std::size_t level = 0; level < counts.size(); ++level)
@@ -232,7 +241,7 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     const bool may_localise = finest && can_localise();
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
-    const bool stands_in = step_.iterations > 0 && begin_on_stand_in(counts[level]);
+    const bool stands_in = step_.iterations > 0 && begin_on_stand_in(level);
     if (stands_in && finest) {
       const int on_input = share_of(step_.iterations, kOnInputShare);
       step_.iterations -= on_input;
@@ -253,6 +262,7 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     }
     if (level + 1 < counts.size()) to_next_level(counts[level + 1]);
     return_to_input();
+    stand_ins_[level] = {};
   }
   if (plan_.constrained) {
     step_.constrained = true;
