@@ -161,6 +161,8 @@ class Improver {
   double irregular_price() const { return kIrregular * now_.average; }
   std::size_t wanted() const { return options_.vertices ? options_.vertices : run_.seeds.size(); }
   void measure(Snapshot& s);
+  // Takes the snapshot that was measured last.
+  void accept(Snapshot next);
   ShapeExcess worst_excess(const Snapshot& s, Index seed) const;
   bool as_good(const Snapshot& next) const;
   bool newly_broken(const Snapshot& next, Index curve) const;
@@ -209,6 +211,7 @@ class Improver {
   // Makes those of the changes that hold; `on` tells which.
   void make(const std::vector<Change>& changes, std::vector<char>& on);
   void drop_idle();
+  void hand_over();
   void smooth();
   std::vector<std::vector<Index>> colours(const std::vector<PatchVertex>& vertices) const;
 
@@ -221,6 +224,9 @@ class Improver {
   std::size_t searches_left_ = 0;
   std::vector<char> tried_;  // by seed: how often in vain since something near it has changed
   Snapshot now_;
+  // Of what measure() was called for last: snapshots keep nothing of them but what it reads off.
+  RestrictedPolygons polygons_;
+  bool polygons_are_current_ = false;  // those of now_
   ImproveReport report_;
 };
 
@@ -235,6 +241,7 @@ Improver::Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions&
 
 void Improver::measure(Snapshot& s) {
   run_.context().check();
+  if (s.known.diagram.polygons.pairs.empty()) s.known.diagram.polygons = std::move(polygons_);
   run_.evaluate(s.seeds.positions(), Want::polygons | Want::dual, s.known);
   s.covers = run_.covers(s.known.diagram);
   const Dual& dual = s.dual();
@@ -263,6 +270,15 @@ void Improver::measure(Snapshot& s) {
   const auto edges = static_cast<long long>(s.rings.values.size() / 2);
   s.euler = vertices - edges + static_cast<long long>(dual.triangles.size());
   if (has_curves()) s.features = check_features(trace_, run_.curves(), s.seeds.places(), s.known.diagram);
+  polygons_ = std::move(s.known.diagram.polygons);
+  s.known.diagram.polygons = {};
+  s.known.diagram.has = Want::dual;
+  polygons_are_current_ = false;
+}
+
+void Improver::accept(Snapshot next) {
+  now_ = std::move(next);
+  polygons_are_current_ = true;
 }
 
 ShapeExcess Improver::worst_excess(const Snapshot& s, Index seed) const {
@@ -723,7 +739,7 @@ void Improver::make(const std::vector<Change>& changes, std::vector<char>& on) {
       continue;
     }
     if (!as_good(next)) break;
-    now_ = std::move(next);
+    accept(std::move(next));
     return;
   }
   std::fill(on.begin(), on.end(), 0);
@@ -806,7 +822,7 @@ void Improver::smooth() {
       for (const Index w : seeds_within(now_.seeds.position(v), reach)) put_back(w);
     }
     if (changed) continue;
-    if (as_good(next) && next.average < now_.average) now_ = std::move(next);
+    if (as_good(next) && next.average < now_.average) accept(std::move(next));
     return;
   }
 }
@@ -820,15 +836,24 @@ void Improver::drop_idle() {
   next.seeds = now_.seeds;
   next.seeds.remove(idle);
   measure(next);
-  if (as_good(next)) now_ = std::move(next);
+  if (as_good(next)) accept(std::move(next));
+}
+
+void Improver::hand_over() {
+  if (polygons_are_current_) {
+    now_.known.diagram.polygons = std::move(polygons_);
+    now_.known.diagram.has = Want::polygons | Want::dual;
+  }
+  run_.adopt(std::move(now_.seeds), std::move(now_.known));
 }
 
 ImproveReport Improver::run() {
   now_.seeds = run_.seeds;
   now_.known = run_.take_diagram(Want::polygons | Want::dual);
   measure(now_);
+  polygons_are_current_ = true;
   if (now_.dual().triangles.empty()) {
-    run_.adopt(std::move(now_.seeds), std::move(now_.known));
+    hand_over();
     return report_;
   }
   drop_idle();
@@ -853,11 +878,12 @@ ImproveReport Improver::run() {
   if (now_.average > average) {
     now_.seeds = run_.seeds;
     measure(now_);
+    polygons_are_current_ = true;
     report_ = {report_.trials, 0, 0, 0, 0};
   }
 
   for (const ShapeExcess& excess : now_.excess) report_.missed += excess.most() > 0;
-  run_.adopt(std::move(now_.seeds), std::move(now_.known));
+  hand_over();
   complete(run_, true);
   return report_;
 }

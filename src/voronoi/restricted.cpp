@@ -31,13 +31,12 @@ struct Entry {
   Index moments;  // index into Chunk::moments, or kWhole
 };
 
-// What one chunk of facets contributes, facet by facet, and the polygons if they are wanted.
+// What one chunk of facets contributes, facet by facet.
 struct Chunk {
   std::vector<Entry> entries;
   std::vector<Moments> moments;
   std::vector<Index> first_label;  // of each of `moments`, in `labels`; and one past the last
   std::vector<Index> labels;       // bounding lines in cyclic order: slots or facet edges
-  RestrictedPolygons polygons;
   PairCounts counts;
 
   void clear() {
@@ -45,7 +44,6 @@ struct Chunk {
     moments.clear();
     first_label.clear();
     labels.clear();
-    polygons = {};
     counts = {};
   }
 };
@@ -76,6 +74,7 @@ struct RestrictedVoronoi::Work {
   NeighbourSource built_source = NeighbourSource::nearest;
   std::vector<Index> owner;                // slot of each used vertex
   std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
+  std::vector<RestrictedPolygons> polygons;  // of each chunk, if they are wanted
   std::uint64_t generation = 0;            // of `seeds`
   ThreadLocal<Walker> walkers;
   std::size_t chunk_size = 1;                        // facets
@@ -93,7 +92,7 @@ struct RestrictedVoronoi::Work {
 
   void find_owners();
   void clip_facets(bool want_polygons);
-  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, bool want_polygons) const;
+  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, RestrictedPolygons* polygons_here) const;
   bool confirm_last(std::size_t facet, Index slot, Walker& walker) const;
   // What has become of a slot of the last diagram.
   Index now(Index slot) const { return followed ? slot : slot < slot_now.size() ? slot_now[slot] : kNone; }
@@ -101,7 +100,7 @@ struct RestrictedVoronoi::Work {
   void sort_items();
   PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
-  void gather(RestrictedPolygons& polygons) const;
+  void gather(RestrictedPolygons& all) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
   void relate(const SortedSeeds& last, const std::vector<Vec3>& given);
   DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want,
@@ -123,17 +122,18 @@ void RestrictedVoronoi::Work::find_owners() {
   });
 }
 
-void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk, bool want_polygons) const {
+void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk,
+                                         RestrictedPolygons* polygons_here) const {
   const FacetSummary& summary = surface.summaries[index];
   Clipper& clipper = walker.clipper;
   const Index first = owner[summary.vertex[0]];
   // A cell is convex: it holds the facet if it owns the corners.
   if (first == owner[summary.vertex[1]] && first == owner[summary.vertex[2]]) {
     chunk.entries.push_back({first, kWhole});
-    if (want_polygons) {
+    if (polygons_here) {
       clipper.begin(surface.facets[index]);
       clipper.take(first);
-      append_polygon(clipper, seeds, summary.triangle, first, chunk.polygons);
+      append_polygon(clipper, seeds, summary.triangle, first, *polygons_here);
     }
     return;
   }
@@ -154,7 +154,7 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
     chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
     chunk.moments.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
-    if (want_polygons) append_polygon(clipper, seeds, summary.triangle, slot, chunk.polygons);
+    if (polygons_here) append_polygon(clipper, seeds, summary.triangle, slot, *polygons_here);
   }
 }
 
@@ -193,11 +193,14 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
   chunks.swap(last_chunks);
   first_entry.swap(last_first_entry);
   chunks.resize((n + chunk_size - 1) / chunk_size);
+  if (want_polygons) polygons.resize(chunks.size());
   first_entry.resize(n);
   ++generation;
   parallel_chunks(n, chunk_size, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Chunk& chunk = chunks[c];
     chunk.clear();
+    RestrictedPolygons* polygons_here = want_polygons ? &polygons[c] : nullptr;
+    if (polygons_here) clear(*polygons_here);
     Walker& walker = walkers.local();
     if (walker.generation != generation) {
       walker.generation = generation;
@@ -205,7 +208,7 @@ void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
     }
     for (std::size_t k = begin; k < end; ++k) {
       first_entry[k] = static_cast<Index>(chunk.entries.size());
-      clip_facet(k, walker, chunk, want_polygons);
+      clip_facet(k, walker, chunk, polygons_here);
     }
     chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
   });
@@ -361,7 +364,7 @@ DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Ne
 
 // Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of
 // triangles, then cells. Blocks of triangles are counted first, so that each has its place.
-void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
+void RestrictedVoronoi::Work::gather(RestrictedPolygons& all) const {
   struct Place {
     std::size_t pair = 0, corner = 0;
   };
@@ -372,41 +375,40 @@ void RestrictedVoronoi::Work::gather(RestrictedPolygons& polygons) const {
     for (std::size_t t = begin; t < end; ++t) {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
-      const Chunk& chunk = chunks[facet / chunk_size];
-      const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk, first_entry);
+      const RestrictedPolygons& from = polygons[facet / chunk_size];
+      const std::size_t first = first_entry[facet], stop = entries_end(facet, chunks[facet / chunk_size], first_entry);
       count.pair += stop - first;
-      count.corner += chunk.polygons.offsets[stop] - chunk.polygons.offsets[first];
+      count.corner += from.offsets[stop] - from.offsets[first];
     }
   });
   for (std::size_t block = 1; block < places.size(); ++block) {
     places[block].pair += places[block - 1].pair;
     places[block].corner += places[block - 1].corner;
   }
-  polygons.pairs.resize(places.back().pair);
-  polygons.offsets.resize(places.back().pair + 1);
-  polygons.offsets[0] = 0;
-  polygons.labels.resize(places.back().corner);
-  polygons.vertices.resize(places.back().corner);
+  all.pairs.resize(places.back().pair);
+  all.offsets.resize(places.back().pair + 1);
+  all.offsets[0] = 0;
+  all.labels.resize(places.back().corner);
+  all.vertices.resize(places.back().corner);
   parallel_chunks(triangles, kTrianglesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
     Place at = places[block];
     std::vector<std::size_t> order;
     for (std::size_t t = begin; t < end; ++t) {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
-      const Chunk& chunk = chunks[facet / chunk_size];
-      const RestrictedPolygons& from = chunk.polygons;
-      order.resize(entries_end(facet, chunk, first_entry) - first_entry[facet]);
+      const RestrictedPolygons& from = polygons[facet / chunk_size];
+      order.resize(entries_end(facet, chunks[facet / chunk_size], first_entry) - first_entry[facet]);
       std::iota(order.begin(), order.end(), std::size_t{first_entry[facet]});
       if (order.size() > 1)
         std::sort(order.begin(), order.end(),
                   [&](std::size_t a, std::size_t b) { return from.pairs[a].cell < from.pairs[b].cell; });
       for (const std::size_t k : order) {
-        polygons.pairs[at.pair++] = from.pairs[k];
+        all.pairs[at.pair++] = from.pairs[k];
         for (std::size_t e = from.offsets[k]; e < from.offsets[k + 1]; ++e, ++at.corner) {
-          polygons.labels[at.corner] = from.labels[e];
-          polygons.vertices[at.corner] = from.vertices[e];
+          all.labels[at.corner] = from.labels[e];
+          all.vertices[at.corner] = from.vertices[e];
         }
-        polygons.offsets[at.pair] = at.corner;
+        all.offsets[at.pair] = at.corner;
       }
     }
   });
