@@ -186,7 +186,7 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   return best;
 }
 
-Preparation::Preparation(const OrderedInput& ordered, const Context& context)
+Preparation::Preparation(OrderedInput ordered, const Context& context)
     : welded_(join_borders(ordered.mesh, ordered.options.weld)), mesh_(std::exchange(welded_.mesh, {})),
       sizing_(ordered.options.sizing), target_(target_of(ordered.options)),
       given_seeds_(ordered.options.seeds.size()) {

@@ -46,7 +46,7 @@ struct OrderedInput {
 class Preparation {
  public:
   // Welds and orients the input, finds its features and plans their details. Throws Error as remesh does.
-  Preparation(const OrderedInput& input, const Context& context);
+  Preparation(OrderedInput input, const Context& context);
 
   // Beside the bounds that there are already.
   void bound(const SizeBounds& bounds);

@@ -585,8 +585,9 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   check_options(options);
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
-  const OrderedInput ordered(input, options);
-  Preparation preparation(ordered, context);
+  OrderedInput ordered(input, options);
+  const std::vector<Index> vertex_of = std::move(ordered.vertex_of);
+  Preparation preparation(std::move(ordered), context);
   Compute compute(options.compute, context);
   const MakeBackend make_backend = [&](const Surface& surface) { return compute.backend(surface); };
   double preparing = watch.seconds();
@@ -648,7 +649,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   chosen.seconds.total = watch.seconds();
   chosen.welded = preparation.welded();
   for (std::size_t v = 0; v < input.vertices.size(); ++v)
-    chosen.welded.vertex_of[v] = preparation.welded().vertex_of[ordered.vertex_of[v]];
+    chosen.welded.vertex_of[v] = preparation.welded().vertex_of[vertex_of[v]];
   return std::move(chosen);
 }
 

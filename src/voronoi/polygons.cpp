@@ -4,17 +4,22 @@
 
 namespace bisector {
 
+void put_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index slot, Index* labels, Vec3* vertices) {
+  const std::size_t size = clipper.size();
+  for (std::size_t e = 0, k = clipper.first_corner(); e < size; ++e, k = k + 1 == size ? 0 : k + 1) {
+    const Index label = clipper.label(k);
+    labels[e] = is_edge(label) ? label : seeds.id[label];
+    vertices[e] = seeds.x[slot] + clipper.vertex(k);
+  }
+}
+
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
                     RestrictedPolygons& out) {
   out.pairs.push_back({triangle, seeds.id[slot]});
   const std::size_t size = clipper.size(), begin = out.labels.size();
   out.labels.resize(begin + size);
   out.vertices.resize(begin + size);
-  for (std::size_t e = 0, k = clipper.first_corner(); e < size; ++e, k = k + 1 == size ? 0 : k + 1) {
-    const Index label = clipper.label(k);
-    out.labels[begin + e] = is_edge(label) ? label : seeds.id[label];
-    out.vertices[begin + e] = seeds.x[slot] + clipper.vertex(k);
-  }
+  put_polygon(clipper, seeds, slot, out.labels.data() + begin, out.vertices.data() + begin);
   out.offsets.push_back(begin + size);
 }
 

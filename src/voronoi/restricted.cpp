@@ -1,7 +1,8 @@
 #include "voronoi/restricted.h"
 
 #include <algorithm>
-#include <numeric>
+#include <span>
+#include <utility>
 
 #include "core/marks.h"
 #include "core/parallel.h"
@@ -28,23 +29,24 @@ constexpr Index kWhole = kNone;
 
 struct Entry {
   Index slot;
-  Index moments;  // index into Chunk::moments, or kWhole
+  Index moments;  // index into the chunk's, or kWhole
 };
 
 // What one chunk of facets contributes, facet by facet.
 struct Chunk {
   std::vector<Entry> entries;
-  std::vector<Moments> moments;
-  std::vector<Index> first_label;  // of each of `moments`, in `labels`; and one past the last
+  std::vector<Index> first_label;  // of each pair with moments, in `labels`; and one past the last
   std::vector<Index> labels;       // bounding lines in cyclic order: slots or facet edges
   PairCounts counts;
 
   void clear() {
     entries.clear();
-    moments.clear();
     first_label.clear();
     labels.clear();
     counts = {};
+  }
+  std::span<const Index> labels_of(const Entry& entry) const {
+    return {labels.data() + first_label[entry.moments], labels.data() + first_label[entry.moments + 1]};
   }
 };
 
@@ -74,7 +76,7 @@ struct RestrictedVoronoi::Work {
   NeighbourSource built_source = NeighbourSource::nearest;
   std::vector<Index> owner;                // slot of each used vertex
   std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
-  std::vector<RestrictedPolygons> polygons;  // of each chunk, if they are wanted
+  std::vector<std::vector<Moments>> moments;  // of each chunk
   std::uint64_t generation = 0;            // of `seeds`
   ThreadLocal<Walker> walkers;
   std::size_t chunk_size = 1;                        // facets
@@ -91,8 +93,9 @@ struct RestrictedVoronoi::Work {
   Work(const Surface& s, ListLength lists) : surface(s), neighbours(lists) {}
 
   void find_owners();
-  void clip_facets(bool want_polygons);
-  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, RestrictedPolygons* polygons_here) const;
+  Walker& local_walker();
+  void clip_facets();
+  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, std::vector<Moments>& moments_here) const;
   bool confirm_last(std::size_t facet, Index slot, Walker& walker) const;
   // What has become of a slot of the last diagram.
   Index now(Index slot) const { return followed ? slot : slot < slot_now.size() ? slot_now[slot] : kNone; }
@@ -100,7 +103,7 @@ struct RestrictedVoronoi::Work {
   void sort_items();
   PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
-  void gather(RestrictedPolygons& all) const;
+  void set_polygons(RestrictedPolygons& polygons);
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
   void relate(const SortedSeeds& last, const std::vector<Vec3>& given);
   DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want,
@@ -123,18 +126,13 @@ void RestrictedVoronoi::Work::find_owners() {
 }
 
 void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk,
-                                         RestrictedPolygons* polygons_here) const {
+                                         std::vector<Moments>& moments_here) const {
   const FacetSummary& summary = surface.summaries[index];
   Clipper& clipper = walker.clipper;
   const Index first = owner[summary.vertex[0]];
   // A cell is convex: it holds the facet if it owns the corners.
   if (first == owner[summary.vertex[1]] && first == owner[summary.vertex[2]]) {
     chunk.entries.push_back({first, kWhole});
-    if (polygons_here) {
-      clipper.begin(surface.facets[index]);
-      clipper.take(first);
-      append_polygon(clipper, seeds, summary.triangle, first, *polygons_here);
-    }
     return;
   }
   const bool uniform = surface.density.empty();
@@ -152,9 +150,8 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
     for (std::size_t k = 0; k < clipper.size(); ++k) chunk.labels.push_back(clipper.label(k));
     for (std::size_t k = 0; k < clipper.size(); ++k)
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
-    chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
-    chunk.moments.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
-    if (polygons_here) append_polygon(clipper, seeds, summary.triangle, slot, *polygons_here);
+    chunk.entries.push_back({slot, static_cast<Index>(moments_here.size())});
+    moments_here.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
   }
 }
 
@@ -167,16 +164,14 @@ bool RestrictedVoronoi::Work::confirm_last(std::size_t facet, Index slot, Walker
   for (std::size_t k = begin; k < end; ++k) {
     const Entry& entry = chunk.entries[k];
     if (entry.moments == kWhole || now(entry.slot) != slot) continue;
-    const Index* first = chunk.labels.data() + chunk.first_label[entry.moments];
-    const Index* last = chunk.labels.data() + chunk.first_label[entry.moments + 1];
-    const auto count = static_cast<std::size_t>(last - first);
-    if (followed) return walker.clipper.confirm(neighbours, slot, first, count);
-    walker.labels.assign(first, last);
+    const std::span<const Index> labels = chunk.labels_of(entry);
+    if (followed) return walker.clipper.confirm(neighbours, slot, labels.data(), labels.size());
+    walker.labels.assign(labels.begin(), labels.end());
     for (Index& label : walker.labels) {
       if (!is_edge(label)) label = now(label);
       if (label == kNone) return false;
     }
-    return walker.clipper.confirm(neighbours, slot, walker.labels.data(), count);
+    return walker.clipper.confirm(neighbours, slot, walker.labels.data(), labels.size());
   }
   return false;
 }
@@ -187,28 +182,32 @@ std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk&
   return last ? chunk.entries.size() : first[facet + 1];
 }
 
-void RestrictedVoronoi::Work::clip_facets(bool want_polygons) {
+Walker& RestrictedVoronoi::Work::local_walker() {
+  Walker& mine = walkers.local();
+  if (mine.generation != generation) {
+    mine.generation = generation;
+    mine.clipper.reset(seeds);
+  }
+  return mine;
+}
+
+void RestrictedVoronoi::Work::clip_facets() {
   const std::size_t n = surface.facets.size();
   chunk_size = std::clamp<std::size_t>(n / kFewestChunks, 1, kMostFacets);
   chunks.swap(last_chunks);
   first_entry.swap(last_first_entry);
   chunks.resize((n + chunk_size - 1) / chunk_size);
-  if (want_polygons) polygons.resize(chunks.size());
+  moments.resize(chunks.size());
   first_entry.resize(n);
   ++generation;
   parallel_chunks(n, chunk_size, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Chunk& chunk = chunks[c];
     chunk.clear();
-    RestrictedPolygons* polygons_here = want_polygons ? &polygons[c] : nullptr;
-    if (polygons_here) clear(*polygons_here);
-    Walker& walker = walkers.local();
-    if (walker.generation != generation) {
-      walker.generation = generation;
-      walker.clipper.reset(seeds);
-    }
+    moments[c].clear();
+    Walker& walker = local_walker();
     for (std::size_t k = begin; k < end; ++k) {
       first_entry[k] = static_cast<Index>(chunk.entries.size());
-      clip_facet(k, walker, chunk, polygons_here);
+      clip_facet(k, walker, chunk, moments[c]);
     }
     chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
   });
@@ -285,7 +284,7 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
       for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
         const FacetSummary& summary = surface.summaries[items[k].facet];
         sum.add(items[k].moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[s])
-                                           : chunks[items[k].facet / chunk_size].moments[items[k].moments]);
+                                           : moments[items[k].facet / chunk_size][items[k].moments]);
       }
       result.cells[seeds.id[s]] = sum.finish();
     }
@@ -354,17 +353,17 @@ DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Ne
   (source == NeighbourSource::delaunay ? work.delaunay : work.neighbours) = watch.lap();
   find_owners();
   work.owners = watch.lap();
-  clip_facets(want_polygons);
+  clip_facets();
   work.counts = list_triangles(given.size(), diagram.moments);
   if (want_moments) sum_cells(given.size(), diagram.moments);
   work.clip = watch.lap();
-  if (want_polygons) gather(diagram.polygons);
+  if (want_polygons) set_polygons(diagram.polygons);
   return work;
 }
 
-// Polygons lie in chunks by facets in spatial order, each facet's as they were found; the result is in order of
-// triangles, then cells. Blocks of triangles are counted first, so that each has its place.
-void RestrictedVoronoi::Work::gather(RestrictedPolygons& all) const {
+// Sets the polygons from their labels, in order of triangles, then cells. Blocks of triangles are counted first, so that
+// each has its place.
+void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
   struct Place {
     std::size_t pair = 0, corner = 0;
   };
@@ -375,40 +374,46 @@ void RestrictedVoronoi::Work::gather(RestrictedPolygons& all) const {
     for (std::size_t t = begin; t < end; ++t) {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
-      const RestrictedPolygons& from = polygons[facet / chunk_size];
-      const std::size_t first = first_entry[facet], stop = entries_end(facet, chunks[facet / chunk_size], first_entry);
+      const Chunk& chunk = chunks[facet / chunk_size];
+      const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk, first_entry);
       count.pair += stop - first;
-      count.corner += from.offsets[stop] - from.offsets[first];
+      for (std::size_t k = first; k < stop; ++k)
+        count.corner += chunk.entries[k].moments == kWhole ? 3 : chunk.labels_of(chunk.entries[k]).size();
     }
   });
   for (std::size_t block = 1; block < places.size(); ++block) {
     places[block].pair += places[block - 1].pair;
     places[block].corner += places[block - 1].corner;
   }
-  all.pairs.resize(places.back().pair);
-  all.offsets.resize(places.back().pair + 1);
-  all.offsets[0] = 0;
-  all.labels.resize(places.back().corner);
-  all.vertices.resize(places.back().corner);
+  polygons.pairs.resize(places.back().pair);
+  polygons.offsets.resize(places.back().pair + 1);
+  polygons.offsets[0] = 0;
+  polygons.labels.resize(places.back().corner);
+  polygons.vertices.resize(places.back().corner);
   parallel_chunks(triangles, kTrianglesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
     Place at = places[block];
-    std::vector<std::size_t> order;
+    Clipper& clipper = local_walker().clipper;
+    std::vector<Entry> entries;
     for (std::size_t t = begin; t < end; ++t) {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
-      const RestrictedPolygons& from = polygons[facet / chunk_size];
-      order.resize(entries_end(facet, chunks[facet / chunk_size], first_entry) - first_entry[facet]);
-      std::iota(order.begin(), order.end(), std::size_t{first_entry[facet]});
-      if (order.size() > 1)
-        std::sort(order.begin(), order.end(),
-                  [&](std::size_t a, std::size_t b) { return from.pairs[a].cell < from.pairs[b].cell; });
-      for (const std::size_t k : order) {
-        all.pairs[at.pair++] = from.pairs[k];
-        for (std::size_t e = from.offsets[k]; e < from.offsets[k + 1]; ++e, ++at.corner) {
-          all.labels[at.corner] = from.labels[e];
-          all.vertices[at.corner] = from.vertices[e];
+      const Chunk& chunk = chunks[facet / chunk_size];
+      const Entry* all = chunk.entries.data();
+      entries.assign(all + first_entry[facet], all + entries_end(facet, chunk, first_entry));
+      std::sort(entries.begin(), entries.end(),
+                [&](const Entry& a, const Entry& b) { return seeds.id[a.slot] < seeds.id[b.slot]; });
+      clipper.begin(surface.facets[facet]);
+      for (const Entry& entry : entries) {
+        if (entry.moments == kWhole) {
+          clipper.take(entry.slot);
+        } else {
+          const std::span<const Index> labels = chunk.labels_of(entry);
+          clipper.take(entry.slot, labels.data(), labels.size());
         }
-        all.offsets[at.pair] = at.corner;
+        put_polygon(clipper, seeds, entry.slot, polygons.labels.data() + at.corner, polygons.vertices.data() + at.corner);
+        at.corner += clipper.size();
+        polygons.pairs[at.pair++] = {static_cast<Index>(t), seeds.id[entry.slot]};
+        polygons.offsets[at.pair] = at.corner;
       }
     }
   });
