@@ -1,18 +1,25 @@
 #include "mesh/topology.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <utility>
 
+#include "bisector/error.h"
 #include "bisector/quality.h"
 #include "bisector/repair.h"
 #include "core/disjoint_sets.h"
 #include "core/grouping.h"
+#include "core/parallel.h"
 #include "mesh/half_edges.h"
 
 namespace bisector {
 
 namespace {
+
+constexpr std::size_t kVerticesAtOnce = 4096;  // of a parallel loop
 
 // Links the corners (3 t + k) at both ends of an edge over all its triangles.
 void join_fans(const std::vector<Triangle>& triangles, const EdgeTable& table, std::size_t edge, DisjointSets<>& fans) {
@@ -61,36 +68,49 @@ std::array<bool, 3> edges_among(const Triangle& t, const std::vector<std::array<
 }
 
 EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
-  using Record = std::pair<Index, std::size_t>;  // the edge's higher vertex, half-edge
-  const std::size_t n = 3 * triangles.size();
-  const auto ends = [&](std::size_t h) {
-    return std::minmax({origin(triangles, h), origin(triangles, next_half_edge(h))});
+  struct Record {
+    Index high, half_edge;  // of an edge: its higher vertex
   };
-
+  const std::size_t n = 3 * triangles.size();
+  if (n > std::numeric_limits<Index>::max())
+    throw Error(fmt::format("{} triangles are too many; at most {} can be indexed", triangles.size(),
+                            std::numeric_limits<Index>::max() / 3));
   Csr<Record> records = group_into_rows<Record>(vertex_count, [&](const auto& put) {
     for (std::size_t h = 0; h < n; ++h) {
-      const auto [low, high] = ends(h);
-      put(low, Record{high, h});
+      const auto [low, high] = std::minmax({origin(triangles, h), origin(triangles, next_half_edge(h))});
+      put(low, Record{high, static_cast<Index>(h)});
     }
   });
-
-  EdgeTable table;
-  table.edges.reserve(n / 2);
-  table.half_edges.offsets.reserve(n / 2 + 1);
-  table.half_edges.values.reserve(n);
-  for (std::size_t v = 0; v < vertex_count; ++v) {
-    Record* const begin = records.values.data() + records.offsets[v];
-    Record* const end = records.values.data() + records.offsets[v + 1];
-    std::sort(begin, end);
-    for (const Record* record = begin; record != end; ++record) {
-      if (record == begin || record->first != record[-1].first) {
-        if (!table.edges.empty()) table.half_edges.offsets.push_back(table.half_edges.values.size());
-        table.edges.push_back({static_cast<Index>(v), record->first});
-      }
-      table.half_edges.values.push_back(record->second);
+  const auto is_first = [&](std::size_t row, std::size_t k) {
+    return k == records.offsets[row] || records.values[k].high != records.values[k - 1].high;
+  };
+  std::vector<std::size_t> first((vertex_count + kVerticesAtOnce - 1) / kVerticesAtOnce + 1, 0);  // edge of each block
+  parallel_chunks(vertex_count, kVerticesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      Record* const row = records.values.data();
+      std::sort(row + records.offsets[v], row + records.offsets[v + 1], [](const Record& x, const Record& y) {
+        return x.high != y.high ? x.high < y.high : x.half_edge < y.half_edge;
+      });
+      for (std::size_t k = records.offsets[v]; k < records.offsets[v + 1]; ++k) first[block + 1] += is_first(v, k);
     }
-  }
-  if (!table.edges.empty()) table.half_edges.offsets.push_back(table.half_edges.values.size());
+  });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  EdgeTable table;
+  table.edges.resize(first.back());
+  table.half_edges.offsets.resize(first.back() + 1);
+  table.half_edges.offsets.back() = n;
+  table.half_edges.values.resize(n);
+  parallel_chunks(vertex_count, kVerticesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
+    std::size_t edge = first[block];
+    for (std::size_t v = begin; v < end; ++v)
+      for (std::size_t k = records.offsets[v]; k < records.offsets[v + 1]; ++k) {
+        if (is_first(v, k)) {
+          table.edges[edge] = {static_cast<Index>(v), records.values[k].high};
+          table.half_edges.offsets[edge++] = k;
+        }
+        table.half_edges.values[k] = records.values[k].half_edge;
+      }
+  });
   return table;
 }
 
