@@ -112,8 +112,7 @@ class PlanarReduction::Work {
 
   bool coplanar(Index s, Index t) const {
     const Plane &p = planes_[s], &q = planes_[t];
-    return dot(p.normal, q.normal) > 0 &&
-           norm(cross(p.normal, q.normal)) <= std::min(kMostTilt, p.tilt + q.tilt);
+    return dot(p.normal, q.normal) > 0 && norm(cross(p.normal, q.normal)) <= std::min(kMostTilt, p.tilt + q.tilt);
   }
 
   // Whether the surface around v is flat, or folds or ends along one straight line through it.
@@ -241,8 +240,7 @@ class PlanarReduction::Work {
 };
 
 PlanarReduction::PlanarReduction(const std::vector<Vec3>& points, const std::vector<Triangle>& all,
-                                 const std::vector<std::int32_t>& labels,
-                                 const std::vector<std::array<Index, 2>>& kept)
+                                 const std::vector<std::int32_t>& labels, const std::vector<std::array<Index, 2>>& kept)
     : triangles(all), origin(all.size()) {
   for (Index t = 0; t < origin.size(); ++t) origin[t] = t;
   Work(*this, points, labels, kept).run();

@@ -186,7 +186,8 @@ void Clusters::even_out() {
   take_surface();
 }
 
-// The curves along the vertices that are left of theirs; `image` is the new vertex of each, kNone if it is on no triangle.
+// The curves along the vertices that are left of theirs; `image` is the new vertex of each, kNone if it is on no
+// triangle.
 FeatureGraph images_of(const FeatureGraph& features, const std::vector<Index>& image) {
   FeatureGraph graph;
   for (const Index v : features.corners)

@@ -153,7 +153,8 @@ OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given
     throw Error(fmt::format("{} labels for {} triangles; give one each", input.labels.size(), input.triangles.size()));
   std::vector<double>& density = options.sizing.attribute;
   if (!density.empty() && density.size() != vertices)
-    throw Error(fmt::format("the density has {} values for {} vertices; give one per vertex", density.size(), vertices));
+    throw Error(
+        fmt::format("the density has {} values for {} vertices; give one per vertex", density.size(), vertices));
   check_edges(input, given.features.given);
   check_edges(input, input.feature_edges);
   OrderedMesh ordered = in_spatial_order(input);
@@ -188,8 +189,7 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
 
 Preparation::Preparation(OrderedInput ordered, const Context& context)
     : welded_(join_borders(ordered.mesh, ordered.options.weld)), mesh_(std::exchange(welded_.mesh, {})),
-      sizing_(ordered.options.sizing), target_(target_of(ordered.options)),
-      given_seeds_(ordered.options.seeds.size()) {
+      sizing_(ordered.options.sizing), target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
   const TriangleMesh& input = ordered.mesh;
   const RemeshOptions& options = ordered.options;
   const std::vector<Index>& vertex_of = welded_.vertex_of;

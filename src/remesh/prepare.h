@@ -31,8 +31,8 @@ struct SizeBounds {
 // are there twice are then taken once.
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
 
-// An input as a run takes it: in spatial order, so that what is near in space is near in memory, and the result does not
-// depend on the order in which a file lists triangles and vertices.
+// An input as a run takes it: in spatial order, so that what is near in space is near in memory, and the result does
+// not depend on the order in which a file lists triangles and vertices.
 struct OrderedInput {
   // Throws Error if labels or densities are not one for each triangle or vertex, or given edges are none of the mesh's.
   OrderedInput(const TriangleMesh& input, const RemeshOptions& options);

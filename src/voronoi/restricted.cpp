@@ -16,7 +16,7 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kMostRemembered = 64;                    // pairs of a facet that are searched for an earlier one
+constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
 // Seeds changed one after the other beyond which another list of them is not related to the last; and places without
 // relation, from which on nothing is.
 constexpr std::size_t kMostChanges = 24, kMostLost = 64;
@@ -74,10 +74,10 @@ struct RestrictedVoronoi::Work {
   SortedSeeds seeds;
   Neighbours neighbours;
   NeighbourSource built_source = NeighbourSource::nearest;
-  std::vector<Index> owner;                // slot of each used vertex
-  std::vector<Chunk> chunks, last_chunks;  // of this diagram and of the last with the same slots
+  std::vector<Index> owner;                   // slot of each used vertex
+  std::vector<Chunk> chunks, last_chunks;     // of this diagram and of the last with the same slots
   std::vector<std::vector<Moments>> moments;  // of each chunk
-  std::uint64_t generation = 0;            // of `seeds`
+  std::uint64_t generation = 0;               // of `seeds`
   ThreadLocal<Walker> walkers;
   std::size_t chunk_size = 1;                        // facets
   std::vector<Index> first_entry, last_first_entry;  // of each facet, in its chunk
@@ -361,8 +361,8 @@ DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Ne
   return work;
 }
 
-// Sets the polygons from their labels, in order of triangles, then cells. Blocks of triangles are counted first, so that
-// each has its place.
+// Sets the polygons from their labels, in order of triangles, then cells. Blocks of triangles are counted first, so
+// that each has its place.
 void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
   struct Place {
     std::size_t pair = 0, corner = 0;
@@ -410,7 +410,8 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
           const std::span<const Index> labels = chunk.labels_of(entry);
           clipper.take(entry.slot, labels.data(), labels.size());
         }
-        put_polygon(clipper, seeds, entry.slot, polygons.labels.data() + at.corner, polygons.vertices.data() + at.corner);
+        put_polygon(clipper, seeds, entry.slot, polygons.labels.data() + at.corner,
+                    polygons.vertices.data() + at.corner);
         at.corner += clipper.size();
         polygons.pairs[at.pair++] = {static_cast<Index>(t), seeds.id[entry.slot]};
         polygons.offsets[at.pair] = at.corner;

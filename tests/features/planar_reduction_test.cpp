@@ -5,12 +5,12 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "bisector/features.h"
 #include "core/geometry.h"
-#include "core/random.h"
 #include "features/planar_reduction.h"
 #include "mesh/topology.h"
 #include "support/models.h"
@@ -56,8 +56,8 @@ TriangleMesh rough_sphere() {
 }
 
 TriangleMesh turned(TriangleMesh mesh) {
-  for (Vec3& p : mesh.vertices) p = {0.6 * p.x - 0.48 * p.y + 0.64 * p.z, 0.8 * p.x + 0.36 * p.y - 0.48 * p.z,
-                                     0.8 * p.y + 0.6 * p.z};
+  for (Vec3& p : mesh.vertices)
+    p = {0.6 * p.x - 0.48 * p.y + 0.64 * p.z, 0.8 * p.x + 0.36 * p.y - 0.48 * p.z, 0.8 * p.y + 0.6 * p.z};
   return mesh;
 }
 
@@ -67,9 +67,7 @@ double area(const std::vector<Vec3>& points, const std::vector<Triangle>& triang
   return sum;
 }
 
-std::vector<Edge> edges_of(const TriangleMesh& mesh) {
-  return edge_table(mesh.triangles, mesh.vertices.size()).edges;
-}
+std::vector<Edge> edges_of(const TriangleMesh& mesh) { return edge_table(mesh.triangles, mesh.vertices.size()).edges; }
 
 std::size_t vertices_in(const std::vector<Triangle>& triangles) {
   std::set<Index> used;
@@ -82,7 +80,8 @@ TEST(PlanarReduction, LeavesTheSurfaceWhereItIs) {
     const TriangleMesh mesh = divided(divided(coarse));
     const PlanarReduction reduced(mesh.vertices, mesh.triangles, {}, {});
     const double diagonal = bounding_box(mesh.vertices).diagonal();
-    EXPECT_NEAR(area(mesh.vertices, reduced.triangles), area(mesh.vertices, mesh.triangles), 1e-6 * diagonal * diagonal);
+    EXPECT_NEAR(area(mesh.vertices, reduced.triangles), area(mesh.vertices, mesh.triangles),
+                1e-6 * diagonal * diagonal);
     const MeshTopology before = analyse_topology(mesh.triangles, mesh.vertices.size());
     const MeshTopology after = analyse_topology(reduced.triangles, mesh.vertices.size());
     EXPECT_EQ(after.euler, before.euler);

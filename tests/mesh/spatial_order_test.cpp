@@ -2,44 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numeric>
-#include <utility>
 #include <vector>
 
-#include "core/random.h"
 #include "mesh/spatial_order.h"
 #include "support/models.h"
+#include "support/shuffled.h"
 
 namespace bisector::test {
 namespace {
-
-template <class T>
-void shuffle(std::vector<T>& values, SplitMix64& random) {
-  for (std::size_t k = values.size(); k > 1; --k) std::swap(values[k - 1], values[random.below(k)]);
-}
-
-// The mesh with vertices and triangles in another order, and triangles that begin with other corners.
-TriangleMesh shuffled(const TriangleMesh& mesh, std::uint64_t random_seed) {
-  SplitMix64 random(random_seed);
-  std::vector<Index> place(mesh.vertices.size());
-  std::iota(place.begin(), place.end(), Index{0});
-  shuffle(place, random);
-  TriangleMesh result;
-  result.vertices.resize(mesh.vertices.size());
-  for (std::size_t v = 0; v < place.size(); ++v) result.vertices[place[v]] = mesh.vertices[v];
-  std::vector<Index> order(mesh.triangles.size());
-  std::iota(order.begin(), order.end(), Index{0});
-  shuffle(order, random);
-  for (const Index t : order) {
-    Triangle corners;
-    for (int k = 0; k < 3; ++k) corners[k] = place[mesh.triangles[t][k]];
-    std::rotate(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(random.below(3)), corners.end());
-    result.triangles.push_back(corners);
-    if (!mesh.labels.empty()) result.labels.push_back(mesh.labels[t]);
-  }
-  for (const auto& [a, b] : mesh.feature_edges) result.feature_edges.push_back({place[a], place[b]});
-  return result;
-}
 
 TEST(SpatialOrder, DoesNotDependOnTheOrderGiven) {
   for (TriangleMesh mesh : {torus(40, 20), wavy_patch(12), pages()}) {

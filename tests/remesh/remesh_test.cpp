@@ -17,6 +17,7 @@
 #include "remesh/topology_control.h"
 #include "support/diagram.h"
 #include "support/models.h"
+#include "support/shuffled.h"
 
 namespace bisector::test {
 namespace {
@@ -118,6 +119,25 @@ INSTANTIATE_TEST_SUITE_P(Surfaces, Remesh, testing::ValuesIn(cases()),
                          [](const auto& instance) { return instance.param.name; });
 
 // A plate whose cells reach through it wherever they are wider than it is thick.
+TEST(RemeshInput, MayBeListedInAnyOrder) {
+  for (const TriangleMesh& mesh : {icosphere(4), box(4), wavy_patch(40)}) {
+    RemeshOptions options = options_for(400);
+    options.sizing.kind = DensityKind::attribute;
+    for (const Vec3& v : mesh.vertices) options.sizing.attribute.push_back(2 + v.x);
+    options.features.given = {{mesh.triangles[7][0], mesh.triangles[7][1]}};
+    const RemeshResult a = remesh(mesh, options);
+    TriangleMesh marked = mesh;
+    marked.feature_edges = options.features.given;  // to see which edge of the other it is
+    const TriangleMesh other = shuffled(marked, 5);
+    options.features.given = other.feature_edges;
+    for (std::size_t v = 0; v < other.vertices.size(); ++v) options.sizing.attribute[v] = 2 + other.vertices[v].x;
+    const RemeshResult b = remesh(other, options);
+    EXPECT_TRUE(same_mesh(a.mesh, b.mesh));
+    EXPECT_EQ(a.evaluations, b.evaluations);
+    EXPECT_EQ(a.mesh.feature_edges, b.mesh.feature_edges);
+  }
+}
+
 TEST(RemeshThin, APlateKeepsItsTwoSides) {
   TriangleMesh plate = box(8);
   for (Vec3& v : plate.vertices) v.z *= 0.02;

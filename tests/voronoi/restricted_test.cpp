@@ -331,7 +331,8 @@ TEST(Restricted, FollowsSeedsOfWhichSomeGoAndOthersCome) {
     const std::size_t most = step % 4 == 3 ? seeds.size() - 40 : step % 4 == 2 ? 60 : 3;
     for (std::size_t changes = random.below(step % 4 == 3 ? 1 : 40) + 1; changes-- > 0;) {
       const std::size_t count = random.below(most) + 1, at = random.below(seeds.size() - count + 1);
-      seeds.erase(seeds.begin() + static_cast<std::ptrdiff_t>(at), seeds.begin() + static_cast<std::ptrdiff_t>(at + count));
+      seeds.erase(seeds.begin() + static_cast<std::ptrdiff_t>(at),
+                  seeds.begin() + static_cast<std::ptrdiff_t>(at + count));
       if (seeds.size() < 100) break;
     }
     for (int k = 0; k < 30; ++k)
