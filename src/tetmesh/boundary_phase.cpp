@@ -105,7 +105,7 @@ bool join_boundary(CvtRun& sites, double room, bool thin) {
 
 }  // namespace
 
-JointReport joint_phase(TetRun& run, const BoundaryShare& share) {
+JointReport joint_phase(TetRun& run, const BoundaryShare& share, SolidBackend* stand_in) {
   Split split = split_at_boundary(run.sites);
   // With no more sites on the boundary than that, tetrahedra inside and at the boundary are alike, and something is
   // left inside.
@@ -116,10 +116,12 @@ JointReport joint_phase(TetRun& run, const BoundaryShare& share) {
     split.on_boundary =
         thinned(split.on_boundary, std::max(kFewestOnBoundary, static_cast<std::size_t>(std::llround(room))));
   run.sites.seeds = with_boundary(remesh_boundary(run, std::move(split.on_boundary), {}, false), split.inside);
+  if (stand_in) run.sites.change_backend(*stand_in);
   for (int round = 0; round < kJointRounds; ++round) {
     optimise_sites(run, "with the boundary", kJointShare / kJointRounds, true);
     if (round + 1 < kJointRounds && !join_boundary(run.sites, room, report.thin) && round > 0) break;
   }
+  run.sites.change_backend(run.solid);
   return report;
 }
 

@@ -22,7 +22,8 @@ struct JointReport {
 // From free sites to sites on the boundary and inside. Of those whose cells meet the boundary at most as many are put
 // there as its edge lengths ask for, and the surplus; the others are left out, for match_count of the last phase to
 // replace them inside.
-JointReport joint_phase(TetRun& run, const BoundaryShare& share);
+// `stand_in`: a solid in which they are optimised instead of the run's, or null.
+JointReport joint_phase(TetRun& run, const BoundaryShare& share, SolidBackend* stand_in);
 
 // The finished boundary of the result: a remesh of the solid's boundary from those of the sites that are on it. Throws
 // Error if it does not bound a solid.

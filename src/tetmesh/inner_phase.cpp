@@ -81,12 +81,15 @@ std::vector<Vec3> inside_of(const PlacedSeeds& seeds) {
 
 }  // namespace
 
-void inner_phase(TetRun& run, const RemeshResult& surface) {
+void inner_phase(TetRun& run, const RemeshResult& surface, SolidBackend* stand_in) {
   const std::size_t boundary = surface.mesh.vertices.size();
   run.sites.seeds = with_boundary(surface, inside_of(run.sites.seeds));
   for (SeedPlace& place : run.sites.seeds.edit_places().first(boundary)) place.kind = Kind::fixed;
+  if (stand_in) run.sites.change_backend(*stand_in);
   match_count(run, boundary);
   optimise_sites(run, "inside", kInnerShare, false);
+  if (stand_in) clear_boundary(run);
+  run.sites.change_backend(run.solid);
   clear_boundary(run);
   complete(run.sites, false);
 }

@@ -52,6 +52,18 @@ SolidBackend* StandIns::choose(std::size_t count, std::size_t final_count, const
   return domain_ ? domain_->backend.get() : nullptr;
 }
 
+SolidBackend* StandIns::coarse() {
+  return domain_ && domain_->solid.density.empty() ? domain_->backend.get() : nullptr;
+}
+
+SolidBackend* StandIns::within(const TriangleMesh& boundary, std::size_t count, const SolidBackend& whole) {
+  within_.reset();
+  if (!whole.solid().density.empty() || whole.solid().mesh.tets.size() < kManyTets * count || find_tetgen().empty())
+    return nullptr;
+  within_ = make_within(boundary);
+  return within_ ? within_->backend.get() : nullptr;
+}
+
 // The solid refined only as far as `count` sites ask for.
 std::unique_ptr<StandIns::Domain> StandIns::make_sized(std::size_t count) const {
   SizingTarget target;
@@ -72,9 +84,15 @@ std::unique_ptr<StandIns::Domain> StandIns::make_coarse(std::size_t vertices) co
   Context quiet = context_;
   quiet.progress = nullptr;
   quiet.warning = nullptr;
-  const RemeshResult coarse = remesh(boundary_, features_, remeshing, quiet);
+  return make_within(remesh(boundary_, features_, remeshing, quiet).mesh);
+}
+
+std::unique_ptr<StandIns::Domain> StandIns::make_within(const TriangleMesh& boundary) const {
+  Context quiet = context_;
+  quiet.progress = nullptr;
+  quiet.warning = nullptr;
   try {
-    return std::make_unique<Domain>(tetgen_tets(check_surface(coarse.mesh), {}, quiet).mesh, std::vector<double>{},
+    return std::make_unique<Domain>(tetgen_tets(check_surface(boundary), {}, quiet).mesh, std::vector<double>{},
                                     compute_);
   } catch (const DeviceError&) {
     throw;

@@ -1,5 +1,5 @@
-// Solids with fewer tetrahedra that stand in for the whole one while sites are free, when neither the boundary's
-// details nor a density between the sites matter yet.
+// Solids with fewer tetrahedra that stand in for the whole one while sites move, when the boundary's details do not
+// matter, or a density between the sites not yet.
 #pragma once
 
 #include <cstddef>
@@ -24,12 +24,18 @@ class StandIns {
   // The stand-in for `whole` with `count` of `final_count` sites; null if the solid itself will do. It lasts until the
   // next call.
   SolidBackend* choose(std::size_t count, std::size_t final_count, const SolidBackend& whole);
+  // The inside of the remeshed boundary that stood in last, for sites on the boundary and inside; null if none did.
+  SolidBackend* coarse();
+  // What a finished boundary of the result bounds, for `count` sites of which it has the first; null if `whole` itself
+  // will do. It lasts until the next call.
+  SolidBackend* within(const TriangleMesh& boundary, std::size_t count, const SolidBackend& whole);
 
  private:
   struct Domain;
 
   std::unique_ptr<Domain> make_sized(std::size_t count) const;
   std::unique_ptr<Domain> make_coarse(std::size_t vertices) const;
+  std::unique_ptr<Domain> make_within(const TriangleMesh& boundary) const;
 
   const TetMesh& mesh_;
   const TriangleMesh& surface_;
@@ -39,7 +45,7 @@ class StandIns {
   const SizeField* bound_;
   Compute& compute_;
   const Context& context_;
-  std::unique_ptr<Domain> domain_;
+  std::unique_ptr<Domain> domain_, within_;
   bool tried_ = false;  // to make a coarse one
 };
 

@@ -58,25 +58,25 @@ struct FinishedBoundary {
 };
 
 // From free sites to those of the finished boundary and inside it.
-FinishedBoundary place_sites(TetRun& run, const BoundaryShare& share) {
+FinishedBoundary place_sites(TetRun& run, const BoundaryShare& share, StandIns& stand_ins) {
   FinishedBoundary finished;
-  finished.joint = joint_phase(run, share);
+  finished.joint = joint_phase(run, share, stand_ins.coarse());
   finished.surface = finish_boundary(run);
-  inner_phase(run, finished.surface);
+  inner_phase(run, finished.surface, stand_ins.within(finished.surface.mesh, run.wanted, run.solid));
   return finished;
 }
 
 // If that leaves too few sites, there is no room inside for what the boundary did not take: it is done again from the
 // free sites, and the boundary takes more.
-FinishedBoundary place_enough_sites(TetRun& run) {
+FinishedBoundary place_enough_sites(TetRun& run, StandIns& stand_ins) {
   const PlacedSeeds free = run.sites.seeds;
   const double done = run.done;
-  FinishedBoundary finished = place_sites(run, {});
+  FinishedBoundary finished = place_sites(run, {}, stand_ins);
   const auto count = static_cast<double>(run.sites.seeds.size()), wanted = static_cast<double>(run.wanted);
   if (count >= kEnough * wanted || finished.joint.thin) return finished;
   run.sites.seeds = free;
   run.done = done;
-  return place_sites(run, {wanted - count, true});
+  return place_sites(run, {wanted - count, true}, stand_ins);
 }
 
 void extract(const CvtRun& sites, const TriangleMesh& boundary, TetResult& result) {
@@ -121,7 +121,7 @@ TetResult mesh_sized(TetRun& run, StandIns& stand_ins) {
   const TriangleMesh& surface = run.solid.surface().mesh;
   result.input_topology = analyse_topology(surface.triangles, surface.vertices.size());
   free_phase(run, stand_ins);
-  FinishedBoundary finished = place_enough_sites(run);
+  FinishedBoundary finished = place_enough_sites(run, stand_ins);
   extract(run.sites, finished.surface.mesh, result);
   remove_slivers(run.sites, run.options.min_dihedral, result);
   result.certification = run.sites.certification();
