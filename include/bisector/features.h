@@ -59,6 +59,8 @@ struct FeatureOptions {
 // fades out. What hangs together is kept if its angle, on average, exceeds 30 degrees by five times its disorder, which
 // is the median angle of the edges around it, or, along chains of many edges, the change of angle from edge to edge, if
 // that is less; and if it is longer than some edges of the mesh or joined to other features.
+// Edges and triangles are those of the mesh without the vertices that lie flat or on straight edges, up to the rounding
+// of coordinates to six digits, so that dividing triangles makes no creases.
 //
 // Corners: vertices with one or with more than two feature edges; turns of a curve by more than the corner angle,
 // measured across edges that are tiny beside their neighbours; where the kind of a curve or the pair of labels beside

@@ -37,7 +37,10 @@ void CvtRun::localise(bool on) {
 }
 
 Localiser& CvtRun::localiser() {
-  if (!localiser_) localiser_ = std::make_unique<Localiser>(surface());
+  if (localiser_surface_ != &surface()) {
+    localiser_ = std::make_unique<Localiser>(surface());
+    localiser_surface_ = &surface();
+  }
   return *localiser_;
 }
 
@@ -96,8 +99,11 @@ bool CvtRun::covers(const Diagram& diagram) const {
 void CvtRun::change_backend(Backend& backend) {
   if (&backend == backend_) return;
   diagram_ = {};
+  if (backend_ != &home_ && localiser_surface_ == &surface()) {
+    localiser_.reset();
+    localiser_surface_ = nullptr;
+  }
   backend_ = &backend;
-  localiser_.reset();
 }
 
 }  // namespace bisector

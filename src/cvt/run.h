@@ -33,7 +33,7 @@ class CvtRun {
  public:
   // All must outlive the run. `curves` are those that places refer to.
   CvtRun(Backend& backend, const FeatureCurves& curves, const Context& context)
-      : backend_(&backend), curves_(curves), context_(context) {}
+      : home_(backend), backend_(&backend), curves_(curves), context_(context) {}
 
   Backend& backend() const { return *backend_; }
   // The surface, or the boundary of the solid.
@@ -68,7 +68,7 @@ class CvtRun {
   void evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& diagram);
   // Whether a diagram covers the domain: the masses of its cells sum to the domain's. One that does not is never used.
   bool covers(const Diagram& diagram) const;
-  // Goes on with another backend, whose domain may be another.
+  // Goes on with another backend, whose domain may be another. All but the first need to live only while they are used.
   void change_backend(Backend& backend);
 
  private:
@@ -78,12 +78,14 @@ class CvtRun {
   Localiser& localiser();
   void leave_out_strays(DiagramOfSeeds& known);
 
+  Backend& home_;  // the first
   Backend* backend_;
   const FeatureCurves& curves_;
   const Context& context_;
   DiagramOfSeeds diagram_;
   bool localised_ = false, sheets_cross_ = false;
-  std::unique_ptr<Localiser> localiser_;  // of the surface, once there was need of it
+  std::unique_ptr<Localiser> localiser_;         // once there was need of it
+  const Surface* localiser_surface_ = nullptr;  // that it is for
   // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.
   std::vector<Vec3> normals_;
 };

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
 #include "voronoi/collinear_strips.h"
@@ -64,27 +65,20 @@ class Complex {
         table_(edge_table(triangles_, surface.mesh.vertices.size())), twin_(3 * triangles_.size(), kBorder),
         polygon_at_(surface.mesh.vertices.size(), kNone), piece_at_(surface.mesh.vertices.size(), kNone),
         parts_(singletons(polygons.pairs.size())), lines_(singletons(polygons.labels.size())) {
-    std::vector<std::size_t> around;
-    for (std::size_t e = 0; e < table_.edges.size(); ++e) {
-      around.clear();
-      for (const std::size_t* h = table_.half_edges.begin(e); h != table_.half_edges.end(e); ++h)
-        if (is_read(*h / 3)) around.push_back(*h);
-      if (around.size() == 2) {
-        twin_[around[0]] = static_cast<Index>(around[1]);
-        twin_[around[1]] = static_cast<Index>(around[0]);
-      } else if (around.size() > 2) {
-        for (const std::size_t h : around) twin_[h] = kSeveral;
-        for (const std::size_t h : around) several_[h] = around;
-      }
-    }
+    parallel_each(table_.edges.size(), [&](std::size_t e) {
+      if (table_.half_edges.size(e) != 2) return;
+      const std::size_t g = table_.half_edges.begin(e)[0], h = table_.half_edges.begin(e)[1];
+      if (!is_read(g / 3) || !is_read(h / 3)) return;
+      twin_[g] = static_cast<Index>(h);
+      twin_[h] = static_cast<Index>(g);
+    });
+    for (std::size_t e = 0; e < table_.edges.size(); ++e)
+      if (table_.half_edges.size(e) > 2) link_several(e);
     Index cells = 0;
     for (const auto& pair : diagram_.pairs) cells = std::max(cells, pair.cell + 1);
-    of_cell_.offsets.assign(cells + 1, 0);
-    for (const auto& pair : diagram_.pairs) ++of_cell_.offsets[pair.cell + 1];
-    std::partial_sum(of_cell_.offsets.begin(), of_cell_.offsets.end(), of_cell_.offsets.begin());
-    of_cell_.values.resize(diagram_.pairs.size());
-    std::vector<std::size_t> next(of_cell_.offsets.begin(), of_cell_.offsets.end() - 1);
-    for (Index p = 0; p < diagram_.pairs.size(); ++p) of_cell_.values[next[diagram_.pairs[p].cell]++] = p;
+    of_cell_ = group_into_rows<Index>(cells, [&](const auto& put) {
+      for (Index p = 0; p < diagram_.pairs.size(); ++p) put(diagram_.pairs[p].cell, p);
+    });
   }
 
   BallReport check() {
@@ -111,6 +105,23 @@ class Complex {
 
  private:
   static constexpr Index kBorder = kNone, kSeveral = kNone - 1;
+
+  // An edge of more than two triangles, some of which may have no polygons.
+  void link_several(std::size_t edge) {
+    std::vector<std::size_t> around;
+    for (const std::size_t* h = table_.half_edges.begin(edge); h != table_.half_edges.end(edge); ++h)
+      if (is_read(*h / 3)) around.push_back(*h);
+    if (around.size() < 2) return;
+    if (around.size() == 2) {
+      twin_[around[0]] = static_cast<Index>(around[1]);
+      twin_[around[1]] = static_cast<Index>(around[0]);
+      return;
+    }
+    for (const std::size_t h : around) {
+      twin_[h] = kSeveral;
+      several_[h] = around;
+    }
+  }
 
   enum class Kind : unsigned char { piece, crossing, end, branching };
   // What lies on the boundary towards the cell `other`: an entry, or its crossing of a mesh edge of two, one or more

@@ -65,11 +65,14 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
   }
 
   facet_of.assign(mesh.triangles.size(), kNone);
-  for (Index k : hilbert_order(centres)) {
-    const Index t = kept[k];
+  const std::vector<Index> order = hilbert_order(centres);
+  facets.resize(order.size());
+  summaries.resize(order.size());
+  parallel_each(order.size(), [&](std::size_t place) {
+    const Index t = kept[order[place]];
     const Triangle& v = mesh.triangles[t];
-    Facet f;
-    FacetSummary summary;
+    Facet& f = facets[place];
+    FacetSummary& summary = summaries[place];
     summary.triangle = t;
     f.normal = normals[t];
     std::array<std::array<Index, 3>, 3> edges;
@@ -93,10 +96,8 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
                                        f.density[0], f.density[1], f.density[2], 0.5 * twice_area);
     std::sort(edges.begin(), edges.end());
     for (unsigned char r = 0; r < 3; ++r) f.rank[edges[r][2]] = r;
-    facet_of[t] = static_cast<Index>(facets.size());
-    facets.push_back(f);
-    summaries.push_back(summary);
-  }
+    facet_of[t] = static_cast<Index>(place);
+  });
   area = fixed_sum(facets.size(), [&](std::size_t k) {
     const Facet& f = facets[k];
     return 0.5 * dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
