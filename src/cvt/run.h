@@ -83,7 +83,7 @@ class CvtRun {
   const FeatureCurves& curves_;
   const Context& context_;
   DiagramOfSeeds diagram_;
-  bool localised_ = false, sheets_cross_ = false;
+  bool localised_ = false;
   std::unique_ptr<Localiser> localiser_;        // once there was need of it
   const Surface* localiser_surface_ = nullptr;  // that it is for
   // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.

@@ -666,9 +666,8 @@ FeatureGraph find_graph(const TriangleMesh& mesh, const std::vector<Triangle>& t
 }
 
 std::vector<Edge> given_edges(const TriangleMesh& mesh, const FeatureOptions& options) {
-  std::vector<Edge> edges;
-  for (const std::vector<Edge>* list : {&options.given, &mesh.feature_edges})
-    for (const Edge& e : *list) edges.push_back({std::min(e[0], e[1]), std::max(e[0], e[1])});
+  std::vector<Edge> edges = options.given;
+  edges.insert(edges.end(), mesh.feature_edges.begin(), mesh.feature_edges.end());
   return edges;
 }
 
@@ -710,7 +709,7 @@ FeatureGraph detect_features(const TriangleMesh& mesh, const FeatureOptions& opt
   // What makes a crease is judged by what lies beside it and around it. On a mesh divided into smaller triangles that
   // would be flat everywhere.
   const PlanarReduction reduced(mesh.vertices, triangles, labels, given_edges(mesh, options));
-  if (!reduced.removed_any()) return find_graph(mesh, triangles, labels, options);
+  if (reduced.triangles.size() == triangles.size()) return find_graph(mesh, triangles, labels, options);
   std::vector<std::int32_t> left;
   for (const Index t : reduced.origin)
     if (!labels.empty()) left.push_back(labels[t]);

@@ -72,7 +72,6 @@ class PlanarReduction::Work {
       const Index to = best_target(v, spokes);
       if (to == kNone) continue;
       collapse(v, to, spokes, gone);
-      out_.removed_any_ = true;
       for (const Spoke& spoke : spokes)
         if (!std::exchange(queued[spoke.end], 1)) queue.push_back(spoke.end);
     }

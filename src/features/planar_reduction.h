@@ -16,7 +16,7 @@ class PlanarReduction {
  public:
   // Collapses edges of the mesh's triangles, which have no repeated corners, where that leaves every point of the
   // surface where it is but for the rounding of coordinates to six digits. Vertices stay at corners, at ends of the
-  // edges `kept` (sorted, lower vertex first), and where folds, borders, non-manifold edges or edges between labels
+  // edges `kept`, and where folds, borders, non-manifold edges or edges between labels
   // turn or meet; also where a triangle has no normal, and where nothing but slivers would be left. A mesh divided into
   // smaller triangles becomes what it was. `labels` are of the triangles, or empty.
   PlanarReduction(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles,
@@ -25,8 +25,6 @@ class PlanarReduction {
   std::vector<Triangle> triangles;
   std::vector<Index> origin;  // of each, the triangle of the mesh that it is left of, and has its label from
 
-  // Whether any vertex was removed.
-  bool removed_any() const { return removed_any_; }
   // The vertices of the mesh along an edge where the surface folds or ends, from a to b.
   std::vector<Index> chain(Index a, Index b) const;
 
@@ -36,7 +34,6 @@ class PlanarReduction {
   static std::vector<Index> chain_of(const Chains& chains, Index a, Index b);
 
   Chains chains_;  // inner vertices by both ends, from the lower
-  bool removed_any_ = false;
 };
 
 }  // namespace bisector

@@ -211,6 +211,7 @@ class Improver {
   // Makes those of the changes that hold; `on` tells which.
   void make(const std::vector<Change>& changes, std::vector<char>& on);
   void drop_idle();
+  // Gives now_ to the run, with its polygons if they are still there.
   void hand_over();
   void smooth();
   std::vector<std::vector<Index>> colours(const std::vector<PatchVertex>& vertices) const;
@@ -848,10 +849,11 @@ void Improver::hand_over() {
 }
 
 ImproveReport Improver::run() {
-  now_.seeds = run_.seeds;
-  now_.known = run_.take_diagram(Want::polygons | Want::dual);
-  measure(now_);
-  polygons_are_current_ = true;
+  Snapshot first;
+  first.seeds = run_.seeds;
+  first.known = run_.take_diagram(Want::polygons | Want::dual);
+  measure(first);
+  accept(std::move(first));
   if (now_.dual().triangles.empty()) {
     hand_over();
     return report_;
@@ -876,9 +878,10 @@ ImproveReport Improver::run() {
     batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
   if (report_.made > 0) smooth();
   if (now_.average > average) {
-    now_.seeds = run_.seeds;
-    measure(now_);
-    polygons_are_current_ = true;
+    Snapshot start;
+    start.seeds = run_.seeds;
+    measure(start);
+    accept(std::move(start));
     report_ = {report_.trials, 0, 0, 0, 0};
   }
 

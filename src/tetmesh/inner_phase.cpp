@@ -88,6 +88,7 @@ void inner_phase(TetRun& run, const RemeshResult& surface, SolidBackend* stand_i
   if (stand_in) run.sites.change_backend(*stand_in);
   match_count(run, boundary);
   optimise_sites(run, "inside", kInnerShare, false);
+  // Most of what has to be pushed away is found there, and only the rest in the solid itself.
   if (stand_in) clear_boundary(run);
   run.sites.change_backend(run.solid);
   clear_boundary(run);

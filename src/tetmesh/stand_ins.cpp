@@ -19,6 +19,13 @@ constexpr int kSurfaceSteps = 20;             // iterations of its surface's opt
 constexpr std::size_t kFewestVertices = 100;  // of its surface
 constexpr std::size_t kFewerTriangles = 4;    // triangles of the surface given for each vertex of its surface, at least
 
+// Without word of what goes on.
+Context quiet(Context context) {
+  context.progress = nullptr;
+  context.warning = nullptr;
+  return context;
+}
+
 }  // namespace
 
 // A solid and what computes its diagrams.
@@ -81,19 +88,13 @@ std::unique_ptr<StandIns::Domain> StandIns::make_coarse(std::size_t vertices) co
   remeshing.iterations = kSurfaceSteps;
   remeshing.topology = TopologyControl::check;
   remeshing.min_angle = 0;
-  Context quiet = context_;
-  quiet.progress = nullptr;
-  quiet.warning = nullptr;
-  return make_within(remesh(boundary_, features_, remeshing, quiet).mesh);
+  return make_within(remesh(boundary_, features_, remeshing, quiet(context_)).mesh);
 }
 
 std::unique_ptr<StandIns::Domain> StandIns::make_within(const TriangleMesh& boundary) const {
-  Context quiet = context_;
-  quiet.progress = nullptr;
-  quiet.warning = nullptr;
   try {
-    return std::make_unique<Domain>(tetgen_tets(check_surface(boundary), {}, quiet).mesh, std::vector<double>{},
-                                    compute_);
+    return std::make_unique<Domain>(tetgen_tets(check_surface(boundary), {}, quiet(context_)).mesh,
+                                    std::vector<double>{}, compute_);
   } catch (const DeviceError&) {
     throw;
   } catch (const Error&) {

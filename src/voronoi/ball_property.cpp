@@ -68,9 +68,7 @@ class Complex {
     parallel_each(table_.edges.size(), [&](std::size_t e) {
       if (table_.half_edges.size(e) != 2) return;
       const std::size_t g = table_.half_edges.begin(e)[0], h = table_.half_edges.begin(e)[1];
-      if (!is_read(g / 3) || !is_read(h / 3)) return;
-      twin_[g] = static_cast<Index>(h);
-      twin_[h] = static_cast<Index>(g);
+      if (is_read(g / 3) && is_read(h / 3)) make_twins(g, h);
     });
     for (std::size_t e = 0; e < table_.edges.size(); ++e)
       if (table_.half_edges.size(e) > 2) link_several(e);
@@ -106,17 +104,18 @@ class Complex {
  private:
   static constexpr Index kBorder = kNone, kSeveral = kNone - 1;
 
+  void make_twins(std::size_t g, std::size_t h) {
+    twin_[g] = static_cast<Index>(h);
+    twin_[h] = static_cast<Index>(g);
+  }
+
   // An edge of more than two triangles, some of which may have no polygons.
   void link_several(std::size_t edge) {
     std::vector<std::size_t> around;
     for (const std::size_t* h = table_.half_edges.begin(edge); h != table_.half_edges.end(edge); ++h)
       if (is_read(*h / 3)) around.push_back(*h);
-    if (around.size() < 2) return;
-    if (around.size() == 2) {
-      twin_[around[0]] = static_cast<Index>(around[1]);
-      twin_[around[1]] = static_cast<Index>(around[0]);
-      return;
-    }
+    if (around.size() == 2) make_twins(around[0], around[1]);
+    if (around.size() <= 2) return;
     for (const std::size_t h : around) {
       twin_[h] = kSeveral;
       several_[h] = around;

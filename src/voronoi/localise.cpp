@@ -545,7 +545,10 @@ void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons&
     }
   }
   RestrictedPolygons& found = scratch.found;
-  clear(found);
+  found.pairs.clear();
+  found.offsets.assign(1, 0);
+  found.labels.clear();
+  found.vertices.clear();
   for (std::size_t k = 0; k < met.size(); ++k) {
     const bool clipped_already = search && k == 0;
     if (!clipped_already && !clipper.clip(neighbours, met[k])) continue;

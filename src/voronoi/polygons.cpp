@@ -30,13 +30,6 @@ std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std:
   return begin;
 }
 
-void clear(RestrictedPolygons& polygons) {
-  polygons.pairs.clear();
-  polygons.offsets.assign(1, 0);
-  polygons.labels.clear();
-  polygons.vertices.clear();
-}
-
 void append_polygons(const RestrictedPolygons& from, std::size_t begin, std::size_t end, RestrictedPolygons& out) {
   if (out.offsets.empty()) out.offsets.push_back(0);
   if (begin == end) return;

@@ -20,9 +20,6 @@ void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index tria
 // The first polygon of each triangle, and one past the last.
 std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles);
 
-// Leaves no polygon, but the memory.
-void clear(RestrictedPolygons& polygons);
-
 // Appends the polygons from `begin` to before `end`.
 void append_polygons(const RestrictedPolygons& from, std::size_t begin, std::size_t end, RestrictedPolygons& out);
 

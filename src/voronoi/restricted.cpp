@@ -313,24 +313,28 @@ void RestrictedVoronoi::Work::relate(const SortedSeeds& last, const std::vector<
   const auto same = [&](std::size_t i, std::size_t j) {
     return i < before && j < count && last.slot[i] != kNone && last.x[last.slot[i]] == given[j];
   };
-  std::size_t i = 0, j = 0, lost = 0;
-  while (i < before && j < count) {
+  // How many seeds to skip in each list to the nearest place where both go on alike; one in each if there is none.
+  struct Skip {
+    std::size_t last, now;
+    bool found;
+  };
+  const auto skip_changes = [&](std::size_t i, std::size_t j) -> Skip {
+    for (std::size_t both = 1; both <= kMostChanges; ++both)
+      for (std::size_t k = 0; k <= both; ++k)
+        if (same(i + k, j + both - k)) return {k, both - k, true};
+    return {1, 1, false};
+  };
+  std::size_t lost = 0;
+  for (std::size_t i = 0, j = 0; i < before && j < count && lost <= kMostLost;) {
     if (same(i, j)) {
       pair(i++, j++);
       continue;
     }
-    // The nearest place where both go on alike.
-    std::size_t skip = 1, skip_there = 0;
-    bool found = false;
-    for (std::size_t both = 1; both <= kMostChanges && !found; ++both)
-      for (skip = 0; skip <= both && !found; ++skip) found = same(i + skip, j + (skip_there = both - skip));
-    if (found) --skip;
-    else skip = skip_there = 1;
-    lost += found ? 0 : 1;
-    if (lost > kMostLost) break;
-    for (std::size_t k = 0; k < std::min(skip, skip_there); ++k) pair(i + k, j + k);
-    i += skip;
-    j += skip_there;
+    const Skip skip = skip_changes(i, j);
+    lost += !skip.found;
+    for (std::size_t k = 0; k < std::min(skip.last, skip.now); ++k) pair(i + k, j + k);
+    i += skip.last;
+    j += skip.now;
   }
   if (lost <= kMostLost) return;
   slot_now.assign(before == count ? last.x.size() : 0, kNone);
