@@ -11,7 +11,6 @@ namespace bisector {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kScreens = 512;  // kept, each for the last cell whose slot leads to it
 
 }  // namespace
 
@@ -21,14 +20,13 @@ void Clipper::Polygon::reserve(std::size_t count) {
   edges.resize(2 * count);
 }
 
-Clipper::Clipper() : lines_(16), screens_(kScreens) {
+Clipper::Clipper() : lines_(16) {
   for (unsigned k = 0; k < 3; ++k) lines_[k].slot = kEdgeLabel | k;
 }
 
 void Clipper::reset(const SortedSeeds& seeds) {
   seeds_ = &seeds;
-  scale_ = screen_scale(seeds.extent);
-  for (Screen& screen : screens_) screen.list = nullptr;
+  screens_.reset(seeds);
 }
 
 void Clipper::begin(const Facet& facet, const SlotFilter* among) {
@@ -68,13 +66,12 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
   NeighbourList list = neighbours.list(slot);
   for (;;) {
     const std::size_t count = static_cast<std::size_t>(list.end - list.begin);
-    const std::size_t screened = std::min(count, 4 * kBlocks);
-    Screen& screen = screen_of(list);
+    const std::size_t screened = std::min(count, CellScreen::kListed);
+    CellScreen& screen = screens_.of(slot, list);
     std::size_t k = 0;
     for (; k < screened; k += 4) {
-      if (k == 4 * screen.built) build_block(screen, list, k / 4);
       if (!bounded_) bound_polygon();
-      const ScreenBlock& block = screen.blocks[k / 4];
+      const ScreenBlock& block = screens_.block(screen, slot, list, k / 4);
       if (reach_.is_safe_from(block)) return true;
       const unsigned present = (1u << std::min<std::size_t>(4, count - k)) - 1;
       for (unsigned lines = lines_that_may_cut(block) & present; lines; lines &= lines - 1)
@@ -133,88 +130,6 @@ void Clipper::take(Index slot, const Index* labels, std::size_t count) {
     if (is_edge(before.slot) && is_edge(after.slot))
       polygon_.corners[k] = {local_[after.slot & ~kEdgeLabel], kCornerSlack * largest_};
     else add_corner(before, after, polygon_.corners[k]);
-  }
-}
-
-// A closed chain of corners, each where two lines that follow each other meet, that all lie strictly within every other
-// line is the boundary of the clipped facet: each is a vertex of it, and two on one line end that line's edge.
-bool Clipper::confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count) {
-  start(slot);
-  place_lines();
-  set_labels(labels, count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Line &before = lines_[polygon_.edges[previous(k)]], &after = lines_[polygon_.edges[k]];
-    if (is_edge(before.slot) && is_edge(after.slot)) {
-      const unsigned corner = after.slot & ~kEdgeLabel;
-      if ((before.slot & ~kEdgeLabel) != (corner + 2) % 3) return false;
-      polygon_.corners[k] = {local_[corner], kCornerSlack * largest_};
-    } else if (!meet(before, after, polygon_.corners[k])) {
-      return false;
-    }
-  }
-  for (std::size_t e = 0; e < line_count_; ++e)
-    for (std::size_t k = 0; k < count; ++k)
-      if (polygon_.edges[k] != e && polygon_.edges[previous(k)] != e && !certainly_inside(k, lines_[e])) return false;
-  bound_polygon();
-  const NeighbourList list = neighbours.list(slot);
-  const std::size_t listed = static_cast<std::size_t>(list.end - list.begin);
-  Screen& screen = screen_of(list);
-  for (std::size_t k = 0; k < std::min(listed, 4 * kBlocks); k += 4) {
-    if (k == 4 * screen.built) build_block(screen, list, k / 4);
-    const ScreenBlock& block = screen.blocks[k / 4];
-    if (reach_.is_safe_from(block)) return true;
-    const unsigned present = (1u << std::min<std::size_t>(4, listed - k)) - 1;
-    for (unsigned lines = lines_that_may_cut(block) & present; lines; lines &= lines - 1)
-      if (!certainly_passes(list.begin[k + static_cast<unsigned>(std::countr_zero(lines))])) return false;
-  }
-  return listed <= 4 * kBlocks && (list.radius == kInfinity || reach_.is_safe_from(list.radius * list.radius));
-}
-
-bool Clipper::certainly_inside(std::size_t k, const Line& line) const {
-  const Corner& corner = polygon_.corners[k];
-  const double error = corner.slack * taxicab(line.m);
-  if (!is_edge(line.slot)) return dot(corner.at, line.m) + error < BisectorLimits(0.5 * line.squared).before;
-  // A corner of the facet is on the inner side of the edge opposite; elsewhere the edge's normal points inwards if it
-  // runs from its own corner.
-  const Index before = label(previous(k)), after = label(k);
-  if (is_edge(before) && is_edge(after)) return true;
-  const unsigned edge = line.slot & ~kEdgeLabel, origin = facet_->origin[edge];
-  const double height = dot(line.m, corner.at - local_[origin]);
-  return (origin == edge ? height : -height) > 2 * error + kTiny;
-}
-
-bool Clipper::certainly_passes(Index other) const {
-  if (bounded_by(other)) return true;
-  Line line;
-  line.m = seeds_->x[other] - seeds_->x[slot_];
-  line.squared = norm2(line.m);
-  line.slot = other;
-  for (std::size_t k = 0; k < polygon_.size; ++k)
-    if (!certainly_inside(k, line)) return false;
-  return true;
-}
-
-Clipper::Screen& Clipper::screen_of(const NeighbourList& list) {
-  Screen& screen = screens_[slot_ % kScreens];
-  if (screen.list != list.begin) {
-    screen.list = list.begin;
-    screen.built = 0;
-  }
-  return screen;
-}
-
-void Clipper::build_block(Screen& screen, const NeighbourList& list, std::size_t index) const {
-  ScreenBlock& block = screen.blocks[index];
-  screen.built = index + 1;
-  const Vec3 x = seeds_->x[slot_];
-  for (std::size_t m = 0; m < 4; ++m) {
-    const Index* j = list.begin + 4 * index + m;
-    if (j >= list.end) {
-      block.set_none(m);
-      continue;
-    }
-    const Vec3 d = scale_ * (seeds_->x[*j] - x);
-    block.set(m, d, 0.5 * norm2(d));
   }
 }
 
@@ -286,10 +201,10 @@ void Clipper::bound_polygon() {
     slack = std::max(slack, polygon_.corners[k].slack);
     squared = std::max(squared, norm2(polygon_.corners[k].at));
   }
-  reach_ = Reach(squared, slack, facet_squared_, scale_);
+  reach_ = Reach(squared, slack, facet_squared_, screens_.scale());
   if (splats_.size() < polygon_.size) splats_.resize(2 * polygon_.size);
   for (std::size_t k = 0; k < polygon_.size; ++k) {
-    const Vec3 p = scale_ * polygon_.corners[k].at;
+    const Vec3 p = screens_.scale() * polygon_.corners[k].at;
     const float x = static_cast<float>(p.x), y = static_cast<float>(p.y), z = static_cast<float>(p.z);
     splats_[k] = {FourFloats{x, x, x, x}, FourFloats{y, y, y, y}, FourFloats{z, z, z, z}};
   }

@@ -7,7 +7,7 @@
 #include "voronoi/exact.h"
 #include "voronoi/moments.h"
 #include "voronoi/neighbours.h"
-#include "voronoi/screen.h"
+#include "voronoi/screens.h"
 #include "voronoi/surface.h"
 
 namespace bisector {
@@ -31,9 +31,6 @@ class Clipper {
   void begin(const Facet& facet, const SlotFilter* among = nullptr);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
-  // The same, if the result is bounded by the lines with these labels in this cyclic order (that of an earlier diagram
-  // with nearby seeds), and that is certain without exact arithmetic. Otherwise false, and nothing is known.
-  bool confirm(const Neighbours& neighbours, Index slot, const Index* labels, std::size_t count);
   // Takes the whole facet, which the caller knows to lie in the cell.
   void take(Index slot);
   // Takes the polygon bounded by the lines with these labels in this cyclic order, which the caller knows to be the
@@ -52,6 +49,9 @@ class Clipper {
   // Integrals over the last polygon.
   template <bool kUniform>
   Moments integrate();
+
+  // What is kept of the cells' neighbours, for others who look at the same cells.
+  Screens& screens() { return screens_; }
 
   // Whether a decision of the last call to clip() was uncertain, or its list too short.
   bool uncertain() const { return uncertain_; }
@@ -84,28 +84,16 @@ class Clipper {
     }
   };
 
-  // The first neighbours of a cell, four to a block.
-  static constexpr std::size_t kBlocks = 10;
-  struct Screen {
-    const Index* list = nullptr;
-    std::size_t built = 0;
-    ScreenBlock blocks[kBlocks];
-  };
   // A corner in single precision, each coordinate four times.
   struct Splat {
     FourFloats x, y, z;
   };
 
   void start(Index slot);
-  Screen& screen_of(const NeighbourList& list);
-  void build_block(Screen& screen, const NeighbourList& list, std::size_t block) const;
   unsigned lines_that_may_cut(const ScreenBlock& block) const;
   void place_lines();
   unsigned add_line(Index other, const Vec3& towards, double squared);
   void set_labels(const Index* labels, std::size_t count);
-  // Whether corner k is certain to lie on the inner side of the line.
-  bool certainly_inside(std::size_t corner, const Line& line) const;
-  bool certainly_passes(Index other) const;
   // Cuts by one neighbour. False if the polygon is empty then.
   bool visit(Index other);
   void bound_polygon();
@@ -139,9 +127,8 @@ class Clipper {
   std::vector<Line> lines_;   // all that ever cut; the first three are the facet's edges
   std::size_t line_count_ = 0;
   Polygon polygon_, kept_;
-  std::vector<Screen> screens_;  // direct-mapped by slot
+  Screens screens_;
   std::vector<Splat> splats_;    // the polygon's corners, scaled
-  double scale_ = 1;             // of the screen
   std::vector<signed char> sides_;
   std::vector<double> densities_;
   bool uncertain_ = false, wider_ = false;

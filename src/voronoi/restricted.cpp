@@ -9,6 +9,7 @@
 #include "core/stopwatch.h"
 #include "voronoi/clip.h"
 #include "voronoi/fixed_tree_sum.h"
+#include "voronoi/known_polygons.h"
 #include "voronoi/owner.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
@@ -50,12 +51,14 @@ struct Chunk {
   }
 };
 
-// Per thread: a clipper, and the cells that the current facet has met.
+// Per thread: a clipper, the cells that the current facet has met, and what is known of a chunk from the last diagram.
 struct Walker {
   Clipper clipper;
   std::vector<Index> queue;
-  Marks met;                     // slots
-  std::vector<Index> labels;     // of a pair of the last diagram
+  Marks met;  // slots
+  KnownPolygons known;
+  std::vector<Index> first_known;  // of each facet of the chunk, in `known`; and one past the last
+  std::vector<Index> labels;       // of a pair
   std::uint64_t generation = 0;  // of the seeds that the clipper knows
 
   void begin(std::size_t slots) {
@@ -96,7 +99,14 @@ struct RestrictedVoronoi::Work {
   Walker& local_walker();
   void clip_facets();
   void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, std::vector<Moments>& moments_here) const;
-  bool confirm_last(std::size_t facet, Index slot, Walker& walker) const;
+  bool is_whole(std::size_t facet) const {
+    const Index* vertex = surface.summaries[facet].vertex;
+    return owner[vertex[0]] == owner[vertex[1]] && owner[vertex[0]] == owner[vertex[2]];
+  }
+  void recall(std::size_t begin, std::size_t end, Walker& walker) const;
+  void recall_facet(std::size_t facet, Walker& walker) const;
+  bool take_known(std::size_t first, std::size_t end, const KnownPolygons& known, Chunk& chunk,
+                  std::vector<Moments>& moments_here) const;
   // What has become of a slot of the last diagram.
   Index now(Index slot) const { return followed ? slot : slot < slot_now.size() ? slot_now[slot] : kNone; }
   std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
@@ -127,27 +137,19 @@ void RestrictedVoronoi::Work::find_owners() {
 
 void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk,
                                          std::vector<Moments>& moments_here) const {
-  const FacetSummary& summary = surface.summaries[index];
-  Clipper& clipper = walker.clipper;
-  const Index first = owner[summary.vertex[0]];
-  // A cell is convex: it holds the facet if it owns the corners.
-  if (first == owner[summary.vertex[1]] && first == owner[summary.vertex[2]]) {
-    chunk.entries.push_back({first, kWhole});
-    return;
-  }
   const bool uniform = surface.density.empty();
+  Clipper& clipper = walker.clipper;
   clipper.begin(surface.facets[index]);
   walker.begin(seeds.x.size());
-  for (const Index vertex : summary.vertex) walker.meet(owner[vertex]);
+  for (const Index vertex : surface.summaries[index].vertex) walker.meet(owner[vertex]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
     const Index slot = walker.queue[head];
-    if (!confirm_last(index, slot, walker)) {
-      const bool found = clipper.clip(neighbours, slot);
-      chunk.counts.add_doubts(clipper);
-      if (!found) continue;
-    }
+    const bool found = clipper.clip(neighbours, slot);
+    chunk.counts.add_doubts(clipper);
+    if (!found) continue;
     chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
-    for (std::size_t k = 0; k < clipper.size(); ++k) chunk.labels.push_back(clipper.label(k));
+    for (std::size_t e = 0, k = clipper.first_corner(); e < clipper.size(); ++e, k = k + 1 == clipper.size() ? 0 : k + 1)
+      chunk.labels.push_back(clipper.label(k));
     for (std::size_t k = 0; k < clipper.size(); ++k)
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
     chunk.entries.push_back({slot, static_cast<Index>(moments_here.size())});
@@ -155,25 +157,52 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
   }
 }
 
-// Whether the pair is bounded as it was in the last diagram.
-bool RestrictedVoronoi::Work::confirm_last(std::size_t facet, Index slot, Walker& walker) const {
-  if (!followed && slot_now.empty()) return false;
+// Finds out which facets of a chunk are divided as they were in the last diagram.
+void RestrictedVoronoi::Work::recall(std::size_t begin, std::size_t end, Walker& walker) const {
+  walker.known.begin(surface, seeds, neighbours, owner.data(), walker.clipper.screens());
+  walker.first_known.clear();
+  for (std::size_t facet = begin; facet < end; ++facet) {
+    walker.first_known.push_back(static_cast<Index>(walker.known.size()));
+    if (!is_whole(facet)) recall_facet(facet, walker);
+  }
+  walker.first_known.push_back(static_cast<Index>(walker.known.size()));
+  walker.known.run();
+}
+
+void RestrictedVoronoi::Work::recall_facet(std::size_t facet, Walker& walker) const {
   const Chunk& chunk = last_chunks[facet / chunk_size];
   const std::size_t begin = last_first_entry[facet], end = entries_end(facet, chunk, last_first_entry);
-  if (end - begin > kMostRemembered) return false;
+  if (end - begin > kMostRemembered) return;
   for (std::size_t k = begin; k < end; ++k) {
     const Entry& entry = chunk.entries[k];
-    if (entry.moments == kWhole || now(entry.slot) != slot) continue;
-    const std::span<const Index> labels = chunk.labels_of(entry);
-    if (followed) return walker.clipper.confirm(neighbours, slot, labels.data(), labels.size());
-    walker.labels.assign(labels.begin(), labels.end());
-    for (Index& label : walker.labels) {
-      if (!is_edge(label)) label = now(label);
-      if (label == kNone) return false;
+    const Index slot = now(entry.slot);
+    if (entry.moments == kWhole || slot == kNone) return walker.known.add_unknown();
+    std::span<const Index> labels = chunk.labels_of(entry);
+    if (!followed) {
+      walker.labels.assign(labels.begin(), labels.end());
+      for (Index& label : walker.labels) {
+        if (!is_edge(label)) label = now(label);
+        if (label == kNone) return walker.known.add_unknown();
+      }
+      labels = walker.labels;
     }
-    return walker.clipper.confirm(neighbours, slot, walker.labels.data(), labels.size());
+    walker.known.add(static_cast<Index>(facet), slot, labels);
   }
-  return false;
+}
+
+// Takes over what is known of a facet, if it is all certain.
+bool RestrictedVoronoi::Work::take_known(std::size_t first, std::size_t end, const KnownPolygons& known, Chunk& chunk, std::vector<Moments>& moments_here) const {
+  if (first == end) return false;
+  for (std::size_t k = first; k < end; ++k)
+    if (!known.passes(k)) return false;
+  for (std::size_t k = first; k < end; ++k) {
+    chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
+    const std::span<const Index> labels = known.labels(k);
+    chunk.labels.insert(chunk.labels.end(), labels.begin(), labels.end());
+    chunk.entries.push_back({known.slot(k), static_cast<Index>(moments_here.size())});
+    moments_here.push_back(known.moments(k));
+  }
+  return true;
 }
 
 std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk& chunk,
@@ -200,14 +229,20 @@ void RestrictedVoronoi::Work::clip_facets() {
   moments.resize(chunks.size());
   first_entry.resize(n);
   ++generation;
+  const bool remembers = followed || !slot_now.empty();
   parallel_chunks(n, chunk_size, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Chunk& chunk = chunks[c];
     chunk.clear();
     moments[c].clear();
     Walker& walker = local_walker();
+    if (remembers) recall(begin, end, walker);
     for (std::size_t k = begin; k < end; ++k) {
       first_entry[k] = static_cast<Index>(chunk.entries.size());
-      clip_facet(k, walker, chunk, moments[c]);
+      // A cell is convex: it holds the facet if it owns the corners.
+      if (is_whole(k)) chunk.entries.push_back({owner[surface.summaries[k].vertex[0]], kWhole});
+      else if (!remembers || !take_known(walker.first_known[k - begin], walker.first_known[k - begin + 1],
+                                         walker.known, chunk, moments[c]))
+        clip_facet(k, walker, chunk, moments[c]);
     }
     chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
   });

@@ -1,0 +1,172 @@
+// What known_polygons.cpp includes once for each set of instructions, each time in a namespace that has kWidth: several
+// numbers in one register, and truth values as all or no bits of 64. Every operation rounds each lane as it does single
+// numbers, whatever the width.
+
+typedef double Numbers __attribute__((vector_size(kWidth * sizeof(double)), may_alias));
+typedef std::int64_t Masks __attribute__((vector_size(kWidth * sizeof(std::int64_t)), may_alias));
+struct Lanes3 {
+  Numbers x, y, z;
+};
+
+inline Lanes3 operator+(const Lanes3& a, const Lanes3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Lanes3 operator-(const Lanes3& a, const Lanes3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Lanes3 times(const Numbers& s, const Lanes3& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Numbers dot(const Lanes3& a, const Lanes3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Lanes3 cross(const Lanes3& a, const Lanes3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline Numbers norm2(const Lanes3& a) { return dot(a, a); }
+inline Numbers largest(const Numbers& a, const Numbers& b) { return a < b ? b : a; }
+inline Numbers least(const Numbers& a, const Numbers& b) { return b < a ? b : a; }
+inline Numbers absolute(const Numbers& a) { return a < 0 ? -a : a; }
+inline Lanes3 select(const Masks& mask, const Lanes3& a, const Lanes3& b) {
+  return {mask ? a.x : b.x, mask ? a.y : b.y, mask ? a.z : b.z};
+}
+
+// The same operations in the same order as Clipper's start(), begin(), place_lines(), add_line(), meet() and
+// integrate(), lane by lane, so the same bits.
+template <bool kUniform>
+inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
+  using Row = PolygonBatch::Row;
+  constexpr std::size_t kMostCorners = PolygonBatch::kMost;
+  const auto load = [from](const Row& row) __attribute__((always_inline)) { return *reinterpret_cast<const Numbers*>(row + from); };
+  const auto load3 = [&](const Row* rows) __attribute__((always_inline)) { return Lanes3{load(rows[0]), load(rows[1]), load(rows[2])}; };
+  const auto store = [from](Row& row, const Numbers& n) __attribute__((always_inline)) { *reinterpret_cast<Numbers*>(row + from) = n; };
+  const auto store3 = [&](Row* rows, const Lanes3& n) __attribute__((always_inline)) {
+    store(rows[0], n.x);
+    store(rows[1], n.y);
+    store(rows[2], n.z);
+  };
+  const std::size_t n = batch.corners;
+  const Numbers zero{}, one = zero + 1;
+  const Lanes3 seed = load3(batch.seed), normal = load3(batch.normal);
+  Lanes3 local[3];
+  Numbers reach = zero;
+  for (int k = 0; k < 3; ++k) {
+    local[k] = load3(batch.corner[k]) - seed;
+    reach = largest(reach, largest(absolute(local[k].x), largest(absolute(local[k].y), absolute(local[k].z))));
+  }
+  const Lanes3 anchor = load3(batch.anchor) - seed;
+  const Numbers height = dot(normal, anchor);
+  const Lanes3 foot = times(height, normal);
+
+  struct Line {
+    Lanes3 m, along;
+    Numbers offset, squared;
+    Masks outward;
+  };
+  Line edges[3];
+  Numbers edge_size[3];
+  for (int k = 0; k < 3; ++k) {
+    const Masks own = load(batch.runs_on[k]) > 0;
+    const Lanes3 here = load3(batch.corner[k]), next = load3(batch.corner[(k + 1) % 3]);
+    Line& line = edges[k];
+    line.along = select(own, here, next) - select(own, next, here);
+    line.m = cross(line.along, normal);
+    line.squared = norm2(line.along);
+    line.offset = dot(line.m, select(own, local[k], local[(k + 1) % 3])) - height * dot(normal, line.m);
+    line.outward = ~own;
+    edge_size[k] = absolute(line.m.x) + absolute(line.m.y) + absolute(line.m.z);
+  }
+  Line lines[kMostCorners];
+  Masks on_edge[kMostCorners][3];
+  for (std::size_t k = 0; k < n; ++k) {
+    Line& line = lines[k];
+    line.m = load3(batch.other[k]) - seed;
+    line.along = cross(normal, line.m);
+    line.squared = norm2(line.m);
+    line.offset = 0.5 * line.squared - height * dot(normal, line.m);
+    line.outward = one > 0;
+    const Numbers edge = load(batch.edge[k]);
+    for (int e = 0; e < 3; ++e) {
+      const Masks mask = on_edge[k][e] = edge == zero + e;
+      line.m = select(mask, edges[e].m, line.m);
+      line.along = select(mask, edges[e].along, line.along);
+      line.squared = mask ? edges[e].squared : line.squared;
+      line.offset = mask ? edges[e].offset : line.offset;
+      line.outward = mask ? edges[e].outward : line.outward;
+    }
+  }
+
+  Masks fits = one > 0;
+  Lanes3 at[kMostCorners];
+  Masks is_corner[kMostCorners];
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t previous = k ? k - 1 : n - 1;
+    const Line &before = lines[previous], &after = lines[k];
+    const Numbers determinant = dot(before.along, after.m);
+    const Numbers squares = before.squared * after.squared;
+    const Numbers square = determinant * determinant;
+    const Numbers inverse = 1 / determinant;
+    const Lanes3 w = times(inverse, times(after.offset, before.along) - times(before.offset, after.along));
+    // The root of squares / square is at most the mean of that and 1.
+    const Numbers slack = (1000 * kUnit) * reach * (1 + squares / square);
+    const Masks turns = (square > kShallow * squares) & ((determinant > 0) == (before.outward == after.outward));
+    const Masks edge_before = on_edge[previous][0] | on_edge[previous][1] | on_edge[previous][2];
+    const Masks edge_after = on_edge[k][0] | on_edge[k][1] | on_edge[k][2];
+    const Masks corner = is_corner[k] = edge_before & edge_after;
+    const Lanes3 facet_corner = select(on_edge[k][0], local[0], select(on_edge[k][1], local[1], local[2]));
+    at[k] = select(corner, facet_corner, foot + w);
+    const Numbers error = corner ? kCornerSlack * reach : slack;
+    Masks inside = turns;
+    for (int e = 0; e < 3; ++e) {
+      const Numbers above = dot(edges[e].m, at[k] - local[e]);
+      inside &= on_edge[previous][e] | on_edge[k][e] |
+                ((edges[e].outward ? -above : above) > 2 * error * edge_size[e] + kTiny);
+    }
+    fits &= corner | inside;
+    store3(batch.at[k], at[k]);
+    store(batch.slack[k], error);
+  }
+  store(batch.fits, fits ? one : zero);
+
+  Numbers densities[kMostCorners];
+  if constexpr (!kUniform) {
+    const Numbers r[3] = {load(batch.density[0]), load(batch.density[1]), load(batch.density[2])};
+    const Numbers lowest = least(least(r[0], r[1]), r[2]), highest = largest(largest(r[0], r[1]), r[2]);
+    const Numbers r_anchor = load(batch.anchor_density);
+    const Lanes3 gradient = load3(batch.gradient);
+    for (std::size_t k = 0; k < n; ++k) {
+      const Numbers value = r_anchor + dot(gradient, at[k] - anchor);
+      const Numbers within = least(largest(value, lowest), highest);
+      const Numbers of_corner = on_edge[k][0] ? r[0] : (on_edge[k][1] ? r[1] : r[2]);
+      densities[k] = is_corner[k] ? of_corner : within;
+    }
+  }
+  const Lanes3 a = at[0];
+  const Numbers squared_a = norm2(a);
+  Numbers squared_b = norm2(at[1]);
+  Numbers mass = zero, second = zero;
+  Lanes3 first{zero, zero, zero};
+  for (std::size_t k = 1; k + 1 < n; ++k) {
+    const Lanes3 &b = at[k], &c = at[k + 1];
+    const Numbers area = 0.5 * dot(normal, cross(b - a, c - a));
+    const Numbers squared_c = norm2(c);
+    if constexpr (kUniform) {
+      const Lanes3 sum = a + b + c;
+      mass += area;
+      first = first + times(kThird * area, sum);
+      second += (kTwelfth * area) * (norm2(sum) + (squared_a + squared_b + squared_c));
+    } else {
+      const Numbers &ra = densities[0], &rb = densities[k], &rc = densities[k + 1];
+      const Numbers s = ra + rb + rc;
+      const Lanes3 weighted = times(s + ra, a) + times(s + rb, b) + times(s + rc, c);
+      const Numbers squares = (s + ra + ra) * squared_a + (s + rb + rb) * squared_b + (s + rc + rc) * squared_c;
+      const Numbers products =
+          (s + ra + rb) * dot(a, b) + (s + rb + rc) * dot(b, c) + (s + rc + ra) * dot(c, a);
+      mass += (kThird * area) * s;
+      first = first + times(kTwelfth * area, weighted);
+      second += (kThirtieth * area) * (squares + products);
+    }
+    squared_b = squared_c;
+  }
+  store(batch.mass, mass);
+  store3(batch.first, first);
+  store(batch.second, second);
+}
+
+inline void compute(PolygonBatch& batch, bool uniform) {
+  for (std::size_t from = 0; from < PolygonBatch::kLanes; from += kWidth)
+    if (uniform) compute_lanes<true>(batch, from);
+    else compute_lanes<false>(batch, from);
+}
