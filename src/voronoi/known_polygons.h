@@ -26,43 +26,34 @@ class KnownPolygons {
   void begin(const Surface& surface, const SortedSeeds& seeds, const Neighbours& neighbours, const Index* owner,
              Screens& screens);
   // Adds a polygon; all those of a facet have to be. `labels` bound it in cyclic order, the least first: slots or facet
-  // edges.
-  void add(Index facet, Index slot, std::span<const Index> labels);
-  // Adds one of which nothing is known.
-  void add_unknown() { polygons_.emplace_back(); }
-  // Computes all of them.
-  void run();
-
-  // Of the polygon that was added as the k-th: whether it passed its part of the facet's certificate, which holds if
-  // all polygons of the facet pass; and its moments about the seed then, those that Clipper::integrate() gives.
-  bool passes(std::size_t k) const { return polygons_[k].passes; }
-  const Moments& moments(std::size_t k) const { return polygons_[k].moments; }
-  Index slot(std::size_t k) const { return polygons_[k].slot; }
-  std::span<const Index> labels(std::size_t k) const {
-    return {labels_.data() + polygons_[k].first_label, polygons_[k].count};
-  }
-  std::size_t size() const { return polygons_.size(); }
+  // edges. Until finish() has returned, its moments about the seed are set, those that Clipper::integrate() gives; or
+  // `fails` is set to 1, if the facet's certificate does not hold for its part, and nothing is known of the facet.
+  void add(Index facet, Index slot, std::span<const Index> labels, Moments& moments, char& fails);
+  // Deals with all that were added.
+  void finish();
 
  private:
   struct Polygon {
-    Index facet = 0, slot = 0;
-    Index first_label = 0, count = 0;
-    bool passes = false;
-    Moments moments;
+    Index slot;
+    const Index* labels;
+    Moments* moments;
+    char* fails;
+  };
+  struct Batch {
+    PolygonBatch numbers;
+    Polygon polygons[PolygonBatch::kLanes];
+    std::size_t filled = 0;
   };
 
-  void finish(PolygonBatch& batch);
-  bool is_certain(const PolygonBatch& batch, std::size_t lane) const;
-  bool is_empty_ball(Index slot, const Vec3& centre, double slack, Index one, Index other) const;
+  void finish(Batch& batch);
+  bool is_certain(const Batch& batch, std::size_t lane) const;
 
   const Surface* surface_ = nullptr;
   const SortedSeeds* seeds_ = nullptr;
   const Neighbours* neighbours_ = nullptr;
   const Index* owner_ = nullptr;
   Screens* screens_ = nullptr;
-  std::vector<Polygon> polygons_;
-  std::vector<Index> labels_;
-  std::vector<PolygonBatch> batches_;  // by number of corners
+  std::vector<Batch> batches_;  // by number of corners
 };
 
 }  // namespace bisector

@@ -9,8 +9,7 @@ struct PolygonBatch {
   static constexpr std::size_t kLanes = 8, kMost = 9;  // corners
   using Row = double[kLanes];
 
-  std::size_t corners = 0, filled = 0;
-  std::size_t polygon[kLanes];
+  std::size_t corners = 0;
   // Of the facet.
   alignas(64) Row corner[3][3];
   Row normal[3], anchor[3];

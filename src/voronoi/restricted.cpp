@@ -17,7 +17,6 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kMostRemembered = 64;  // pairs of a facet that are searched for an earlier one
 // Seeds changed one after the other beyond which another list of them is not related to the last; and places without
 // relation, from which on nothing is.
 constexpr std::size_t kMostChanges = 24, kMostLost = 64;
@@ -36,12 +35,14 @@ struct Entry {
 // What one chunk of facets contributes, facet by facet.
 struct Chunk {
   std::vector<Entry> entries;
-  std::vector<Index> first_label;  // of each pair with moments, in `labels`; and one past the last
-  std::vector<Index> labels;       // bounding lines in cyclic order: slots or facet edges
+  std::vector<Moments> moments;    // of the pairs whose cell does not hold all of the facet
+  std::vector<Index> first_label;  // of each of these, in `labels`; and one past the last
+  std::vector<Index> labels;       // bounding lines in cyclic order, the least first: slots or facet edges
   PairCounts counts;
 
   void clear() {
     entries.clear();
+    moments.clear();
     first_label.clear();
     labels.clear();
     counts = {};
@@ -49,16 +50,47 @@ struct Chunk {
   std::span<const Index> labels_of(const Entry& entry) const {
     return {labels.data() + first_label[entry.moments], labels.data() + first_label[entry.moments + 1]};
   }
+  std::span<Index> labels_of(const Entry& entry) {
+    return {labels.data() + first_label[entry.moments], labels.data() + first_label[entry.moments + 1]};
+  }
+  // Appends these entries of another chunk, which follow each other.
+  void append(const Chunk& from, std::size_t begin, std::size_t end);
 };
 
-// Per thread: a clipper, the cells that the current facet has met, and what is known of a chunk from the last diagram.
+template <class T>
+void append_range(std::vector<T>& to, const std::vector<T>& from, std::size_t begin, std::size_t end) {
+  const auto at = [](std::size_t k) { return static_cast<std::ptrdiff_t>(k); };
+  to.insert(to.end(), from.begin() + at(begin), from.begin() + at(end));
+}
+
+void Chunk::append(const Chunk& from, std::size_t begin, std::size_t end) {
+  const Index before = static_cast<Index>(moments.size());
+  Index first = kNone, stop = 0;  // their moments in `from`
+  for (std::size_t k = begin; k < end; ++k) {
+    Entry entry = from.entries[k];
+    if (entry.moments != kWhole) {
+      first = std::min(first, entry.moments);
+      stop = entry.moments + 1;
+      entry.moments = before + entry.moments - first;
+    }
+    entries.push_back(entry);
+  }
+  if (first == kNone) return;
+  const Index label = from.first_label[first];
+  for (Index m = first; m < stop; ++m)
+    first_label.push_back(static_cast<Index>(labels.size()) + from.first_label[m] - label);
+  append_range(labels, from.labels, label, from.first_label[stop]);
+  append_range(moments, from.moments, first, stop);
+}
+
+// Per thread: a clipper, the cells that the current facet has met, and what serves a chunk that is brought up to date.
 struct Walker {
   Clipper clipper;
   std::vector<Index> queue;
   Marks met;  // slots
   KnownPolygons known;
-  std::vector<Index> first_known;  // of each facet of the chunk, in `known`; and one past the last
-  std::vector<Index> labels;       // of a pair
+  std::vector<char> changed;  // of each facet of the chunk
+  Chunk renewed;
   std::uint64_t generation = 0;  // of the seeds that the clipper knows
 
   void begin(std::size_t slots) {
@@ -78,14 +110,13 @@ struct RestrictedVoronoi::Work {
   Neighbours neighbours;
   NeighbourSource built_source = NeighbourSource::nearest;
   std::vector<Index> owner;                   // slot of each used vertex
-  std::vector<Chunk> chunks, last_chunks;     // of this diagram and of the last with the same slots
-  std::vector<std::vector<Moments>> moments;  // of each chunk
+  std::vector<Chunk> chunks;
   std::uint64_t generation = 0;               // of `seeds`
   ThreadLocal<Walker> walkers;
   std::size_t chunk_size = 1;                        // facets
-  std::vector<Index> first_entry, last_first_entry;  // of each facet, in its chunk
-  bool followed = false;                             // the slots are those of the last diagram
-  std::vector<Index> slot_now;                       // else, of each of the last slots; kNone where that is unknown
+  std::vector<Index> first_entry;  // of each facet, in its chunk
+  bool followed = false;           // the slots are those of the last diagram
+  std::vector<Index> slot_now;     // else, of each of the last slots; kNone where that is unknown
   struct Item {
     Index facet, moments;
   };
@@ -98,15 +129,15 @@ struct RestrictedVoronoi::Work {
   void find_owners();
   Walker& local_walker();
   void clip_facets();
-  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk, std::vector<Moments>& moments_here) const;
+  void clip_facet(std::size_t facet, Walker& walker, Chunk& chunk) const;
   bool is_whole(std::size_t facet) const {
     const Index* vertex = surface.summaries[facet].vertex;
     return owner[vertex[0]] == owner[vertex[1]] && owner[vertex[0]] == owner[vertex[2]];
   }
-  void recall(std::size_t begin, std::size_t end, Walker& walker) const;
-  void recall_facet(std::size_t facet, Walker& walker) const;
-  bool take_known(std::size_t first, std::size_t end, const KnownPolygons& known, Chunk& chunk,
-                  std::vector<Moments>& moments_here) const;
+  bool relabel(Entry& entry, Chunk& chunk) const;
+  bool recall(std::size_t begin, std::size_t end, Chunk& chunk, Walker& walker) const;
+  void renew(std::size_t begin, std::size_t end, Chunk& chunk, Walker& walker);
+  void divide(std::size_t facet, Chunk& chunk, Walker& walker);
   // What has become of a slot of the last diagram.
   Index now(Index slot) const { return followed ? slot : slot < slot_now.size() ? slot_now[slot] : kNone; }
   std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
@@ -135,8 +166,7 @@ void RestrictedVoronoi::Work::find_owners() {
   });
 }
 
-void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk,
-                                         std::vector<Moments>& moments_here) const {
+void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk) const {
   const bool uniform = surface.density.empty();
   Clipper& clipper = walker.clipper;
   clipper.begin(surface.facets[index]);
@@ -148,61 +178,85 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
     chunk.counts.add_doubts(clipper);
     if (!found) continue;
     chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
-    for (std::size_t e = 0, k = clipper.first_corner(); e < clipper.size(); ++e, k = k + 1 == clipper.size() ? 0 : k + 1)
+    const std::size_t size = clipper.size();
+    for (std::size_t e = 0, k = clipper.first_corner(); e < size; ++e, k = k + 1 == size ? 0 : k + 1)
       chunk.labels.push_back(clipper.label(k));
-    for (std::size_t k = 0; k < clipper.size(); ++k)
+    for (std::size_t k = 0; k < size; ++k)
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
-    chunk.entries.push_back({slot, static_cast<Index>(moments_here.size())});
-    moments_here.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
+    chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
+    chunk.moments.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
   }
 }
 
-// Finds out which facets of a chunk are divided as they were in the last diagram.
-void RestrictedVoronoi::Work::recall(std::size_t begin, std::size_t end, Walker& walker) const {
-  walker.known.begin(surface, seeds, neighbours, owner.data(), walker.clipper.screens());
-  walker.first_known.clear();
-  for (std::size_t facet = begin; facet < end; ++facet) {
-    walker.first_known.push_back(static_cast<Index>(walker.known.size()));
-    if (!is_whole(facet)) recall_facet(facet, walker);
-  }
-  walker.first_known.push_back(static_cast<Index>(walker.known.size()));
-  walker.known.run();
+// Appends a facet's entries.
+void RestrictedVoronoi::Work::divide(std::size_t facet, Chunk& chunk, Walker& walker) {
+  first_entry[facet] = static_cast<Index>(chunk.entries.size());
+  // A cell is convex: it holds the facet if it owns the corners.
+  if (is_whole(facet)) chunk.entries.push_back({owner[surface.summaries[facet].vertex[0]], kWhole});
+  else clip_facet(facet, walker, chunk);
 }
 
-void RestrictedVoronoi::Work::recall_facet(std::size_t facet, Walker& walker) const {
-  const Chunk& chunk = last_chunks[facet / chunk_size];
-  const std::size_t begin = last_first_entry[facet], end = entries_end(facet, chunk, last_first_entry);
-  if (end - begin > kMostRemembered) return;
-  for (std::size_t k = begin; k < end; ++k) {
-    const Entry& entry = chunk.entries[k];
-    const Index slot = now(entry.slot);
-    if (entry.moments == kWhole || slot == kNone) return walker.known.add_unknown();
-    std::span<const Index> labels = chunk.labels_of(entry);
-    if (!followed) {
-      walker.labels.assign(labels.begin(), labels.end());
-      for (Index& label : walker.labels) {
-        if (!is_edge(label)) label = now(label);
-        if (label == kNone) return walker.known.add_unknown();
-      }
-      labels = walker.labels;
-    }
-    walker.known.add(static_cast<Index>(facet), slot, labels);
+// Puts today's slots in the place of those of the last diagram. False if one is not known.
+bool RestrictedVoronoi::Work::relabel(Entry& entry, Chunk& chunk) const {
+  entry.slot = now(entry.slot);
+  if (entry.slot == kNone) return false;
+  if (entry.moments == kWhole) return true;
+  const std::span<Index> labels = chunk.labels_of(entry);
+  for (Index& label : labels) {
+    if (!is_edge(label)) label = now(label);
+    if (label == kNone) return false;
   }
-}
-
-// Takes over what is known of a facet, if it is all certain.
-bool RestrictedVoronoi::Work::take_known(std::size_t first, std::size_t end, const KnownPolygons& known, Chunk& chunk, std::vector<Moments>& moments_here) const {
-  if (first == end) return false;
-  for (std::size_t k = first; k < end; ++k)
-    if (!known.passes(k)) return false;
-  for (std::size_t k = first; k < end; ++k) {
-    chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
-    const std::span<const Index> labels = known.labels(k);
-    chunk.labels.insert(chunk.labels.end(), labels.begin(), labels.end());
-    chunk.entries.push_back({known.slot(k), static_cast<Index>(moments_here.size())});
-    moments_here.push_back(known.moments(k));
-  }
+  if (is_edge(labels[0])) return true;
+  const auto least = std::min_element(labels.begin(), labels.end(),
+                                      [&](Index a, Index b) { return seeds.id[a] < seeds.id[b]; });
+  std::rotate(labels.begin(), least, labels.end());
   return true;
+}
+
+// Sets the moments of a chunk of the last diagram, and which facets are not divided as they were then. False if there
+// are any.
+bool RestrictedVoronoi::Work::recall(std::size_t begin, std::size_t end, Chunk& chunk, Walker& walker) const {
+  chunk.counts = {};
+  walker.changed.assign(end - begin, 0);
+  walker.known.begin(surface, seeds, neighbours, owner.data(), walker.clipper.screens());
+  for (std::size_t facet = begin; facet < end; ++facet) {
+    char& changed = walker.changed[facet - begin];
+    const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk, first_entry);
+    if (!followed)
+      for (std::size_t k = first; k < stop; ++k) changed |= !relabel(chunk.entries[k], chunk);
+    const bool whole = is_whole(facet);
+    changed |= whole != (chunk.entries[first].moments == kWhole);
+    if (changed) continue;
+    if (whole) {
+      chunk.entries[first].slot = owner[surface.summaries[facet].vertex[0]];
+      continue;
+    }
+    for (std::size_t k = first; k < stop; ++k) {
+      const Entry& entry = chunk.entries[k];
+      walker.known.add(static_cast<Index>(facet), entry.slot, chunk.labels_of(entry), chunk.moments[entry.moments], changed);
+    }
+  }
+  walker.known.finish();
+  return std::find(walker.changed.begin(), walker.changed.end(), 1) == walker.changed.end();
+}
+
+// Divides the facets that have changed.
+void RestrictedVoronoi::Work::renew(std::size_t begin, std::size_t end, Chunk& chunk, Walker& walker) {
+  Chunk& renewed = walker.renewed;
+  renewed.clear();
+  for (std::size_t facet = begin; facet < end;) {
+    if (walker.changed[facet - begin]) {
+      divide(facet++, renewed, walker);
+      continue;
+    }
+    std::size_t next = facet;
+    while (next < end && !walker.changed[next - begin]) ++next;
+    const Index first = first_entry[facet], before = static_cast<Index>(renewed.entries.size());
+    renewed.append(chunk, first, entries_end(next - 1, chunk, first_entry));
+    for (; facet < next; ++facet) first_entry[facet] += before - first;
+  }
+  renewed.first_label.push_back(static_cast<Index>(renewed.labels.size()));
+  std::swap(chunk, renewed);
 }
 
 std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk& chunk,
@@ -222,28 +276,20 @@ Walker& RestrictedVoronoi::Work::local_walker() {
 
 void RestrictedVoronoi::Work::clip_facets() {
   const std::size_t n = surface.facets.size();
+  const bool remembers = followed || !slot_now.empty();
   chunk_size = std::clamp<std::size_t>(n / kFewestChunks, 1, kMostFacets);
-  chunks.swap(last_chunks);
-  first_entry.swap(last_first_entry);
   chunks.resize((n + chunk_size - 1) / chunk_size);
-  moments.resize(chunks.size());
   first_entry.resize(n);
   ++generation;
-  const bool remembers = followed || !slot_now.empty();
   parallel_chunks(n, chunk_size, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Chunk& chunk = chunks[c];
-    chunk.clear();
-    moments[c].clear();
     Walker& walker = local_walker();
-    if (remembers) recall(begin, end, walker);
-    for (std::size_t k = begin; k < end; ++k) {
-      first_entry[k] = static_cast<Index>(chunk.entries.size());
-      // A cell is convex: it holds the facet if it owns the corners.
-      if (is_whole(k)) chunk.entries.push_back({owner[surface.summaries[k].vertex[0]], kWhole});
-      else if (!remembers || !take_known(walker.first_known[k - begin], walker.first_known[k - begin + 1],
-                                         walker.known, chunk, moments[c]))
-        clip_facet(k, walker, chunk, moments[c]);
+    if (remembers) {
+      if (!recall(begin, end, chunk, walker)) renew(begin, end, chunk, walker);
+      return;
     }
+    chunk.clear();
+    for (std::size_t k = begin; k < end; ++k) divide(k, chunk, walker);
     chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
   });
 }
@@ -319,7 +365,7 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
       for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
         const FacetSummary& summary = surface.summaries[items[k].facet];
         sum.add(items[k].moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[s])
-                                           : moments[items[k].facet / chunk_size][items[k].moments]);
+                                           : chunks[items[k].facet / chunk_size].moments[items[k].moments]);
       }
       result.cells[seeds.id[s]] = sum.finish();
     }
