@@ -127,31 +127,26 @@ void KnownPolygons::finish(Batch& batch) {
 // Whether every other seed is certain to be farther from the vertices than those whose cells meet there. Of the
 // polygons that meet in a vertex, the one of the lowest slot sees to it; it does so for all of its vertices at once.
 bool KnownPolygons::is_certain(const Batch& batch, std::size_t lane) const {
-  struct Vertex {
-    Vec3 at;
-    double slack;
-    Index before, after;
-    float x, y, z;
+  struct Splat {
+    FourFloats x, y, z;
   };
-  Vertex vertices[PolygonBatch::kMost];
-  std::size_t count = 0;
+  Splat splats[PolygonBatch::kMost];
+  std::size_t corners[PolygonBatch::kMost], count = 0;
   const Polygon& polygon = batch.polygons[lane];
   const PolygonBatch& numbers = batch.numbers;
   const double scale = screens_->scale();
   double squared = 0, slack = 0;
+  const auto splat = [scale](double value) {
+    const float single = static_cast<float>(scale * value);
+    return FourFloats{single, single, single, single};
+  };
   const auto sees_to = [&](Index label) { return is_edge(label) || label > polygon.slot; };
   for (std::size_t k = 0, previous = numbers.corners - 1; k < numbers.corners; previous = k++) {
     const Index before = polygon.labels[previous], after = polygon.labels[k];
     if ((is_edge(before) && is_edge(after)) || !sees_to(before) || !sees_to(after)) continue;
-    const Vec3 at{numbers.at[k][0][lane], numbers.at[k][1][lane], numbers.at[k][2][lane]};
-    vertices[count++] = {at,
-                         numbers.slack[k][lane],
-                         before,
-                         after,
-                         static_cast<float>(scale * at.x),
-                         static_cast<float>(scale * at.y),
-                         static_cast<float>(scale * at.z)};
-    squared = std::max(squared, norm2(at));
+    splats[count] = {splat(numbers.at[k][0][lane]), splat(numbers.at[k][1][lane]), splat(numbers.at[k][2][lane])};
+    corners[count++] = k;
+    squared = std::max(squared, numbers.squared[k][lane]);
     slack = std::max(slack, numbers.slack[k][lane]);
   }
   if (count == 0) return true;
@@ -164,16 +159,17 @@ bool KnownPolygons::is_certain(const Batch& batch, std::size_t lane) const {
     if (reach.is_safe_from(block)) return true;
     const unsigned present = (1u << std::min<std::size_t>(4, listed - k)) - 1;
     unsigned near = present & may_cut(block, reach.margin, [&](const auto& test) {
-                      for (std::size_t v = 0; v < count; ++v) test(vertices[v].x, vertices[v].y, vertices[v].z);
+                      for (std::size_t v = 0; v < count; ++v) test(splats[v].x, splats[v].y, splats[v].z);
                     });
     for (; near; near &= near - 1) {
       const Index j = list.begin[k + static_cast<unsigned>(std::countr_zero(near))];
-      const Vec3 d = seeds_->x[j] - seeds_->x[polygon.slot];
-      const BisectorLimits limits(0.5 * norm2(d));
       for (std::size_t v = 0; v < count; ++v) {
-        const Vertex& vertex = vertices[v];
-        if (j == vertex.before || j == vertex.after) continue;
-        if (!(dot(vertex.at, d) + vertex.slack * taxicab(d) < limits.before)) return false;
+        const std::size_t corner = corners[v], previous = corner ? corner - 1 : numbers.corners - 1;
+        if (j == polygon.labels[corner] || j == polygon.labels[previous]) continue;
+        const Vec3 at{numbers.at[corner][0][lane], numbers.at[corner][1][lane], numbers.at[corner][2][lane]};
+        const Vec3 d = seeds_->x[j] - seeds_->x[polygon.slot];
+        if (!(dot(at, d) + numbers.slack[corner][lane] * taxicab(d) < BisectorLimits(0.5 * norm2(d)).before))
+          return false;
       }
     }
   }

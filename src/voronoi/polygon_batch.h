@@ -19,9 +19,9 @@ struct PolygonBatch {
   // other seed.
   Row seed[3];
   Row edge[kMost], other[kMost][3];
-  // Results: vertices relative to the seed, bounds of the errors of their coordinates, 1 where the polygon turns the
-  // right way at all of them within the facet; moments.
-  Row at[kMost][3], slack[kMost], fits;
+  // Results: vertices relative to the seed, their squared lengths, bounds of the errors of their coordinates, 1 where the
+  // polygon turns the right way at all of them within the facet; moments.
+  Row at[kMost][3], squared[kMost], slack[kMost], fits;
   Row mass, first[3], second;
 };
 

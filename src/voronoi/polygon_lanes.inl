@@ -90,6 +90,7 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
 
   Masks fits = one > 0;
   Lanes3 at[kMostCorners];
+  Numbers squared[kMostCorners];
   Masks is_corner[kMostCorners];
   for (std::size_t k = 0; k < n; ++k) {
     const std::size_t previous = k ? k - 1 : n - 1;
@@ -116,6 +117,8 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     }
     fits &= corner | inside;
     store3(batch.at[k], at[k]);
+    squared[k] = norm2(at[k]);
+    store(batch.squared[k], squared[k]);
     store(batch.slack[k], error);
   }
   store(batch.fits, fits ? one : zero);
@@ -134,31 +137,27 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     }
   }
   const Lanes3 a = at[0];
-  const Numbers squared_a = norm2(a);
-  Numbers squared_b = norm2(at[1]);
   Numbers mass = zero, second = zero;
   Lanes3 first{zero, zero, zero};
   for (std::size_t k = 1; k + 1 < n; ++k) {
     const Lanes3 &b = at[k], &c = at[k + 1];
     const Numbers area = 0.5 * dot(normal, cross(b - a, c - a));
-    const Numbers squared_c = norm2(c);
     if constexpr (kUniform) {
       const Lanes3 sum = a + b + c;
       mass += area;
       first = first + times(kThird * area, sum);
-      second += (kTwelfth * area) * (norm2(sum) + (squared_a + squared_b + squared_c));
+      second += (kTwelfth * area) * (norm2(sum) + (squared[0] + squared[k] + squared[k + 1]));
     } else {
       const Numbers &ra = densities[0], &rb = densities[k], &rc = densities[k + 1];
       const Numbers s = ra + rb + rc;
       const Lanes3 weighted = times(s + ra, a) + times(s + rb, b) + times(s + rc, c);
-      const Numbers squares = (s + ra + ra) * squared_a + (s + rb + rb) * squared_b + (s + rc + rc) * squared_c;
+      const Numbers squares = (s + ra + ra) * squared[0] + (s + rb + rb) * squared[k] + (s + rc + rc) * squared[k + 1];
       const Numbers products =
           (s + ra + rb) * dot(a, b) + (s + rb + rc) * dot(b, c) + (s + rc + ra) * dot(c, a);
       mass += (kThird * area) * s;
       first = first + times(kTwelfth * area, weighted);
       second += (kThirtieth * area) * (squares + products);
     }
-    squared_b = squared_c;
   }
   store(batch.mass, mass);
   store3(batch.first, first);
