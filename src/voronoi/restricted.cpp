@@ -1,6 +1,7 @@
 #include "voronoi/restricted.h"
 
 #include <algorithm>
+#include <bit>
 #include <span>
 #include <utility>
 
@@ -113,7 +114,7 @@ struct RestrictedVoronoi::Work {
   std::vector<Chunk> chunks;
   std::uint64_t generation = 0;               // of `seeds`
   ThreadLocal<Walker> walkers;
-  std::size_t chunk_size = 1;                        // facets
+  unsigned chunk_bits = 0;                    // a chunk has two to this power facets
   std::vector<Index> first_entry;  // of each facet, in its chunk
   bool followed = false;           // the slots are those of the last diagram
   std::vector<Index> slot_now;     // else, of each of the last slots; kNone where that is unknown
@@ -138,6 +139,7 @@ struct RestrictedVoronoi::Work {
   bool recall(std::size_t begin, std::size_t end, Chunk& chunk, Walker& walker) const;
   void renew(std::size_t begin, std::size_t end, Chunk& chunk, Walker& walker);
   void divide(std::size_t facet, Chunk& chunk, Walker& walker);
+  std::size_t chunk_of(std::size_t facet) const { return facet >> chunk_bits; }
   // What has become of a slot of the last diagram.
   Index now(Index slot) const { return followed ? slot : slot < slot_now.size() ? slot_now[slot] : kNone; }
   std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
@@ -261,7 +263,7 @@ void RestrictedVoronoi::Work::renew(std::size_t begin, std::size_t end, Chunk& c
 
 std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk& chunk,
                                                  const std::vector<Index>& first) const {
-  const bool last = facet + 1 == first.size() || (facet + 1) % chunk_size == 0;
+  const bool last = facet + 1 == first.size() || chunk_of(facet + 1) != chunk_of(facet);
   return last ? chunk.entries.size() : first[facet + 1];
 }
 
@@ -277,7 +279,8 @@ Walker& RestrictedVoronoi::Work::local_walker() {
 void RestrictedVoronoi::Work::clip_facets() {
   const std::size_t n = surface.facets.size();
   const bool remembers = followed || !slot_now.empty();
-  chunk_size = std::clamp<std::size_t>(n / kFewestChunks, 1, kMostFacets);
+  const std::size_t chunk_size = std::bit_floor(std::clamp<std::size_t>(n / kFewestChunks, 1, kMostFacets));
+  chunk_bits = static_cast<unsigned>(std::countr_zero(chunk_size));
   chunks.resize((n + chunk_size - 1) / chunk_size);
   first_entry.resize(n);
   ++generation;
@@ -303,7 +306,7 @@ void RestrictedVoronoi::Work::sort_items() {
     for (std::size_t t = begin; t < end; ++t) {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
-      const Chunk& chunk = chunks[facet / chunk_size];
+      const Chunk& chunk = chunks[chunk_of(facet)];
       const std::size_t stop = entries_end(facet, chunk, first_entry);
       for (std::size_t k = first_entry[facet]; k < stop; ++k) visit(facet, chunk.entries[k]);
     }
@@ -365,7 +368,7 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
       for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
         const FacetSummary& summary = surface.summaries[items[k].facet];
         sum.add(items[k].moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[s])
-                                           : chunks[items[k].facet / chunk_size].moments[items[k].moments]);
+                                           : chunks[chunk_of(items[k].facet)].moments[items[k].moments]);
       }
       result.cells[seeds.id[s]] = sum.finish();
     }
@@ -459,7 +462,7 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
     for (std::size_t t = begin; t < end; ++t) {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
-      const Chunk& chunk = chunks[facet / chunk_size];
+      const Chunk& chunk = chunks[chunk_of(facet)];
       const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk, first_entry);
       count.pair += stop - first;
       for (std::size_t k = first; k < stop; ++k)
@@ -482,7 +485,7 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
     for (std::size_t t = begin; t < end; ++t) {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
-      const Chunk& chunk = chunks[facet / chunk_size];
+      const Chunk& chunk = chunks[chunk_of(facet)];
       const Entry* all = chunk.entries.data();
       entries.assign(all + first_entry[facet], all + entries_end(facet, chunk, first_entry));
       std::sort(entries.begin(), entries.end(),
