@@ -1,6 +1,7 @@
 #include "voronoi/known_polygons.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <limits>
 
@@ -110,67 +111,60 @@ void KnownPolygons::finish(Batch& batch) {
   static const Compute compute = best_compute();
   const PolygonBatch& numbers = batch.numbers;
   compute(batch.numbers, surface_->density.empty());
+  const std::size_t n = numbers.corners;
+  std::array<Vertex, PolygonBatch::kLanes * PolygonBatch::kMost> vertices;
+  std::size_t count = 0;
   for (std::size_t lane = 0; lane < batch.filled; ++lane) {
     const Polygon& polygon = batch.polygons[lane];
-    if (*polygon.fails) continue;
-    if (!(numbers.fits[lane] > 0) || !is_certain(batch, lane)) {
-      *polygon.fails = 1;
-      continue;
-    }
     *polygon.moments = {numbers.mass[lane],
                         {numbers.first[0][lane], numbers.first[1][lane], numbers.first[2][lane]},
                         numbers.second[lane]};
+    *polygon.fails |= !(numbers.fits[lane] > 0);
+    // Of the polygons that meet in a vertex, the one of the lowest slot sees to it; edges compare as greater.
+    for (std::size_t k = 0, previous = n - 1; k < n; previous = k++) {
+      const Index before = polygon.labels[previous], after = polygon.labels[k];
+      vertices[count] = {before, after, static_cast<unsigned char>(lane), static_cast<unsigned char>(k)};
+      count += (before > polygon.slot) & (after > polygon.slot) & !is_edge(before & after);
+    }
+  }
+  for (std::size_t v = 0; v < count; ++v) {
+    char& fails = *batch.polygons[vertices[v].lane].fails;
+    if (!fails && !is_certain(batch, vertices[v])) fails = 1;
   }
   batch.filled = 0;
 }
 
-// Whether every other seed is certain to be farther from the vertices than those whose cells meet there. Of the
-// polygons that meet in a vertex, the one of the lowest slot sees to it; it does so for all of its vertices at once.
-bool KnownPolygons::is_certain(const Batch& batch, std::size_t lane) const {
-  struct Splat {
-    FourFloats x, y, z;
-  };
-  Splat splats[PolygonBatch::kMost];
-  std::size_t corners[PolygonBatch::kMost], count = 0;
-  const Polygon& polygon = batch.polygons[lane];
+// Whether every other seed is certain to be farther from the vertex than those whose cells meet there.
+bool KnownPolygons::is_certain(const Batch& batch, const Vertex& vertex) const {
   const PolygonBatch& numbers = batch.numbers;
-  const double scale = screens_->scale();
-  double squared = 0, slack = 0;
+  const std::size_t lane = vertex.lane;
+  const Index slot = batch.polygons[lane].slot;
+  const PolygonBatch::Row* row = numbers.at[vertex.corner];
+  const Vec3 at{row[0][lane], row[1][lane], row[2][lane]};
+  const double slack = numbers.slack[vertex.corner][lane], scale = screens_->scale();
+  const Reach reach(numbers.squared[vertex.corner][lane], slack, kInfinity, scale);
   const auto splat = [scale](double value) {
     const float single = static_cast<float>(scale * value);
     return FourFloats{single, single, single, single};
   };
-  const auto sees_to = [&](Index label) { return is_edge(label) || label > polygon.slot; };
-  for (std::size_t k = 0, previous = numbers.corners - 1; k < numbers.corners; previous = k++) {
-    const Index before = polygon.labels[previous], after = polygon.labels[k];
-    if ((is_edge(before) && is_edge(after)) || !sees_to(before) || !sees_to(after)) continue;
-    splats[count] = {splat(numbers.at[k][0][lane]), splat(numbers.at[k][1][lane]), splat(numbers.at[k][2][lane])};
-    corners[count++] = k;
-    squared = std::max(squared, numbers.squared[k][lane]);
-    slack = std::max(slack, numbers.slack[k][lane]);
-  }
-  if (count == 0) return true;
-  const Reach reach(squared, slack, kInfinity, scale);
-  const NeighbourList list = neighbours_->list(polygon.slot);
+  const FourFloats x = splat(at.x), y = splat(at.y), z = splat(at.z);
+  const NeighbourList list = neighbours_->list(slot);
   const std::size_t listed = static_cast<std::size_t>(list.end - list.begin);
-  CellScreen& screen = screens_->of(polygon.slot, list);
-  for (std::size_t k = 0; k < std::min(listed, CellScreen::kListed); k += 4) {
-    const ScreenBlock& block = screens_->block(screen, polygon.slot, list, k / 4);
-    if (reach.is_safe_from(block)) return true;
-    const unsigned present = (1u << std::min<std::size_t>(4, listed - k)) - 1;
-    unsigned near = present & may_cut(block, reach.margin, [&](const auto& test) {
-                      for (std::size_t v = 0; v < count; ++v) test(splats[v].x, splats[v].y, splats[v].z);
-                    });
+  CellScreen& screen = screens_->of(slot, list);
+  const auto near_of = [&](std::size_t block) {
+    return may_cut(screens_->block(screen, slot, list, block), reach.margin,
+                   [&](const auto& test) { test(x, y, z); });
+  };
+  // Two blocks at a time, of which most vertices need no more.
+  for (std::size_t k = 0; k < std::min(listed, CellScreen::kListed); k += 8) {
+    if (k && reach.is_safe_from(screens_->block(screen, slot, list, k / 4))) return true;
+    unsigned near = near_of(k / 4);
+    near |= near_of(k / 4 + 1) << 4;
     for (; near; near &= near - 1) {
       const Index j = list.begin[k + static_cast<unsigned>(std::countr_zero(near))];
-      for (std::size_t v = 0; v < count; ++v) {
-        const std::size_t corner = corners[v], previous = corner ? corner - 1 : numbers.corners - 1;
-        if (j == polygon.labels[corner] || j == polygon.labels[previous]) continue;
-        const Vec3 at{numbers.at[corner][0][lane], numbers.at[corner][1][lane], numbers.at[corner][2][lane]};
-        const Vec3 d = seeds_->x[j] - seeds_->x[polygon.slot];
-        if (!(dot(at, d) + numbers.slack[corner][lane] * taxicab(d) < BisectorLimits(0.5 * norm2(d)).before))
-          return false;
-      }
+      if (j == vertex.before || j == vertex.after) continue;
+      const Vec3 d = seeds_->x[j] - seeds_->x[slot];
+      if (!(dot(at, d) + slack * taxicab(d) < BisectorLimits(0.5 * norm2(d)).before)) return false;
     }
   }
   return listed <= CellScreen::kListed && (list.radius == kInfinity || reach.is_safe_from(list.radius * list.radius));

@@ -45,8 +45,14 @@ class KnownPolygons {
     std::size_t filled = 0;
   };
 
+  // A vertex between two lines of a polygon.
+  struct Vertex {
+    Index before, after;
+    unsigned char lane, corner;
+  };
+
   void finish(Batch& batch);
-  bool is_certain(const Batch& batch, std::size_t lane) const;
+  bool is_certain(const Batch& batch, const Vertex& vertex) const;
 
   const Surface* surface_ = nullptr;
   const SortedSeeds* seeds_ = nullptr;
