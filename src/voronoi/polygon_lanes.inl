@@ -100,8 +100,8 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     const Numbers square = determinant * determinant;
     const Numbers inverse = 1 / determinant;
     const Lanes3 w = times(inverse, times(after.offset, before.along) - times(before.offset, after.along));
-    // The root of squares / square is at most the mean of that and 1.
-    const Numbers slack = (1000 * kUnit) * reach * (1 + squares / square);
+    // The root of squares / square, the inverse sine, is at most the mean of that and 1.
+    const Numbers slack = (1001 * kUnit) * reach * (1 + squares * (inverse * inverse));
     const Masks turns = (square > kShallow * squares) & ((determinant > 0) == (before.outward == after.outward));
     const Masks edge_before = on_edge[previous][0] | on_edge[previous][1] | on_edge[previous][2];
     const Masks edge_after = on_edge[k][0] | on_edge[k][1] | on_edge[k][2];
