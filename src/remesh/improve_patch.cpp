@@ -113,19 +113,10 @@ Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
       }
     }
   }
-  Vec3 foot = p;
-  double best = std::numeric_limits<double>::infinity();
-  for (const Index* t = cells_.begin(owner); t != cells_.end(owner); ++t) {
-    const Facet& facet = surface_.facets[surface_.facet_of[*t]];
-    const Vec3 q = nearest_on_triangle(p, facet.corners[0], facet.corners[1], facet.corners[2]);
-    const double squared = norm2(q - p);
-    if (squared < best) {
-      best = squared;
-      foot = q;
-      normal = facet.normal;
-    }
-  }
-  return foot;
+  const SurfacePoint foot = nearest_on_triangles(surface_, {cells_.begin(owner), cells_.end(owner)}, p);
+  if (!foot.facet) return p;
+  normal = foot.facet->normal;
+  return foot.at;
 }
 
 Index ImprovePatch::add_vertex(const PatchVertex& vertex) {
