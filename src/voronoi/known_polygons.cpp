@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 
+#include "core/lanes.h"
 #include "voronoi/error_bounds.h"
 #include "voronoi/polygon_batch.h"
 
@@ -13,38 +16,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define BISECTOR_WIDE_LANES 1
-#pragma GCC push_options
-#pragma GCC target("avx512f,avx512dq,avx512vl")
-namespace avx512 {
-constexpr int kWidth = 8;
-#include "voronoi/polygon_lanes.inl"
-}  // namespace avx512
-#pragma GCC pop_options
-#pragma GCC push_options
-#pragma GCC target("avx2")
-namespace avx2 {
-constexpr int kWidth = 4;
-#include "voronoi/polygon_lanes.inl"
-}  // namespace avx2
-#pragma GCC pop_options
-#endif
-namespace portable {
-constexpr int kWidth = 2;
-#include "voronoi/polygon_lanes.inl"
-}  // namespace portable
-
-using Compute = void (*)(PolygonBatch&, bool);
-
-Compute best_compute() {
-#if defined(BISECTOR_WIDE_LANES)
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-    return avx512::compute;
-  if (__builtin_cpu_supports("avx2")) return avx2::compute;
-#endif
-  return portable::compute;
-}
+#define BISECTOR_LANES_FILE "voronoi/polygon_lanes.inl"
+#include "core/each_lanes.inl"
 
 }  // namespace
 
@@ -59,6 +32,7 @@ void KnownPolygons::begin(const Surface& surface, const SortedSeeds& seeds, cons
   neighbours_ = &neighbours;
   owner_ = owner;
   screens_ = &screens;
+  compute_ = of_widest_lanes(avx512::compute, avx2::compute, portable::compute);
 }
 
 void KnownPolygons::add(Index index, Index slot, std::span<const Index> labels, Moments& moments, char& fails) {
@@ -108,9 +82,8 @@ void KnownPolygons::finish() {
 }
 
 void KnownPolygons::finish(Batch& batch) {
-  static const Compute compute = best_compute();
   const PolygonBatch& numbers = batch.numbers;
-  compute(batch.numbers, surface_->density.empty());
+  compute_(batch.numbers, surface_->density.empty());
   const std::size_t n = numbers.corners;
   std::array<Vertex, PolygonBatch::kLanes * PolygonBatch::kMost> vertices;
   std::size_t count = 0;

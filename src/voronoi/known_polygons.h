@@ -59,6 +59,7 @@ class KnownPolygons {
   const Neighbours* neighbours_ = nullptr;
   const Index* owner_ = nullptr;
   Screens* screens_ = nullptr;
+  void (*compute_)(PolygonBatch&, bool uniform) = nullptr;
   std::vector<Batch> batches_;  // by number of corners
 };
 

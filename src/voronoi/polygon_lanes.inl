@@ -1,27 +1,4 @@
-// What known_polygons.cpp includes once for each set of instructions, each time in a namespace that has kWidth: several
-// numbers in one register, and truth values as all or no bits of 64. Every operation rounds each lane as it does single
-// numbers, whatever the width.
-
-typedef double Numbers __attribute__((vector_size(kWidth * sizeof(double)), may_alias));
-typedef std::int64_t Masks __attribute__((vector_size(kWidth * sizeof(std::int64_t)), may_alias));
-struct Lanes3 {
-  Numbers x, y, z;
-};
-
-inline Lanes3 operator+(const Lanes3& a, const Lanes3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Lanes3 operator-(const Lanes3& a, const Lanes3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Lanes3 times(const Numbers& s, const Lanes3& a) { return {s * a.x, s * a.y, s * a.z}; }
-inline Numbers dot(const Lanes3& a, const Lanes3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Lanes3 cross(const Lanes3& a, const Lanes3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline Numbers norm2(const Lanes3& a) { return dot(a, a); }
-inline Numbers largest(const Numbers& a, const Numbers& b) { return a < b ? b : a; }
-inline Numbers least(const Numbers& a, const Numbers& b) { return b < a ? b : a; }
-inline Numbers absolute(const Numbers& a) { return a < 0 ? -a : a; }
-inline Lanes3 select(const Masks& mask, const Lanes3& a, const Lanes3& b) {
-  return {mask ? a.x : b.x, mask ? a.y : b.y, mask ? a.z : b.z};
-}
+// Included by known_polygons.cpp, once for each set of instructions (core/lanes.h).
 
 // The same operations in the same order as Clipper's start(), begin(), place_lines(), add_line(), meet() and
 // integrate(), lane by lane, so the same bits.
@@ -29,9 +6,15 @@ template <bool kUniform>
 inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
   using Row = PolygonBatch::Row;
   constexpr std::size_t kMostCorners = PolygonBatch::kMost;
-  const auto load = [from](const Row& row) __attribute__((always_inline)) { return *reinterpret_cast<const Numbers*>(row + from); };
-  const auto load3 = [&](const Row* rows) __attribute__((always_inline)) { return Lanes3{load(rows[0]), load(rows[1]), load(rows[2])}; };
-  const auto store = [from](Row& row, const Numbers& n) __attribute__((always_inline)) { *reinterpret_cast<Numbers*>(row + from) = n; };
+  const auto load = [from](const Row& row) __attribute__((always_inline)) {
+    return *reinterpret_cast<const Numbers*>(row + from);
+  };
+  const auto load3 = [&](const Row* rows) __attribute__((always_inline)) {
+    return Lanes3{load(rows[0]), load(rows[1]), load(rows[2])};
+  };
+  const auto store = [from](Row& row, const Numbers& n) __attribute__((always_inline)) {
+    *reinterpret_cast<Numbers*>(row + from) = n;
+  };
   const auto store3 = [&](Row* rows, const Lanes3& n) __attribute__((always_inline)) {
     store(rows[0], n.x);
     store(rows[1], n.y);
