@@ -16,12 +16,12 @@
 namespace bisector {
 namespace {
 
-constexpr double kSpacing = 0.5;         // of the vertices, in edges
+constexpr double kSpacing = 0.6;         // of the vertices, in edges
 constexpr double kReachAfter = 1.5;      // of fronts that start in the middle of a cluster, in spacings
 constexpr double kNormals = 0.5;         // cosine of the angle between normals of vertices that become one, at least
 constexpr double kPerComponent = 4;      // edges are no longer than those of so many cells on a component
 constexpr double kPerCurve = 4;          // nor than such a part of a curve
-constexpr double kFewer = 0.6;           // triangles must be fewer than this share
+constexpr double kFewer = 0.8;           // triangles must be fewer than this share
 constexpr double kAreaTolerance = 0.05;  // relative
 
 // The vertices that become one are those with the same label, which is the index of the one that stays.

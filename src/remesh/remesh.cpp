@@ -41,9 +41,9 @@ constexpr double kCoarsestShare = 0.6, kFinestShare = 0.5, kConstrainedShare = 0
 constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
 // Triangles for each seed, from which on a stand-in with fewer may pay.
-constexpr std::size_t kManyFacets = 8;
+constexpr std::size_t kManyFacets = 6;
 // Of the steps of the finest level, those that are made on the input after all.
-constexpr double kOnInputShare = 0.3;
+constexpr double kOnInputShare = 0.15;
 constexpr int kMendingRounds = 3;  // of features and topology
 // A run starts again with edges shorter by this where cells are no disks, or along broken curves; not if more than one
 // cell, or curve, in so many is such.
