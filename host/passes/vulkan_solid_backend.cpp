@@ -76,7 +76,7 @@ DeviceWork VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds,
 
   CellMoments shell;
   find_boundary_moments(shell, work.certification);
-  if (includes(want, Want::polygons)) shell_.polygons(diagram.polygons);
+  if (includes(want, Want::labels)) shell_.polygons(diagram.polygons);
   tets_.set_shell(shell_.store(), shell, stage_.seeds.count());
   work.paired = watch.lap();
 

@@ -29,10 +29,11 @@ DiagramSeconds& operator+=(DiagramSeconds& a, const DiagramSeconds& b) {
 
 EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   if (seeds.empty()) throw Error("there are no seeds; give at least one");
-  const Want computed = includes(want, Want::dual) ? (want & Want::polyhedra) | Want::polygons : want;
+  const Want computed = includes(want, Want::dual) ? want | Want::labels : want;
   if (!includes(offers_, computed)) throw std::logic_error("a backend of a surface was asked for polyhedra");
   const EvaluationReport report = compute(seeds, computed, diagram);
-  if (!includes(computed, Want::polygons)) diagram.polygons = {};
+  if (!includes(computed, Want::labels)) diagram.polygons = {};
+  if (!includes(computed, Want::polygons)) diagram.polygons.vertices.clear();
   if (!includes(computed, Want::polyhedra)) diagram.polyhedra = {};
   if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
   else diagram.dual = {};

@@ -29,7 +29,7 @@ void CvtRun::localise(bool on) {
   localised_ = on;
   if (!on) {
     if (diagram_.strays > 0) diagram_ = {};
-  } else if (includes(diagram_.diagram.has, Want::polygons)) {
+  } else if (includes(diagram_.diagram.has, Want::labels)) {
     leave_out_strays(diagram_);
   } else {
     diagram_ = {};
@@ -53,7 +53,7 @@ void CvtRun::leave_out_strays(DiagramOfSeeds& known) {
 }
 
 std::size_t CvtRun::strays() {
-  const Diagram& now = diagram(Want::polygons);
+  const Diagram& now = diagram(Want::labels);
   return localised_ ? diagram_.strays : localiser().count_strays(diagram_.positions, now);
 }
 
@@ -61,7 +61,7 @@ void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSe
   // The dual is read off here, when stray parts are gone, and not by the backend.
   const bool wants_dual = includes(want, Want::dual);
   Want computed = want & (Want::polygons | Want::polyhedra);
-  if (wants_dual || localised_) computed = computed | Want::polygons;
+  if (wants_dual || localised_) computed = computed | Want::labels;
   if (known.positions != positions || !includes(known.diagram.has, computed)) {
     known.positions.clear();
     known.report = backend_->evaluate(positions, computed, known.diagram);

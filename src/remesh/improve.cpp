@@ -158,6 +158,8 @@ class Improver {
   // Whether the number of seeds is the aim.
   static bool counts(Aim aim) { return aim == Aim::fewer || aim == Aim::more; }
   bool has_curves() const { return run_.curves().size() > 0; }
+  // Of a diagram: curves are followed along the polygons' vertices.
+  Want parts() const { return (has_curves() ? Want::polygons : Want::labels) | Want::dual; }
   double irregular_price() const { return kIrregular * now_.average; }
   std::size_t wanted() const { return options_.vertices ? options_.vertices : run_.seeds.size(); }
   void measure(Snapshot& s);
@@ -243,7 +245,7 @@ Improver::Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions&
 void Improver::measure(Snapshot& s) {
   run_.context().check();
   if (s.known.diagram.polygons.pairs.empty()) s.known.diagram.polygons = std::move(polygons_);
-  run_.evaluate(s.seeds.positions(), Want::polygons | Want::dual, s.known);
+  run_.evaluate(s.seeds.positions(), parts(), s.known);
   s.covers = run_.covers(s.known.diagram);
   const Dual& dual = s.dual();
   const std::vector<Vec3>& seeds = s.seeds.positions();
@@ -843,7 +845,7 @@ void Improver::drop_idle() {
 void Improver::hand_over() {
   if (polygons_are_current_) {
     now_.known.diagram.polygons = std::move(polygons_);
-    now_.known.diagram.has = Want::polygons | Want::dual;
+    now_.known.diagram.has = parts();
   }
   run_.adopt(std::move(now_.seeds), std::move(now_.known));
 }
@@ -851,7 +853,7 @@ void Improver::hand_over() {
 ImproveReport Improver::run() {
   Snapshot first;
   first.seeds = run_.seeds;
-  first.known = run_.take_diagram(Want::polygons | Want::dual);
+  first.known = run_.take_diagram(parts());
   measure(first);
   accept(std::move(first));
   if (now_.dual().triangles.empty()) {

@@ -49,8 +49,9 @@ struct DiagramWork {
   double clip = 0;                      // clipping and sums
 };
 
-// Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it.
-enum class Want : unsigned { moments = 0, polygons = 1, polyhedra = 2, dual = 4 };
+// Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it; `labels` are the polygons
+// without their vertices.
+enum class Want : unsigned { moments = 0, labels = 1, polygons = 3, polyhedra = 4, dual = 8 };
 
 constexpr Want operator|(Want a, Want b) {
   return static_cast<Want>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
@@ -65,7 +66,7 @@ struct Diagram {
   CellMoments moments;
   RestrictedPolygons polygons;  // of the surface, or of the solid's boundary
   ClippedPolyhedra polyhedra;   // of a solid only
-  Dual dual;                    // of the surface, or of the solid's boundary; comes with the polygons it is read off
+  Dual dual;                    // of the surface, or of the solid's boundary; comes with the labels it is read off
   Want has = Want::moments;     // which parts are there
 };
 

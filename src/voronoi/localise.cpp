@@ -624,6 +624,7 @@ RestrictedPolygons Localiser::Work::splice() const {
     kept = first[t + 1];
   }
   append_polygons(*raw, kept, raw->pairs.size(), all);
+  if (raw->vertices.empty()) all.vertices.clear();
   return all;
 }
 

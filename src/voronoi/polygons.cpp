@@ -4,22 +4,17 @@
 
 namespace bisector {
 
-void put_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index slot, Index* labels, Vec3* vertices) {
-  const std::size_t size = clipper.size();
-  for (std::size_t e = 0, k = clipper.first_corner(); e < size; ++e, k = k + 1 == size ? 0 : k + 1) {
-    const Index label = clipper.label(k);
-    labels[e] = is_edge(label) ? label : seeds.id[label];
-    vertices[e] = seeds.x[slot] + clipper.vertex(k);
-  }
-}
-
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
                     RestrictedPolygons& out) {
   out.pairs.push_back({triangle, seeds.id[slot]});
   const std::size_t size = clipper.size(), begin = out.labels.size();
   out.labels.resize(begin + size);
   out.vertices.resize(begin + size);
-  put_polygon(clipper, seeds, slot, out.labels.data() + begin, out.vertices.data() + begin);
+  for (std::size_t e = 0, k = clipper.first_corner(); e < size; ++e, k = k + 1 == size ? 0 : k + 1) {
+    const Index label = clipper.label(k);
+    out.labels[begin + e] = is_edge(label) ? label : seeds.id[label];
+    out.vertices[begin + e] = seeds.x[slot] + clipper.vertex(k);
+  }
   out.offsets.push_back(begin + size);
 }
 
@@ -38,7 +33,8 @@ void append_polygons(const RestrictedPolygons& from, std::size_t begin, std::siz
   const std::size_t first = from.offsets[begin], last = from.offsets[end], before = out.labels.size();
   for (std::size_t p = begin; p < end; ++p) out.offsets.push_back(before + from.offsets[p + 1] - first);
   out.labels.insert(out.labels.end(), from.labels.begin() + at(first), from.labels.begin() + at(last));
-  out.vertices.insert(out.vertices.end(), from.vertices.begin() + at(first), from.vertices.begin() + at(last));
+  if (!from.vertices.empty())
+    out.vertices.insert(out.vertices.end(), from.vertices.begin() + at(first), from.vertices.begin() + at(last));
 }
 
 double polygon_area(const RestrictedPolygons& polygons, std::size_t polygon) {

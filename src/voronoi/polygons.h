@@ -9,11 +9,8 @@
 
 namespace bisector {
 
-// Writes the labels and corners of the clipper's polygon, starting at the edge of the smallest label; slots become the
-// caller's indices.
-void put_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index slot, Index* labels, Vec3* vertices);
-
-// Appends that polygon, which lies on the triangle.
+// Appends the clipper's polygon, which lies on the triangle, starting at the edge of the smallest label; slots become
+// the caller's indices.
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
                     RestrictedPolygons& out);
 

@@ -146,7 +146,9 @@ struct RestrictedVoronoi::Work {
   void sort_items();
   PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
-  void set_polygons(RestrictedPolygons& polygons);
+  void set_polygons(RestrictedPolygons& polygons, bool with_vertices);
+  void put_vertices(const Entry& entry, const Chunk& chunk, Clipper& clipper, Vec3* to) const;
+  Index* put_labels(std::size_t facet, const Entry& entry, const Chunk& chunk, Index* to) const;
   bool follow(const std::vector<Vec3>& given, NeighbourSource source);
   void relate(const SortedSeeds& last, const std::vector<Vec3>& given);
   DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments, Want want,
@@ -428,8 +430,7 @@ void RestrictedVoronoi::Work::relate(const SortedSeeds& last, const std::vector<
 
 DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments,
                                               Want want, Diagram& diagram) {
-  const bool want_polygons = includes(want, Want::polygons);
-  DiagramWork work;
+    DiagramWork work;
   Stopwatch watch;
   followed = follow(given, source);
   if (!followed) {
@@ -445,13 +446,38 @@ DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Ne
   work.counts = list_triangles(given.size(), diagram.moments);
   if (want_moments) sum_cells(given.size(), diagram.moments);
   work.clip = watch.lap();
-  if (want_polygons) set_polygons(diagram.polygons);
+  if (includes(want, Want::labels)) set_polygons(diagram.polygons, includes(want, Want::polygons));
   return work;
+}
+
+// Writes the labels of a polygon as the caller knows them. Returns where they end.
+Index* RestrictedVoronoi::Work::put_labels(std::size_t facet, const Entry& entry, const Chunk& chunk, Index* to) const {
+  if (entry.moments == kWhole) {
+    const unsigned char* rank = surface.facets[facet].rank;
+    for (Index k = 0, edge = rank[0] == 0 ? 0 : rank[1] == 0 ? 1 : 2; k < 3; ++k, edge = edge == 2 ? 0 : edge + 1)
+      *to++ = kEdgeLabel | edge;
+    return to;
+  }
+  for (const Index label : chunk.labels_of(entry)) *to++ = is_edge(label) ? label : seeds.id[label];
+  return to;
+}
+
+// Writes the vertices of a polygon on the facet that the clipper is at, in the order of its labels.
+void RestrictedVoronoi::Work::put_vertices(const Entry& entry, const Chunk& chunk, Clipper& clipper, Vec3* to) const {
+  if (entry.moments == kWhole) {
+    clipper.take(entry.slot);
+  } else {
+    const std::span<const Index> labels = chunk.labels_of(entry);
+    clipper.take(entry.slot, labels.data(), labels.size());
+  }
+  const std::size_t size = clipper.size();
+  for (std::size_t e = 0, k = clipper.first_corner(); e < size; ++e, k = k + 1 == size ? 0 : k + 1)
+    to[e] = seeds.x[entry.slot] + clipper.vertex(k);
 }
 
 // Sets the polygons from their labels, in order of triangles, then cells. Blocks of triangles are counted first, so
 // that each has its place.
-void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
+void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons, bool with_vertices) {
   struct Place {
     std::size_t pair = 0, corner = 0;
   };
@@ -477,7 +503,7 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
   polygons.offsets.resize(places.back().pair + 1);
   polygons.offsets[0] = 0;
   polygons.labels.resize(places.back().corner);
-  polygons.vertices.resize(places.back().corner);
+  polygons.vertices.resize(with_vertices ? places.back().corner : 0);
   parallel_chunks(triangles, kTrianglesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
     Place at = places[block];
     Clipper& clipper = local_walker().clipper;
@@ -490,17 +516,11 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons) {
       entries.assign(all + first_entry[facet], all + entries_end(facet, chunk, first_entry));
       std::sort(entries.begin(), entries.end(),
                 [&](const Entry& a, const Entry& b) { return seeds.id[a.slot] < seeds.id[b.slot]; });
-      clipper.begin(surface.facets[facet]);
+      if (with_vertices) clipper.begin(surface.facets[facet]);
       for (const Entry& entry : entries) {
-        if (entry.moments == kWhole) {
-          clipper.take(entry.slot);
-        } else {
-          const std::span<const Index> labels = chunk.labels_of(entry);
-          clipper.take(entry.slot, labels.data(), labels.size());
-        }
-        put_polygon(clipper, seeds, entry.slot, polygons.labels.data() + at.corner,
-                    polygons.vertices.data() + at.corner);
-        at.corner += clipper.size();
+        Index* labels = polygons.labels.data() + at.corner;
+        if (with_vertices) put_vertices(entry, chunk, clipper, polygons.vertices.data() + at.corner);
+        at.corner += static_cast<std::size_t>(put_labels(facet, entry, chunk, labels) - labels);
         polygons.pairs[at.pair++] = {static_cast<Index>(t), seeds.id[entry.slot]};
         polygons.offsets[at.pair] = at.corner;
       }
