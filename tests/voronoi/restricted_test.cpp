@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "bisector/io.h"
 #include "core/degenerate.h"
 #include "core/geometry.h"
+#include "core/lanes.h"
 #include "support/diagram.h"
 #include "support/models.h"
 #include "support/oracle.h"
@@ -312,6 +314,55 @@ TEST(Restricted, FollowsSeedsThatMoveByAFractionOfTheirSpacing) {
       for (Vec3& x : seeds) x += 0.05 * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
     }
   }
+}
+
+// Facets that stay divided as they were are certified vertex by vertex and computed several polygons at a time. Whatever
+// happens to the seeds, and whatever instructions are used, no bit may differ from a diagram that knows nothing.
+TEST(Restricted, WhatIsKnownOfFacetsChangesNoBit) {
+  struct Case {
+    const char* name;
+    TriangleMesh mesh;
+    std::size_t seeds;
+  };
+  const Case cases[] = {{"facets smaller than cells", torus(96, 48), 700},
+                        {"facets larger than cells", icosphere(2), 3000},
+                        {"about the same, flat", grid_patch(30, 20), 900},
+                        {"sheets without neighbours", soup(60, 5), 500}};
+  for (const Case& c : cases)
+    for (const bool uniform : {true, false}) {
+      std::vector<double> density;
+      if (!uniform)
+        for (const Vec3& p : c.mesh.vertices) density.push_back(1.5 + std::sin(3 * p.x) * std::cos(2 * p.y + p.z));
+      const Surface surface(c.mesh, density);
+      const double spacing = std::sqrt(surface.area / static_cast<double>(c.seeds));
+      std::array<std::unique_ptr<RestrictedVoronoi>, 3> used;
+      for (auto& voronoi : used) voronoi = std::make_unique<RestrictedVoronoi>(surface);
+      SplitMix64 random(71);
+      const auto somewhere = [&] { return Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)}; };
+      std::vector<Vec3> seeds = random_seeds(c.mesh, c.seeds, 72);
+      for (int step = 0; step < 30; ++step) {
+        SCOPED_TRACE(std::string(c.name) + (uniform ? "" : ", with a density") + ", step " + std::to_string(step));
+        const Diagram fresh = diagram_of(surface, seeds, NeighbourSource::nearest);
+        for (const LaneSet lanes : {LaneSet::portable, LaneSet::avx2, LaneSet::avx512}) {
+          limit_lanes(lanes);
+          RestrictedVoronoi& voronoi = *used[static_cast<std::size_t>(lanes)];
+          // Known facets are what vertices are told from, too.
+          expect_same_diagram(diagram_of(voronoi, seeds, NeighbourSource::nearest), fresh);
+        }
+        limit_lanes(LaneSet::avx512);
+        if (HasFailure()) return;
+        // All move, by less and less; or some are thrown to where others are, or put beside them.
+        const double reach = spacing * std::pow(10.0, -0.5 * (step % 10));
+        if (step % 3 == 0) {
+          for (Vec3& x : seeds) x += reach * somewhere();
+        } else {
+          for (std::size_t k = random.below(10); k < 12; ++k) {
+            const Vec3& other = seeds[random.below(seeds.size())];
+            seeds[random.below(seeds.size())] = other + reach * somewhere();
+          }
+        }
+      }
+    }
 }
 
 // Seeds that stay are recognised where others among them go, come or move, and what bounded their cells is tried first.
