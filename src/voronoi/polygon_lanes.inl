@@ -36,10 +36,10 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
   struct Line {
     Lanes3 m, along;
     Numbers offset, squared;
-    Masks outward;
   };
   Line edges[3];
   Numbers edge_size[3];
+  Masks runs_on[3];
   for (int k = 0; k < 3; ++k) {
     const Masks own = load(batch.runs_on[k]) > 0;
     const Lanes3 here = load3(batch.corner[k]), next = load3(batch.corner[(k + 1) % 3]);
@@ -48,7 +48,7 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     line.m = cross(line.along, normal);
     line.squared = norm2(line.along);
     line.offset = dot(line.m, select(own, local[k], local[(k + 1) % 3])) - height * dot(normal, line.m);
-    line.outward = ~own;
+    runs_on[k] = own;
     edge_size[k] = absolute(line.m.x) + absolute(line.m.y) + absolute(line.m.z);
   }
   Line lines[kMostCorners];
@@ -59,7 +59,6 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     line.along = cross(normal, line.m);
     line.squared = norm2(line.m);
     line.offset = 0.5 * line.squared - height * dot(normal, line.m);
-    line.outward = one > 0;
     const Numbers edge = load(batch.edge[k]);
     for (int e = 0; e < 3; ++e) {
       const Masks mask = on_edge[k][e] = edge == zero + e;
@@ -67,7 +66,6 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
       line.along = select(mask, edges[e].along, line.along);
       line.squared = mask ? edges[e].squared : line.squared;
       line.offset = mask ? edges[e].offset : line.offset;
-      line.outward = mask ? edges[e].outward : line.outward;
     }
   }
 
@@ -85,18 +83,17 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     const Lanes3 w = times(inverse, times(after.offset, before.along) - times(before.offset, after.along));
     // The root of squares / square, the inverse sine, is at most the mean of that and 1.
     const Numbers slack = (1001 * kUnit) * reach * (1 + squares * (inverse * inverse));
-    const Masks turns = (square > kShallow * squares) & ((determinant > 0) == (before.outward == after.outward));
     const Masks edge_before = on_edge[previous][0] | on_edge[previous][1] | on_edge[previous][2];
     const Masks edge_after = on_edge[k][0] | on_edge[k][1] | on_edge[k][2];
     const Masks corner = is_corner[k] = edge_before & edge_after;
     const Lanes3 facet_corner = select(on_edge[k][0], local[0], select(on_edge[k][1], local[1], local[2]));
     at[k] = select(corner, facet_corner, foot + w);
     const Numbers error = corner ? kCornerSlack * reach : slack;
-    Masks inside = turns;
+    Masks inside = square > kShallow * squares;
     for (int e = 0; e < 3; ++e) {
       const Numbers above = dot(edges[e].m, at[k] - local[e]);
       inside &= on_edge[previous][e] | on_edge[k][e] |
-                ((edges[e].outward ? -above : above) > 2 * error * edge_size[e] + kTiny);
+                ((runs_on[e] ? above : -above) > 2 * error * edge_size[e] + kTiny);
     }
     fits &= corner | inside;
     store3(batch.at[k], at[k]);

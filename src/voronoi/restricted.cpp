@@ -200,20 +200,16 @@ void RestrictedVoronoi::Work::divide(std::size_t facet, Chunk& chunk, Walker& wa
   else clip_facet(facet, walker, chunk);
 }
 
-// Puts today's slots in the place of those of the last diagram. False if one is not known.
+// Puts today's slots in the place of those of the last diagram. False if one is not known. The least label stays first,
+// for seeds that are related are in the same order.
 bool RestrictedVoronoi::Work::relabel(Entry& entry, Chunk& chunk) const {
   entry.slot = now(entry.slot);
   if (entry.slot == kNone) return false;
   if (entry.moments == kWhole) return true;
-  const std::span<Index> labels = chunk.labels_of(entry);
-  for (Index& label : labels) {
+  for (Index& label : chunk.labels_of(entry)) {
     if (!is_edge(label)) label = now(label);
     if (label == kNone) return false;
   }
-  if (is_edge(labels[0])) return true;
-  const auto least = std::min_element(labels.begin(), labels.end(),
-                                      [&](Index a, Index b) { return seeds.id[a] < seeds.id[b]; });
-  std::rotate(labels.begin(), least, labels.end());
   return true;
 }
 
