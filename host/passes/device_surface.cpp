@@ -19,7 +19,8 @@ Vec3 edge_normal(const Facet& f, int k) {
   return (1 / length) * outward;
 }
 
-void pack(const Facet& f, double scale, bool is_double, RealWords& words) {
+// `density`: null where it is 1.
+void pack(const Facet& f, const FacetDensity* density, double scale, bool is_double, RealWords& words) {
   const FacetLayout layout = facet_layout(is_double);
   const std::size_t begin = words.count();
   for (const Vec3& corner : f.corners) words.point(scale * corner);
@@ -30,9 +31,9 @@ void pack(const Facet& f, double scale, bool is_double, RealWords& words) {
     for (int k = 0; k < 3; ++k) words.point(edge_normal(f, k));
   }
   words.expect_at(begin + layout.density);
-  for (const double density : f.density) words.number(density);
+  for (int k = 0; k < 3; ++k) words.number(density ? density->at[k] : 1);
   words.expect_at(begin + layout.gradient);
-  words.vector((1 / scale) * f.gradient);
+  words.vector(density ? (1 / scale) * density->gradient : Vec3{});
   words.expect_at(begin + layout.words);
 }
 
@@ -62,7 +63,7 @@ std::vector<FacetChunk> upload_facets(Device& device, Commands& commands, const 
     std::vector<FacetMeta> meta;
     meta.reserve(count);
     for (std::size_t k = first; k < first + count; ++k) {
-      pack(surface.facets[k], scale, is_double, words);
+      pack(surface.facets[k], surface.density_of(k), scale, is_double, words);
       meta.push_back(meta_of(surface.facets[k], surface.summaries[k]));
       wholes.moments(scaled(surface.summaries[k].moments, scale));
     }

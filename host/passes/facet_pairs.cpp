@@ -73,12 +73,11 @@ void FacetPairs::clip(const PairJob& job, const PairBuffers& buffers, std::size_
 
 std::vector<ExactPair> FacetPairs::clip_exactly(const PairJob& job, const std::vector<PairName>& names) {
   std::vector<ExactPair> pairs(names.size());
-  const bool uniform = surface().density.empty();
   exact_.for_each<Clipper>(names.size(), [&](std::size_t k, Clipper& clipper) {
-    clipper.begin(surface().facets[names[k].element]);
+    clipper.begin(surface(), names[k].element);
     if (!clipper.clip(exact_.neighbours(), names[k].slot)) return;
     pairs[k].empty = false;
-    pairs[k].moments = scaled(uniform ? clipper.integrate<true>() : clipper.integrate<false>(), job.seeds.scale);
+    pairs[k].moments = scaled(clipper.integrate(), job.seeds.scale);
     for (std::size_t e = 0; e < clipper.size(); ++e)
       if (!is_edge(clipper.label(e))) pairs[k].proposals.push_back({names[k].element, clipper.label(e)});
   });
@@ -88,7 +87,7 @@ std::vector<ExactPair> FacetPairs::clip_exactly(const PairJob& job, const std::v
 std::vector<std::vector<Index>> FacetPairs::label_exactly(const std::vector<PairName>& pairs) {
   std::vector<std::vector<Index>> labels(pairs.size());
   exact_.for_each<Clipper>(pairs.size(), [&](std::size_t k, Clipper& clipper) {
-    clipper.begin(surface().facets[pairs[k].element]);
+    clipper.begin(surface(), pairs[k].element);
     if (!clipper.clip(exact_.neighbours(), pairs[k].slot)) return;
     for (std::size_t e = 0; e < clipper.size(); ++e) labels[k].push_back(clipper.label(e));
   });

@@ -80,7 +80,7 @@ void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, R
     Clipper clipper;
     clipper.reset(seeds);
     for (std::size_t k = begin; k < end; ++k) {
-      clipper.begin(surface.facets[found[k].facet]);
+      clipper.begin(surface, found[k].facet);
       clipper.take(found[k].slot, labels.data() + found[k].first_label, found[k].count);
       append_polygon(clipper, seeds, triangle(found[k]), found[k].slot, parts[c]);
     }

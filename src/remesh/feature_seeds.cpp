@@ -41,7 +41,10 @@ CurveMeasure::CurveMeasure(const Surface& surface, const FeatureCurves& curves) 
   surface_ = fixed_sum(surface.facets.size(), [&](std::size_t k) {
     const Facet& f = surface.facets[k];
     const double area = 0.5 * dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
-    return area * (std::sqrt(f.density[0]) + std::sqrt(f.density[1]) + std::sqrt(f.density[2])) / 3;
+    const FacetDensity* of_facet = surface.density_of(k);
+    if (!of_facet) return area;
+    const auto& r = of_facet->at;
+    return area * (std::sqrt(r[0]) + std::sqrt(r[1]) + std::sqrt(r[2])) / 3;
   });
   const EdgeTable table = edge_table(surface.mesh.triangles, surface.mesh.vertices.size());
   for (std::size_t e = 0; e < table.edges.size(); ++e) {

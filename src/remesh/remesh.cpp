@@ -340,7 +340,8 @@ void Pipeline::mend_features_and_topology() {
 }
 
 Pipeline::Divided Pipeline::divide_sheets() {
-  const RestrictedPolygons& undivided = run_.diagram(Want::polygons).polygons;
+  const RestrictedPolygons& undivided =
+      run_.diagram(topology_.sheets.empty() ? Want::labels : Want::polygons).polygons;
   Divided result{{}, run_.seeds.positions(), check_ball_property(surface_, undivided)};
   if (topology_.sheets.empty() || result.ball.holds) return result;
   RestrictedPolygons polygons = undivided;
@@ -382,7 +383,8 @@ void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
 
 void Pipeline::extract() {
   const Stopwatch watch;
-  const Diagram& diagram = run_.diagram(Want::polygons | Want::dual);
+  const bool traces = run_.has_features() || !topology_.sheets.empty();
+  const Diagram& diagram = run_.diagram((traces ? Want::polygons : Want::labels) | Want::dual);
   result_.untiled = count_untiled(surface_, diagram.polygons);
   if (run_.has_features()) features_ = check_features(trace_, curves_, run_.seeds.places(), diagram);
   const Divided divided = divide_sheets();
@@ -446,9 +448,9 @@ SizeBounds Pipeline::crowded() {
   if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !input.manifold || !input.oriented)
     return found;
   run_.localise(localises_);
+  const BallReport report = check_ball_property(surface_, run_.diagram(Want::labels).polygons);
+  if (report.cells.empty() || report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
   const RestrictedPolygons& polygons = run_.diagram(Want::polygons).polygons;
-  const BallReport report = check_ball_property(surface_, polygons);
-  if (report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
   for (const BallReport::Cell& cell : report.cells) {
     double area = 0;
     for (const auto& part : cell.parts)

@@ -277,9 +277,11 @@ class Control {
   // Checks the diagram of the seeds, with the cells of sheets that touch divided.
   void check() {
     run_.context().check();
-    polygons_ = &run_.diagram(Want::polygons).polygons;
     cuts_ = find_cuts();
-    outcome_.ball = check_ball_property(run_.surface(), *polygons_);
+    outcome_.ball = check_ball_property(run_.surface(), run_.diagram(parts_).polygons);
+    // Only what has to be mended is asked where it is.
+    if (!holds()) parts_ = Want::polygons;
+    polygons_ = &run_.diagram(parts_).polygons;
     vertices_ = run_.seeds.positions();
     if (!outcome_.ball.holds && (!too_few_seeds() || gap_ == kInfinity)) divide();
     outcome_.gap = gap_;
@@ -504,6 +506,7 @@ class Control {
   TopologyOutcome outcome_;
   std::vector<Cut> cuts_;
   std::vector<char> lost_;                        // by curve: cut at the beginning, and so left as it is
+  Want parts_ = Want::labels;  // of a diagram
   const RestrictedPolygons* polygons_ = nullptr;  // of the run's diagram, or divided_
   RestrictedPolygons divided_;
   std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells
@@ -559,7 +562,7 @@ std::vector<TopologyFault> topology_faults(const BallReport& report, const std::
 TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
                                  OptimiseOptions options) {
   if (input.manifold && input.oriented) return Control(run, trace, std::move(options)).run();
-  return {check_ball_property(run.surface(), run.diagram(Want::polygons).polygons), 0, 0, 0, {}, 0};
+  return {check_ball_property(run.surface(), run.diagram(Want::labels).polygons), 0, 0, 0, {}, 0};
 }
 
 }  // namespace bisector

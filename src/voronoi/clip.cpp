@@ -29,8 +29,10 @@ void Clipper::reset(const SortedSeeds& seeds) {
   screens_.reset(seeds);
 }
 
-void Clipper::begin(const Facet& facet, const SlotFilter* among) {
+void Clipper::begin(const Surface& surface, std::size_t index, const SlotFilter* among) {
+  const Facet& facet = surface.facets[index];
   facet_ = &facet;
+  density_ = surface.density_of(index);
   among_ = among;
   for (unsigned k = 0; k < 3; ++k) {
     Line& line = lines_[k];
@@ -242,10 +244,10 @@ void Clipper::add_corner(const Line& before, const Line& after, Corner& corner) 
 }
 
 double Clipper::density(std::size_t k) const {
-  const double* r = facet_->density;
+  const double* r = density_->at;
   const Index after = label(k);
   if (is_edge(after) && is_edge(label(previous(k)))) return r[after & ~kEdgeLabel];
-  const double value = r[facet_->anchor] + dot(facet_->gradient, vertex(k) - local_[facet_->anchor]);
+  const double value = r[facet_->anchor] + dot(density_->gradient, vertex(k) - local_[facet_->anchor]);
   return std::min(std::max(value, std::min({r[0], r[1], r[2]})), std::max({r[0], r[1], r[2]}));
 }
 
@@ -258,7 +260,7 @@ std::size_t Clipper::first_corner() const {
 }
 
 template <bool kUniform>
-Moments Clipper::integrate() {
+Moments Clipper::integrate_with() {
   const std::size_t n = polygon_.size;
   if constexpr (!kUniform) {
     densities_.resize(n);
@@ -281,8 +283,7 @@ Moments Clipper::integrate() {
   return sum;
 }
 
-template Moments Clipper::integrate<true>();
-template Moments Clipper::integrate<false>();
+Moments Clipper::integrate() { return density_ ? integrate_with<false>() : integrate_with<true>(); }
 
 ExactFrame Clipper::frame() const {
   return {{facet_->corners[0], facet_->corners[1], facet_->corners[2]}, seeds_->x[slot_], seeds_->id[slot_]};

@@ -27,8 +27,8 @@ class Clipper {
   // Forgets what is kept about the seeds; to be called whenever they or their neighbours change.
   void reset(const SortedSeeds& seeds);
   // The facet that the following calls are about, and the seeds that clip() takes to be there, all if there is no
-  // filter; both must outlive them.
-  void begin(const Facet& facet, const SlotFilter* among = nullptr);
+  // filter; they must outlive these calls.
+  void begin(const Surface& surface, std::size_t facet, const SlotFilter* among = nullptr);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
   // Takes the whole facet, which the caller knows to lie in the cell.
@@ -47,7 +47,6 @@ class Clipper {
   // The index of the edge with the smallest label.
   std::size_t first_corner() const;
   // Integrals over the last polygon.
-  template <bool kUniform>
   Moments integrate();
 
   // What is kept of the cells' neighbours, for others who look at the same cells.
@@ -90,6 +89,8 @@ class Clipper {
   };
 
   void start(Index slot);
+  template <bool kUniform>
+  Moments integrate_with();
   unsigned lines_that_may_cut(const ScreenBlock& block) const;
   void place_lines();
   unsigned add_line(Index other, const Vec3& towards, double squared);
@@ -115,6 +116,7 @@ class Clipper {
 
   const SortedSeeds* seeds_ = nullptr;
   const Facet* facet_ = nullptr;
+  const FacetDensity* density_ = nullptr;
   const SlotFilter* among_ = nullptr;
   Index slot_ = 0;
   Vec3 local_[3];             // the facet's corners relative to the seed

@@ -63,10 +63,10 @@ void KnownPolygons::add(Index index, Index slot, std::span<const Index> labels, 
   put(numbers.normal, facet.normal);
   put(numbers.anchor, facet.corners[facet.anchor]);
   put(numbers.seed, seeds_->x[slot]);
-  if (!surface_->density.empty()) {
-    for (int k = 0; k < 3; ++k) numbers.density[k][lane] = facet.density[k];
-    numbers.anchor_density[lane] = facet.density[facet.anchor];
-    put(numbers.gradient, facet.gradient);
+  if (const FacetDensity* density = surface_->density_of(index)) {
+    for (int k = 0; k < 3; ++k) numbers.density[k][lane] = density->at[k];
+    numbers.anchor_density[lane] = density->at[facet.anchor];
+    put(numbers.gradient, density->gradient);
   }
   for (std::size_t k = 0; k < count; ++k) {
     const bool edge = is_edge(labels[k]);

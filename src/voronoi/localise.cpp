@@ -269,7 +269,7 @@ void Localiser::Work::take(const Row& on, std::size_t polygon, Clipper& clipper)
                 polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon + 1]));
   for (Index& label : labels)
     if (!is_edge(label)) label = seeds.slot[label];
-  clipper.begin(surface.facets[surface.facet_of[triangle]]);
+  clipper.begin(surface, surface.facet_of[triangle]);
   clipper.take(seeds.slot[cell], labels.data(), labels.size());
 }
 
@@ -520,7 +520,7 @@ Triangles Localiser::Work::beside(const Triangles& triangles) const {
 void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons& out) {
   const Among& these = *among.find(triangle);
   const Admitted filter(regions, these);
-  clipper.begin(surface.facets[surface.facet_of[triangle]], &filter);
+  clipper.begin(surface, surface.facet_of[triangle], &filter);
   Scratch& scratch = scratches.local();
   std::vector<Index>& met = scratch.met;
   met.clear();
@@ -632,7 +632,6 @@ RestrictedPolygons Localiser::Work::splice() const {
 void Localiser::Work::sum(Diagram& diagram) {
   CellMoments& moments = diagram.moments;
   const std::vector<Index>& cells = cell_triangles.items;
-  const bool uniform = surface.density.empty();
   parallel_each(
       cells.size(),
       [&](std::size_t k) {
@@ -642,7 +641,7 @@ void Localiser::Work::sum(Diagram& diagram) {
         for (const Index t : *cell_triangles.find(cell)) {
           const Row on = row(t);
           take(on, on.find(cell), mine);
-          sum.add(uniform ? mine.integrate<true>() : mine.integrate<false>());
+          sum.add(mine.integrate());
         }
         moments.cells[cell] = sum.finish();
         moments.step_mass[cell] = -1;

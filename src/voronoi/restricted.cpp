@@ -54,6 +54,9 @@ struct Chunk {
   std::span<Index> labels_of(const Entry& entry) {
     return {labels.data() + first_label[entry.moments], labels.data() + first_label[entry.moments + 1]};
   }
+  // Room for somewhat more than another chunk holds: kept between diagrams, what is grown by doubling would be a third
+  // of all memory.
+  void reserve_for(const Chunk& other);
   // Appends these entries of another chunk, which follow each other.
   void append(const Chunk& from, std::size_t begin, std::size_t end);
 };
@@ -62,6 +65,14 @@ template <class T>
 void append_range(std::vector<T>& to, const std::vector<T>& from, std::size_t begin, std::size_t end) {
   const auto at = [](std::size_t k) { return static_cast<std::ptrdiff_t>(k); };
   to.insert(to.end(), from.begin() + at(begin), from.begin() + at(end));
+}
+
+void Chunk::reserve_for(const Chunk& other) {
+  const auto reserve = [](auto& room, std::size_t size) { room.reserve(size + size / 16 + 16); };
+  reserve(entries, other.entries.size());
+  reserve(moments, other.moments.size());
+  reserve(first_label, other.first_label.size());
+  reserve(labels, other.labels.size());
 }
 
 void Chunk::append(const Chunk& from, std::size_t begin, std::size_t end) {
@@ -171,9 +182,8 @@ void RestrictedVoronoi::Work::find_owners() {
 }
 
 void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chunk& chunk) const {
-  const bool uniform = surface.density.empty();
   Clipper& clipper = walker.clipper;
-  clipper.begin(surface.facets[index]);
+  clipper.begin(surface, index);
   walker.begin(seeds.x.size());
   for (const Index vertex : surface.summaries[index].vertex) walker.meet(owner[vertex]);
   for (std::size_t head = 0; head < walker.queue.size(); ++head) {
@@ -188,7 +198,7 @@ void RestrictedVoronoi::Work::clip_facet(std::size_t index, Walker& walker, Chun
     for (std::size_t k = 0; k < size; ++k)
       if (!is_edge(clipper.label(k))) walker.meet(clipper.label(k));
     chunk.entries.push_back({slot, static_cast<Index>(chunk.moments.size())});
-    chunk.moments.push_back(uniform ? clipper.integrate<true>() : clipper.integrate<false>());
+    chunk.moments.push_back(clipper.integrate());
   }
 }
 
@@ -244,6 +254,7 @@ bool RestrictedVoronoi::Work::recall(std::size_t begin, std::size_t end, Chunk& 
 void RestrictedVoronoi::Work::renew(std::size_t begin, std::size_t end, Chunk& chunk, Walker& walker) {
   Chunk& renewed = walker.renewed;
   renewed.clear();
+  renewed.reserve_for(chunk);
   for (std::size_t facet = begin; facet < end;) {
     if (walker.changed[facet - begin]) {
       divide(facet++, renewed, walker);
@@ -289,9 +300,11 @@ void RestrictedVoronoi::Work::clip_facets() {
       if (!recall(begin, end, chunk, walker)) renew(begin, end, chunk, walker);
       return;
     }
-    chunk.clear();
-    for (std::size_t k = begin; k < end; ++k) divide(k, chunk, walker);
-    chunk.first_label.push_back(static_cast<Index>(chunk.labels.size()));
+    Chunk& fresh = walker.renewed;
+    fresh.clear();
+    for (std::size_t k = begin; k < end; ++k) divide(k, fresh, walker);
+    fresh.first_label.push_back(static_cast<Index>(fresh.labels.size()));
+    chunk = fresh;
   });
 }
 
@@ -512,7 +525,7 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons, bool wi
       entries.assign(all + first_entry[facet], all + entries_end(facet, chunk, first_entry));
       std::sort(entries.begin(), entries.end(),
                 [&](const Entry& a, const Entry& b) { return seeds.id[a.slot] < seeds.id[b.slot]; });
-      if (with_vertices) clipper.begin(surface.facets[facet]);
+      if (with_vertices) clipper.begin(surface, facet);
       for (const Entry& entry : entries) {
         Index* labels = polygons.labels.data() + at.corner;
         if (with_vertices) put_vertices(entry, chunk, clipper, polygons.vertices.data() + at.corner);

@@ -68,6 +68,7 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
   const std::vector<Index> order = hilbert_order(centres);
   facets.resize(order.size());
   summaries.resize(order.size());
+  if (!density.empty()) densities.resize(order.size());
   parallel_each(order.size(), [&](std::size_t place) {
     const Index t = kept[order[place]];
     const Triangle& v = mesh.triangles[t];
@@ -78,22 +79,25 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     std::array<std::array<Index, 3>, 3> edges;
     for (unsigned char m = 0; m < 3; ++m) {
       f.corners[m] = mesh.vertices[v[m]];
-      f.density[m] = density.empty() ? 1.0 : density[v[m]];
       summary.vertex[m] = place_of[v[m]];
       const unsigned char next = static_cast<unsigned char>((m + 1) % 3);
       f.origin[m] = v[m] < v[next] ? m : next;
       edges[m] = {std::min(v[m], v[next]), std::max(v[m], v[next]), m};
     }
     const double twice_area = dot(f.normal, cross(f.corners[1] - f.corners[0], f.corners[2] - f.corners[0]));
-    // The area of a facet that is all but collinear may come out as nothing.
-    if (twice_area != 0)
-      f.gradient =
-          (1 / twice_area) * cross(f.normal, (f.density[1] - f.density[0]) * (f.corners[0] - f.corners[2]) +
-                                                 (f.density[2] - f.density[0]) * (f.corners[1] - f.corners[0]));
+    double at[3] = {1, 1, 1};
+    if (!density.empty()) {
+      FacetDensity& d = densities[place];
+      for (int m = 0; m < 3; ++m) at[m] = d.at[m] = density[v[m]];
+      // The area of a facet that is all but collinear may come out as nothing.
+      if (twice_area != 0)
+        d.gradient = (1 / twice_area) * cross(f.normal, (at[1] - at[0]) * (f.corners[0] - f.corners[2]) +
+                                                            (at[2] - at[0]) * (f.corners[1] - f.corners[0]));
+    }
     f.anchor = static_cast<unsigned char>(std::min_element(v.begin(), v.end()) - v.begin());
     const Vec3 origin = summary.anchor = f.corners[f.anchor];
     summary.moments = triangle_moments(f.corners[0] - origin, f.corners[1] - origin, f.corners[2] - origin,
-                                       f.density[0], f.density[1], f.density[2], 0.5 * twice_area);
+                                       at[0], at[1], at[2], 0.5 * twice_area);
     std::sort(edges.begin(), edges.end());
     for (unsigned char r = 0; r < 3; ++r) f.rank[edges[r][2]] = r;
     facet_of[t] = static_cast<Index>(place);

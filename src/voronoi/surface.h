@@ -13,11 +13,15 @@ namespace bisector {
 struct Facet {
   Vec3 corners[3];
   Vec3 normal;              // unit length
-  double density[3];        // at the corners
-  Vec3 gradient;            // of the density
   unsigned char anchor;     // the corner of lowest vertex index
   unsigned char origin[3];  // of each edge: its end of lower vertex index
   unsigned char rank[3];    // of each edge among the three, by sorted vertex indices
+};
+
+// A linear density on it.
+struct FacetDensity {
+  double at[3];  // the corners
+  Vec3 gradient;
 };
 
 // What is needed of a triangle that lies in one cell.
@@ -41,11 +45,15 @@ struct Surface {
   std::vector<double> density;          // per vertex, or empty
   std::vector<Facet> facets;            // in a spatial order; exactly collinear triangles are left out
   std::vector<FacetSummary> summaries;  // of the facets
+  std::vector<FacetDensity> densities;  // of the facets; empty where the density is 1
   std::vector<Index> used_vertices;     // of the mesh: those that facets use, in a spatial order
   std::vector<Index> facet_of;          // of each triangle, or kNone
   double area = 0;
   double mass = 0;  // integral of the density
   Box box;          // of the used vertices
+
+  // Null where the density is 1.
+  const FacetDensity* density_of(std::size_t facet) const { return densities.empty() ? nullptr : &densities[facet]; }
 };
 
 }  // namespace bisector

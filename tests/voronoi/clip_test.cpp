@@ -165,7 +165,7 @@ Tally check(const Problem& problem, bool all) {
   neighbours.build(seeds, NeighbourSource::nearest);
   Clipper clipper;
   clipper.reset(seeds);
-  clipper.begin(facet);
+  clipper.begin(*surface, 0);
   for (Index slot = 0; slot < seeds.x.size(); ++slot) {
     const ExactClipper exact{seeds, facet, slot};
     const bool found = clipper.clip(neighbours, slot);
