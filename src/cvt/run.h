@@ -41,6 +41,8 @@ class CvtRun {
   const FeatureCurves& curves() const { return curves_; }
   // Whether there are feature curves or corners for seeds to be on.
   bool has_features() const { return !curves_.graph().edges.empty() || !curves_.graph().corners.empty(); }
+  // What of a diagram the curves are traced on: where there are none, nobody asks where the polygons are.
+  Want traced() const { return curves_.size() > 0 ? Want::polygons : Want::labels; }
   const Context& context() const { return context_; }
 
   // Free to be changed: a diagram is only used for the positions that it was computed for.

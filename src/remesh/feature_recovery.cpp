@@ -359,7 +359,7 @@ void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& 
   options.iterations = kClearingSteps;
   for (int round = 0; round < kClearingRounds; ++round) {
     std::vector<char> removed(seeds.size(), 0), crossed(curves.size(), 0);
-    const std::vector<std::vector<CurveInterval>> traced = trace.trace(run.diagram(Want::polygons).polygons);
+    const std::vector<std::vector<CurveInterval>> traced = trace.trace(run.diagram(run.traced()).polygons);
     for (Index c = 0; c < curves.size(); ++c)
       for (const CurveInterval& i : traced[c])
         if (seeds.on_surface(i.cell)) removed[i.cell] = crossed[c] = 1;
@@ -376,7 +376,7 @@ void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& 
 
 FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, double c,
                                OptimiseOptions options) {
-  constexpr Want kChains = Want::polygons | Want::dual;
+  const Want chains = run.traced() | Want::dual;
   const FeatureCurves& curves = run.curves();
   const std::size_t count = run.seeds.size(), most = count + count / 4 + kMostAdded;
   protect_acute_corners(curves, measure, c, run.seeds);
@@ -385,7 +385,7 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   bool crowd = false;
   for (int round = 0;; ++round) {
     run.context().check();
-    const FeatureReport found = check_features(trace, curves, run.seeds.places(), run.diagram(kChains));
+    const FeatureReport found = check_features(trace, curves, run.seeds.places(), run.diagram(chains));
     if (found.faults.empty()) return found;
     if (found.faults.size() < fewest) {
       fewest = found.faults.size();
@@ -413,7 +413,7 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   }
   // Sheets that intersect, or curves that cross another sheet, cannot all be had.
   run.seeds = std::move(best);
-  return check_features(trace, curves, run.seeds.places(), run.diagram(kChains));
+  return check_features(trace, curves, run.seeds.places(), run.diagram(chains));
 }
 
 }  // namespace bisector

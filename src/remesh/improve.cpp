@@ -158,8 +158,7 @@ class Improver {
   // Whether the number of seeds is the aim.
   static bool counts(Aim aim) { return aim == Aim::fewer || aim == Aim::more; }
   bool has_curves() const { return run_.curves().size() > 0; }
-  // Of a diagram: curves are followed along the polygons' vertices.
-  Want parts() const { return (has_curves() ? Want::polygons : Want::labels) | Want::dual; }
+  Want parts() const { return run_.traced() | Want::dual; }  // of a diagram
   double irregular_price() const { return kIrregular * now_.average; }
   std::size_t wanted() const { return options_.vertices ? options_.vertices : run_.seeds.size(); }
   void measure(Snapshot& s);

@@ -282,7 +282,7 @@ bool Pipeline::can_localise() const { return localises_ && plan_.constrained && 
 // Folds of a rough surface give cells pieces that leave no trace in the dual.
 bool Pipeline::dual_suffices() {
   if (plan_.constrained) return false;
-  std::vector<Triangle> dual = run_.diagram(Want::polygons | Want::dual).dual.triangles;
+  std::vector<Triangle> dual = run_.diagram(Want::dual).dual.triangles;
   orient(dual, run_.seeds.size());
   return same_topology(analyse_topology(dual, run_.seeds.size()), input_topology_);
 }
@@ -334,7 +334,7 @@ void Pipeline::mend_features_and_topology() {
     result_.seconds.topology += watch.seconds();
     // What could not be kept once will not be the next time.
     if (!run_.has_features() || !features_.broken.empty()) return;
-    const Diagram& diagram = run_.diagram(Want::polygons | Want::dual);
+    const Diagram& diagram = run_.diagram(run_.traced() | Want::dual);
     if (check_features(trace_, curves_, run_.seeds.places(), diagram).broken.empty()) return;
   }
 }
@@ -383,8 +383,8 @@ void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
 
 void Pipeline::extract() {
   const Stopwatch watch;
-  const bool traces = run_.has_features() || !topology_.sheets.empty();
-  const Diagram& diagram = run_.diagram((traces ? Want::polygons : Want::labels) | Want::dual);
+  const Want parts = topology_.sheets.empty() ? run_.traced() : Want::polygons;
+  const Diagram& diagram = run_.diagram(parts | Want::dual);
   result_.untiled = count_untiled(surface_, diagram.polygons);
   if (run_.has_features()) features_ = check_features(trace_, curves_, run_.seeds.places(), diagram);
   const Divided divided = divide_sheets();

@@ -327,7 +327,7 @@ class Control {
     std::vector<Cut> cuts;
     if (!run_.has_features()) return cuts;
     const FeatureCurves& curves = run_.curves();
-    const std::vector<std::vector<CurveInterval>> traces = trace_.trace(run_.diagram(Want::polygons).polygons);
+    const std::vector<std::vector<CurveInterval>> traces = trace_.trace(run_.diagram(run_.traced()).polygons);
     for (Index c = 0; c < traces.size(); ++c) {
       if (lost_[c]) continue;
       std::map<Index, CurveInterval> longest;
