@@ -33,7 +33,7 @@ EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Di
   if (!includes(offers_, computed)) throw std::logic_error("a backend of a surface was asked for polyhedra");
   const EvaluationReport report = compute(seeds, computed, diagram);
   if (!includes(computed, Want::labels)) diagram.polygons = {};
-  if (!includes(computed, Want::polygons)) diagram.polygons.vertices.clear();
+  if (!includes(computed, Want::polygons)) diagram.polygons.vertices = {};
   if (!includes(computed, Want::polyhedra)) diagram.polyhedra = {};
   if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
   else diagram.dual = {};

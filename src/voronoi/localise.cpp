@@ -137,6 +137,32 @@ struct Scratch {
   RestrictedPolygons found;
 };
 
+// Half-edges that lie across others, mostly one.
+class Across {
+ public:
+  void resize(std::size_t half_edges) { first_.assign(half_edges, kNone); }
+  void set(std::size_t half_edge, std::span<const Index> others) {
+    if (others.size() == 1) {
+      first_[half_edge] = others[0];
+    } else if (others.size() > 1) {
+      first_[half_edge] = kSeveral | static_cast<Index>(several_.size());
+      several_.emplace_back(others.begin(), others.end());
+    }
+  }
+  std::span<const Index> of(std::size_t half_edge) const {
+    const Index& first = first_[half_edge];
+    if (first == kNone) return {};
+    if (first & kSeveral) return several_[first & ~kSeveral];
+    return {&first, 1};
+  }
+
+ private:
+  static constexpr Index kSeveral = 0x80000000u;
+
+  std::vector<Index> first_;  // of each half-edge, or kNone, or a place in several_
+  std::vector<std::vector<Index>> several_;
+};
+
 }  // namespace
 
 struct Localiser::Work {
@@ -148,7 +174,7 @@ struct Localiser::Work {
   const Surface& surface;
   // The half-edges by which a triangle's neighbours across its own half-edge are entered, if need be behind triangles
   // that are exactly collinear and have no polygons.
-  Csr<std::size_t> across;
+  Across across;
   std::vector<char> direct;  // of each half-edge: there is no such triangle between
 
   SortedSeeds seeds;
@@ -219,32 +245,36 @@ struct Localiser::Work {
 Localiser::Work::Work(const Surface& s) : surface(s) {
   const std::vector<Triangle>& triangles = s.mesh.triangles;
   const EdgeTable table = edge_table(triangles, s.mesh.vertices.size());
-  std::vector<std::size_t> edge_of(3 * triangles.size());
+  const std::size_t half_edges = 3 * triangles.size();
+  std::vector<Index> edge_of(half_edges);
   for (std::size_t e = 0; e < table.edges.size(); ++e)
-    for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of[*h] = e;
+    for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h)
+      edge_of[*h] = static_cast<Index>(e);
   const auto has_facet = [&](std::size_t half_edge) { return s.facet_of[half_edge / 3] != kNone; };
-  direct.assign(3 * triangles.size(), 1);
+  direct.assign(half_edges, 1);
+  across.resize(half_edges);
   std::vector<std::size_t> behind;  // half-edges of collinear triangles
-  across = group_into_rows<std::size_t>(3 * triangles.size(), [&](const auto& put) {
-    for (std::size_t from = 0; from < 3 * triangles.size(); ++from) {
-      if (!has_facet(from)) continue;
-      behind.assign(1, from);
-      for (std::size_t i = 0; i < behind.size(); ++i) {
-        const std::size_t edge = edge_of[behind[i]];
-        for (const std::size_t* h = table.half_edges.begin(edge); h != table.half_edges.end(edge); ++h) {
-          if (*h / 3 == behind[i] / 3 || *h / 3 == from / 3) continue;
-          if (has_facet(*h)) {
-            put(from, *h);
-            continue;
-          }
-          direct[from] = 0;
-          for (std::size_t next = *h - *h % 3, k = 0; k < 3; ++k)
-            if (next + k != *h && std::find(behind.begin(), behind.end(), next + k) == behind.end())
-              behind.push_back(next + k);
+  std::vector<Index> others;
+  for (std::size_t from = 0; from < half_edges; ++from) {
+    if (!has_facet(from)) continue;
+    behind.assign(1, from);
+    others.clear();
+    for (std::size_t i = 0; i < behind.size(); ++i) {
+      const Index edge = edge_of[behind[i]];
+      for (const std::size_t* h = table.half_edges.begin(edge); h != table.half_edges.end(edge); ++h) {
+        if (*h / 3 == behind[i] / 3 || *h / 3 == from / 3) continue;
+        if (has_facet(*h)) {
+          others.push_back(static_cast<Index>(*h));
+          continue;
         }
+        direct[from] = 0;
+        for (std::size_t next = *h - *h % 3, k = 0; k < 3; ++k)
+          if (next + k != *h && std::find(behind.begin(), behind.end(), next + k) == behind.end())
+            behind.push_back(next + k);
       }
     }
-  });
+    across.set(from, others);
+  }
 }
 
 // Until one is added to the cells that changed.
@@ -328,8 +358,8 @@ std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
       const Index label = on.polygons->labels[e];
       if (!is_edge(label)) continue;
       const std::size_t h = std::size_t{3} * triangles[i] + (label & ~kEdgeLabel);
-      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
-        const Index t = static_cast<Index>(*other / 3), at = place[t];
+      for (const Index other : across.of(h)) {
+        const Index t = other / 3, at = place[t];
         if (at < count && triangles[at] == t) components -= parts.join(i, at);
       }
     }
@@ -381,12 +411,12 @@ void Localiser::Work::each_cell_beside(Index cell, const Triangles& piece, const
         continue;
       }
       const std::size_t h = std::size_t{3} * t + (label & ~kEdgeLabel);
-      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
-        const auto beyond = static_cast<Index>(*other / 3);
+      for (const Index other : across.of(h)) {
+        const auto beyond = other / 3;
         if (!is_left_out(beyond, cell)) continue;
         const Row there = row(beyond);
         for (std::size_t q = there.begin; q < there.end; ++q)
-          if (there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)))
+          if (there.has_label(q, kEdgeLabel | other % 3))
             body(beyond, there.polygons->pairs[q].cell);
       }
     }
@@ -484,11 +514,11 @@ Triangles Localiser::Work::put_back_torn(const Triangles& those) {
     for (Index k = 0; k < 3; ++k) {
       const std::size_t h = std::size_t{3} * triangle + k;
       if (!direct[h]) continue;
-      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other) {
-        const Row there = row(static_cast<Index>(*other / 3));
+      for (const Index other : across.of(h)) {
+        const Row there = row(other / 3);
         for (std::size_t q = there.begin; q < there.end; ++q) {
           const Index slot = seeds.slot[there.polygons->pairs[q].cell];
-          if (there.has_label(q, kEdgeLabel | static_cast<Index>(*other % 3)) && !regions.admits(*these, slot))
+          if (there.has_label(q, kEdgeLabel | other % 3) && !regions.admits(*these, slot))
             torn.push_back({triangle, slot});
         }
       }
@@ -510,8 +540,8 @@ Triangles Localiser::Work::beside(const Triangles& triangles) const {
   Triangles found;
   for (const Index t : triangles)
     for (std::size_t h = std::size_t{3} * t; h < std::size_t{3} * t + 3; ++h)
-      for (const std::size_t* other = across.begin(h); other != across.end(h); ++other)
-        found.push_back(static_cast<Index>(*other / 3));
+      for (const Index other : across.of(h))
+        found.push_back(other / 3);
   sort_unique(found);
   return found;
 }

@@ -512,7 +512,8 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons, bool wi
   polygons.offsets.resize(places.back().pair + 1);
   polygons.offsets[0] = 0;
   polygons.labels.resize(places.back().corner);
-  polygons.vertices.resize(with_vertices ? places.back().corner : 0);
+  if (with_vertices) polygons.vertices.resize(places.back().corner);
+  else polygons.vertices = {};
   parallel_chunks(triangles, kTrianglesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
     Place at = places[block];
     Clipper& clipper = local_walker().clipper;
