@@ -240,7 +240,7 @@ void meet_count(CvtRun& run, std::size_t count) {
   for (std::size_t size = 0; run.seeds.size() != count && run.seeds.size() != size;) {
     run.context().check();
     size = run.seeds.size();
-    set_count(run.diagram(Want::polygons), count, run.seeds);
+    set_count(run.take_diagram(Want::polygons).diagram, count, run.seeds);
   }
 }
 

@@ -189,11 +189,10 @@ void Pipeline::place_on_features(std::size_t count) {
 }
 
 void Pipeline::to_next_level(std::size_t count) {
-  const Diagram& diagram = run_.diagram(Want::polygons);
   PlacedSeeds on_features;
   if (run_.has_features())
     on_features = seeds_on_features(curves_, measure_, measure_.scale(count), run_.seeds.places());
-  run_.seeds = refine(diagram, run_.seeds, curves_, on_features, count);
+  run_.seeds = refine(run_.take_diagram(Want::polygons).diagram, run_.seeds, curves_, on_features, count);
   meet_count(run_, count);
 }
 
