@@ -54,9 +54,10 @@ struct Chunk {
   std::span<Index> labels_of(const Entry& entry) {
     return {labels.data() + first_label[entry.moments], labels.data() + first_label[entry.moments + 1]};
   }
-  // Room for somewhat more than another chunk holds: kept between diagrams, what is grown by doubling would be a third
-  // of all memory.
+  // Room for somewhat more than another chunk holds, and no more than somewhat more than this one does: as chunks are
+  // kept between diagrams, spare room would be a third of all memory.
   void reserve_for(const Chunk& other);
+  void trim();
   // Appends these entries of another chunk, which follow each other.
   void append(const Chunk& from, std::size_t begin, std::size_t end);
 };
@@ -73,6 +74,16 @@ void Chunk::reserve_for(const Chunk& other) {
   reserve(moments, other.moments.size());
   reserve(first_label, other.first_label.size());
   reserve(labels, other.labels.size());
+}
+
+void Chunk::trim() {
+  const auto trim_one = [](auto& room) {
+    if (room.capacity() > room.size() + room.size() / 4 + 64) room.shrink_to_fit();
+  };
+  trim_one(entries);
+  trim_one(moments);
+  trim_one(first_label);
+  trim_one(labels);
 }
 
 void Chunk::append(const Chunk& from, std::size_t begin, std::size_t end) {
@@ -267,6 +278,7 @@ void RestrictedVoronoi::Work::renew(std::size_t begin, std::size_t end, Chunk& c
     for (; facet < next; ++facet) first_entry[facet] += before - first;
   }
   renewed.first_label.push_back(static_cast<Index>(renewed.labels.size()));
+  renewed.trim();
   std::swap(chunk, renewed);
 }
 
