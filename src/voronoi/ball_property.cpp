@@ -36,8 +36,8 @@ std::vector<Index> singletons(std::size_t n) {
 }
 
 // Vertices whose triangles, linked through edges, fall apart into several fans.
-std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std::size_t vertices,
-                                    const EdgeTable& table) {
+std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std::size_t vertices) {
+  const EdgeTable table = edge_table(triangles, vertices);
   std::vector<Index> fans = singletons(3 * triangles.size());
   const auto corner_at = [&](std::size_t half_edge, Index v) {
     const std::size_t t = half_edge / 3, k = half_edge % 3;
@@ -62,16 +62,13 @@ class Complex {
  public:
   Complex(const Surface& surface, const RestrictedPolygons& polygons)
       : triangles_(surface.mesh.triangles), diagram_(polygons), begin_(first_polygons(polygons, triangles_.size())),
-        table_(edge_table(triangles_, surface.mesh.vertices.size())), twin_(3 * triangles_.size(), kBorder),
-        polygon_at_(surface.mesh.vertices.size(), kNone), piece_at_(surface.mesh.vertices.size(), kNone),
-        parts_(singletons(polygons.pairs.size())), lines_(singletons(polygons.labels.size())) {
-    parallel_each(table_.edges.size(), [&](std::size_t e) {
-      if (table_.half_edges.size(e) != 2) return;
-      const std::size_t g = table_.half_edges.begin(e)[0], h = table_.half_edges.begin(e)[1];
-      if (is_read(g / 3) && is_read(h / 3)) make_twins(g, h);
-    });
-    for (std::size_t e = 0; e < table_.edges.size(); ++e)
-      if (table_.half_edges.size(e) > 2) link_several(e);
+        twin_(3 * triangles_.size(), kBorder) {
+    const std::size_t vertices = surface.mesh.vertices.size();
+    link_triangles(edge_table(triangles_, vertices));
+    polygon_at_.assign(vertices, kNone);
+    piece_at_.assign(vertices, kNone);
+    parts_ = singletons(polygons.pairs.size());
+    lines_ = singletons(polygons.labels.size());
     Index cells = 0;
     for (const auto& pair : diagram_.pairs) cells = std::max(cells, pair.cell + 1);
     of_cell_ = group_into_rows<Index>(cells, [&](const auto& put) {
@@ -109,10 +106,20 @@ class Complex {
     twin_[h] = static_cast<Index>(g);
   }
 
+  void link_triangles(const EdgeTable& table) {
+    parallel_each(table.edges.size(), [&](std::size_t e) {
+      if (table.half_edges.size(e) != 2) return;
+      const std::size_t g = table.half_edges.begin(e)[0], h = table.half_edges.begin(e)[1];
+      if (is_read(g / 3) && is_read(h / 3)) make_twins(g, h);
+    });
+    for (std::size_t e = 0; e < table.edges.size(); ++e)
+      if (table.half_edges.size(e) > 2) link_several(table.half_edges.begin(e), table.half_edges.end(e));
+  }
+
   // An edge of more than two triangles, some of which may have no polygons.
-  void link_several(std::size_t edge) {
+  void link_several(const std::size_t* begin, const std::size_t* end) {
     std::vector<std::size_t> around;
-    for (const std::size_t* h = table_.half_edges.begin(edge); h != table_.half_edges.end(edge); ++h)
+    for (const std::size_t* h = begin; h != end; ++h)
       if (is_read(*h / 3)) around.push_back(*h);
     if (around.size() == 2) make_twins(around[0], around[1]);
     if (around.size() <= 2) return;
@@ -372,7 +379,7 @@ class Complex {
   void forgive_singular_vertices(BallReport& report) const {
     const auto suspect = [](const BallReport::Cell& c) { return c.components == 1 && c.euler == 1 && c.loops != 1; };
     if (std::none_of(report.cells.begin(), report.cells.end(), suspect)) return;
-    const std::vector<char> singular = singular_vertices(triangles_, polygon_at_.size(), table_);
+    const std::vector<char> singular = singular_vertices(triangles_, polygon_at_.size());
     std::vector<char> touched(of_cell_.rows(), 0);
     for (std::size_t v = 0; v < singular.size(); ++v)
       if (singular[v] && polygon_at_[v] != kNone) touched[diagram_.pairs[polygon_at_[v]].cell] = 1;
@@ -382,7 +389,6 @@ class Complex {
   const std::vector<Triangle>& triangles_;
   const RestrictedPolygons& diagram_;
   std::vector<std::size_t> begin_;  // first polygon of each triangle
-  EdgeTable table_;
   std::vector<Index> twin_;  // of each half-edge of a triangle with polygons
   std::map<std::size_t, std::vector<std::size_t>>
       several_;                    // all half-edges on the same mesh edge, where more than two
