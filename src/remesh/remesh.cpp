@@ -339,8 +339,7 @@ void Pipeline::mend_features_and_topology() {
 }
 
 Pipeline::Divided Pipeline::divide_sheets() {
-  const RestrictedPolygons& undivided =
-      run_.diagram(topology_.sheets.empty() ? Want::labels : Want::polygons).polygons;
+  const RestrictedPolygons& undivided = run_.diagram(topology_.sheets.empty() ? Want::labels : Want::polygons).polygons;
   Divided result{{}, run_.seeds.positions(), check_ball_property(surface_, undivided)};
   if (topology_.sheets.empty() || result.ball.holds) return result;
   RestrictedPolygons polygons = undivided;

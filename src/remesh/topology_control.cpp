@@ -506,7 +506,7 @@ class Control {
   TopologyOutcome outcome_;
   std::vector<Cut> cuts_;
   std::vector<char> lost_;                        // by curve: cut at the beginning, and so left as it is
-  Want parts_ = Want::labels;  // of a diagram
+  Want parts_ = Want::labels;                     // of a diagram
   const RestrictedPolygons* polygons_ = nullptr;  // of the run's diagram, or divided_
   RestrictedPolygons divided_;
   std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells

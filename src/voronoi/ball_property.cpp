@@ -389,7 +389,7 @@ class Complex {
   const std::vector<Triangle>& triangles_;
   const RestrictedPolygons& diagram_;
   std::vector<std::size_t> begin_;  // first polygon of each triangle
-  std::vector<Index> twin_;  // of each half-edge of a triangle with polygons
+  std::vector<Index> twin_;         // of each half-edge of a triangle with polygons
   std::map<std::size_t, std::vector<std::size_t>>
       several_;                    // all half-edges on the same mesh edge, where more than two
   Csr<Index> of_cell_;             // polygons of each cell

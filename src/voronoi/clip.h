@@ -130,7 +130,7 @@ class Clipper {
   std::size_t line_count_ = 0;
   Polygon polygon_, kept_;
   Screens screens_;
-  std::vector<Splat> splats_;    // the polygon's corners, scaled
+  std::vector<Splat> splats_;  // the polygon's corners, scaled
   std::vector<signed char> sides_;
   std::vector<double> densities_;
   bool uncertain_ = false, wider_ = false;

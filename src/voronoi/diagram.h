@@ -49,8 +49,8 @@ struct DiagramWork {
   double clip = 0;                      // clipping and sums
 };
 
-// Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it; `labels` are the polygons
-// without their vertices.
+// Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it; `labels` are the
+// polygons without their vertices.
 enum class Want : unsigned { moments = 0, labels = 1, polygons = 3, polyhedra = 4, dual = 8 };
 
 constexpr Want operator|(Want a, Want b) {

@@ -125,8 +125,7 @@ bool KnownPolygons::is_certain(const Batch& batch, const Vertex& vertex) const {
   const std::size_t listed = static_cast<std::size_t>(list.end - list.begin);
   CellScreen& screen = screens_->of(slot, list);
   const auto near_of = [&](std::size_t block) {
-    return may_cut(screens_->block(screen, slot, list, block), reach.margin,
-                   [&](const auto& test) { test(x, y, z); });
+    return may_cut(screens_->block(screen, slot, list, block), reach.margin, [&](const auto& test) { test(x, y, z); });
   };
   // Two blocks at a time, of which most vertices need no more.
   for (std::size_t k = 0; k < std::min(listed, CellScreen::kListed); k += 8) {

@@ -3,8 +3,9 @@
 //
 // A facet is divided as before if every vertex of the division is there as before: it lies within the facet, and no
 // other seed is as near to it as those whose cells meet in it; a corner of the facet is owned by the cell that had it.
-// For then the boundary of each cell on the facet, which is convex, runs along each of its lines from one of its vertices
-// to the next, and closes; and as the facet's own edges are where they were, all polygons turn the way they did.
+// For then the boundary of each cell on the facet, which is convex, runs along each of its lines from one of its
+// vertices to the next, and closes; and as the facet's own edges are where they were, all polygons turn the way they
+// did.
 #pragma once
 
 #include <span>

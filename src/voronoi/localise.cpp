@@ -416,8 +416,7 @@ void Localiser::Work::each_cell_beside(Index cell, const Triangles& piece, const
         if (!is_left_out(beyond, cell)) continue;
         const Row there = row(beyond);
         for (std::size_t q = there.begin; q < there.end; ++q)
-          if (there.has_label(q, kEdgeLabel | other % 3))
-            body(beyond, there.polygons->pairs[q].cell);
+          if (there.has_label(q, kEdgeLabel | other % 3)) body(beyond, there.polygons->pairs[q].cell);
       }
     }
   }
@@ -540,8 +539,7 @@ Triangles Localiser::Work::beside(const Triangles& triangles) const {
   Triangles found;
   for (const Index t : triangles)
     for (std::size_t h = std::size_t{3} * t; h < std::size_t{3} * t + 3; ++h)
-      for (const Index other : across.of(h))
-        found.push_back(other / 3);
+      for (const Index other : across.of(h)) found.push_back(other / 3);
   sort_unique(found);
   return found;
 }

@@ -19,8 +19,8 @@ struct PolygonBatch {
   // other seed.
   Row seed[3];
   Row edge[kMost], other[kMost][3];
-  // Results: vertices relative to the seed, their squared lengths, bounds of the errors of their coordinates, 1 where all
-  // are certain to lie within the facet; moments.
+  // Results: vertices relative to the seed, their squared lengths, bounds of the errors of their coordinates, 1 where
+  // all are certain to lie within the facet; moments.
   Row at[kMost][3], squared[kMost], slack[kMost], fits;
   Row mass, first[3], second;
 };

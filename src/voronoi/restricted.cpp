@@ -132,11 +132,11 @@ struct RestrictedVoronoi::Work {
   SortedSeeds seeds;
   Neighbours neighbours;
   NeighbourSource built_source = NeighbourSource::nearest;
-  std::vector<Index> owner;                   // slot of each used vertex
+  std::vector<Index> owner;  // slot of each used vertex
   std::vector<Chunk> chunks;
-  std::uint64_t generation = 0;               // of `seeds`
+  std::uint64_t generation = 0;  // of `seeds`
   ThreadLocal<Walker> walkers;
-  unsigned chunk_bits = 0;                    // a chunk has two to this power facets
+  unsigned chunk_bits = 0;         // a chunk has two to this power facets
   std::vector<Index> first_entry;  // of each facet, in its chunk
   bool followed = false;           // the slots are those of the last diagram
   std::vector<Index> slot_now;     // else, of each of the last slots; kNone where that is unknown
@@ -254,7 +254,8 @@ bool RestrictedVoronoi::Work::recall(std::size_t begin, std::size_t end, Chunk& 
     }
     for (std::size_t k = first; k < stop; ++k) {
       const Entry& entry = chunk.entries[k];
-      walker.known.add(static_cast<Index>(facet), entry.slot, chunk.labels_of(entry), chunk.moments[entry.moments], changed);
+      walker.known.add(static_cast<Index>(facet), entry.slot, chunk.labels_of(entry), chunk.moments[entry.moments],
+                       changed);
     }
   }
   walker.known.finish();
@@ -451,7 +452,7 @@ void RestrictedVoronoi::Work::relate(const SortedSeeds& last, const std::vector<
 
 DiagramWork RestrictedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, bool want_moments,
                                               Want want, Diagram& diagram) {
-    DiagramWork work;
+  DiagramWork work;
   Stopwatch watch;
   followed = follow(given, source);
   if (!followed) {

@@ -96,8 +96,8 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
     }
     f.anchor = static_cast<unsigned char>(std::min_element(v.begin(), v.end()) - v.begin());
     const Vec3 origin = summary.anchor = f.corners[f.anchor];
-    summary.moments = triangle_moments(f.corners[0] - origin, f.corners[1] - origin, f.corners[2] - origin,
-                                       at[0], at[1], at[2], 0.5 * twice_area);
+    summary.moments = triangle_moments(f.corners[0] - origin, f.corners[1] - origin, f.corners[2] - origin, at[0],
+                                       at[1], at[2], 0.5 * twice_area);
     std::sort(edges.begin(), edges.end());
     for (unsigned char r = 0; r < 3; ++r) f.rank[edges[r][2]] = r;
     facet_of[t] = static_cast<Index>(place);

@@ -316,8 +316,9 @@ TEST(Restricted, FollowsSeedsThatMoveByAFractionOfTheirSpacing) {
   }
 }
 
-// Facets that stay divided as they were are certified vertex by vertex and computed several polygons at a time. Whatever
-// happens to the seeds, and whatever instructions are used, no bit may differ from a diagram that knows nothing.
+// Facets that stay divided as they were are certified vertex by vertex and computed several polygons at a time.
+// Whatever happens to the seeds, and whatever instructions are used, no bit may differ from a diagram that knows
+// nothing.
 TEST(Restricted, WhatIsKnownOfFacetsChangesNoBit) {
   struct Case {
     const char* name;
