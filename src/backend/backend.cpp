@@ -29,7 +29,8 @@ DiagramSeconds& operator+=(DiagramSeconds& a, const DiagramSeconds& b) {
 
 EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   if (seeds.empty()) throw Error("there are no seeds; give at least one");
-  const Want computed = includes(want, Want::dual) ? want | Want::labels : want;
+  const Want computed =
+      (want & (Want::polygons | Want::polyhedra)) | (includes(want, Want::dual) ? Want::labels : Want::moments);
   if (!includes(offers_, computed)) throw std::logic_error("a backend of a surface was asked for polyhedra");
   const EvaluationReport report = compute(seeds, computed, diagram);
   if (!includes(computed, Want::labels)) diagram.polygons = {};

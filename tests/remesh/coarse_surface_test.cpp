@@ -179,7 +179,7 @@ TEST(CoarseSurface, IsFinerWhereTheDensityIsHigher) {
   std::vector<double> density;
   for (const Vec3& v : mesh.vertices) density.push_back(v.z > 0 ? 256 : 1);  // edges a quarter as long
   const Surface fine(mesh, density);
-  const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.4).surface;
+  const std::unique_ptr<Surface> coarse = coarse_surface(fine, {}, 0.3).surface;
   ASSERT_NO_FATAL_FAILURE(expect_stands_in(fine, coarse.get()));
   ASSERT_EQ(coarse->density.size(), coarse->mesh.vertices.size());
   const auto above =

@@ -310,7 +310,7 @@ struct Problem {
   void expect_sound(std::size_t count) {
     EXPECT_EQ(run.seeds.size(), count);
     const int evaluations = run.totals.evaluations;
-    const Diagram& found = run.diagram(Want::polygons);
+    const Diagram& found = run.diagram(run.traced());
     EXPECT_EQ(run.totals.evaluations, evaluations) << "the final diagram is at hand";
     const Diagram d = diagram_of(surface, run.seeds.positions(), NeighbourSource::nearest);
     EXPECT_EQ(triples_of(found.polygons), triples_of(d.polygons));
