@@ -1,35 +1,44 @@
-// Included by known_polygons.cpp, once for each set of instructions (core/lanes.h).
+// Included by known_polygons.cpp, once for each set of instructions (core/lanes.h). The operations are those of
+// Clipper's start(), begin(), place_lines(), add_line(), meet() and integrate() in their order, lane by lane, so the
+// bits are the same.
 
-// The same operations in the same order as Clipper's start(), begin(), place_lines(), add_line(), meet() and
-// integrate(), lane by lane, so the same bits.
-template <bool kUniform>
-inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
+// Some lanes of a batch.
+struct PolygonLanes {
+  PolygonBatch& batch;
+  std::size_t from;
+
   using Row = PolygonBatch::Row;
-  constexpr std::size_t kMostCorners = PolygonBatch::kMost;
-  const auto load = [from](const Row& row) __attribute__((always_inline)) {
-    return *reinterpret_cast<const Numbers*>(row + from);
-  };
-  const auto load3 = [&](const Row* rows) __attribute__((always_inline)) {
-    return Lanes3{load(rows[0]), load(rows[1]), load(rows[2])};
-  };
-  const auto store = [from](Row& row, const Numbers& n) __attribute__((always_inline)) {
-    *reinterpret_cast<Numbers*>(row + from) = n;
-  };
-  const auto store3 = [&](Row* rows, const Lanes3& n) __attribute__((always_inline)) {
+  Numbers load(const Row& row) const { return *reinterpret_cast<const Numbers*>(row + from); }
+  Lanes3 load3(const Row* rows) const { return {load(rows[0]), load(rows[1]), load(rows[2])}; }
+  void store(Row& row, const Numbers& n) const { *reinterpret_cast<Numbers*>(row + from) = n; }
+  void store3(Row* rows, const Lanes3& n) const {
     store(rows[0], n.x);
     store(rows[1], n.y);
     store(rows[2], n.z);
-  };
+  }
+};
+
+// The vertices of the polygons, relative to the seeds.
+struct Placed {
+  Lanes3 anchor, at[PolygonBatch::kMost];
+  Numbers squared[PolygonBatch::kMost];
+  Masks on_edge[PolygonBatch::kMost][3];  // whether the edge that starts there lies on one of the facet's
+  Masks is_corner[PolygonBatch::kMost];   // of the facet
+};
+
+// Sets them, and what the certificate needs of them.
+inline void place(const PolygonLanes& lanes, Placed& placed) {
+  PolygonBatch& batch = lanes.batch;
   const std::size_t n = batch.corners;
   const Numbers zero{}, one = zero + 1;
-  const Lanes3 seed = load3(batch.seed), normal = load3(batch.normal);
+  const Lanes3 seed = lanes.load3(batch.seed), normal = lanes.load3(batch.normal);
   Lanes3 local[3];
   Numbers reach = zero;
   for (int k = 0; k < 3; ++k) {
-    local[k] = load3(batch.corner[k]) - seed;
+    local[k] = lanes.load3(batch.corner[k]) - seed;
     reach = largest(reach, largest(absolute(local[k].x), largest(absolute(local[k].y), absolute(local[k].z))));
   }
-  const Lanes3 anchor = load3(batch.anchor) - seed;
+  const Lanes3 anchor = placed.anchor = lanes.load3(batch.anchor) - seed;
   const Numbers height = dot(normal, anchor);
   const Lanes3 foot = times(height, normal);
 
@@ -41,8 +50,8 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
   Numbers edge_size[3];
   Masks runs_on[3];
   for (int k = 0; k < 3; ++k) {
-    const Masks own = load(batch.runs_on[k]) > 0;
-    const Lanes3 here = load3(batch.corner[k]), next = load3(batch.corner[(k + 1) % 3]);
+    const Masks own = lanes.load(batch.runs_on[k]) > 0;
+    const Lanes3 here = lanes.load3(batch.corner[k]), next = lanes.load3(batch.corner[(k + 1) % 3]);
     Line& line = edges[k];
     line.along = select(own, here, next) - select(own, next, here);
     line.m = cross(line.along, normal);
@@ -51,15 +60,15 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     runs_on[k] = own;
     edge_size[k] = absolute(line.m.x) + absolute(line.m.y) + absolute(line.m.z);
   }
-  Line lines[kMostCorners];
-  Masks on_edge[kMostCorners][3];
+  Line lines[PolygonBatch::kMost];
+  auto& on_edge = placed.on_edge;
   for (std::size_t k = 0; k < n; ++k) {
     Line& line = lines[k];
-    line.m = load3(batch.other[k]) - seed;
+    line.m = lanes.load3(batch.other[k]) - seed;
     line.along = cross(normal, line.m);
     line.squared = norm2(line.m);
     line.offset = 0.5 * line.squared - height * dot(normal, line.m);
-    const Numbers edge = load(batch.edge[k]);
+    const Numbers edge = lanes.load(batch.edge[k]);
     for (int e = 0; e < 3; ++e) {
       const Masks mask = on_edge[k][e] = edge == zero + e;
       line.m = select(mask, edges[e].m, line.m);
@@ -70,9 +79,8 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
   }
 
   Masks fits = one > 0;
-  Lanes3 at[kMostCorners];
-  Numbers squared[kMostCorners];
-  Masks is_corner[kMostCorners];
+  auto& at = placed.at;
+  auto& squared = placed.squared;
   for (std::size_t k = 0; k < n; ++k) {
     const std::size_t previous = k ? k - 1 : n - 1;
     const Line &before = lines[previous], &after = lines[k];
@@ -85,35 +93,44 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
     const Numbers slack = (1001 * kUnit) * reach * (1 + squares * (inverse * inverse));
     const Masks edge_before = on_edge[previous][0] | on_edge[previous][1] | on_edge[previous][2];
     const Masks edge_after = on_edge[k][0] | on_edge[k][1] | on_edge[k][2];
-    const Masks corner = is_corner[k] = edge_before & edge_after;
+    const Masks corner = placed.is_corner[k] = edge_before & edge_after;
     const Lanes3 facet_corner = select(on_edge[k][0], local[0], select(on_edge[k][1], local[1], local[2]));
     at[k] = select(corner, facet_corner, foot + w);
     const Numbers error = corner ? kCornerSlack * reach : slack;
     Masks inside = square > kShallow * squares;
     for (int e = 0; e < 3; ++e) {
       const Numbers above = dot(edges[e].m, at[k] - local[e]);
-      inside &= on_edge[previous][e] | on_edge[k][e] |
-                ((runs_on[e] ? above : -above) > 2 * error * edge_size[e] + kTiny);
+      inside &=
+          on_edge[previous][e] | on_edge[k][e] | ((runs_on[e] ? above : -above) > 2 * error * edge_size[e] + kTiny);
     }
     fits &= corner | inside;
-    store3(batch.at[k], at[k]);
+    lanes.store3(batch.at[k], at[k]);
     squared[k] = norm2(at[k]);
-    store(batch.squared[k], squared[k]);
-    store(batch.slack[k], error);
+    lanes.store(batch.squared[k], squared[k]);
+    lanes.store(batch.slack[k], error);
   }
-  store(batch.fits, fits ? one : zero);
+  lanes.store(batch.fits, fits ? one : zero);
+}
 
-  Numbers densities[kMostCorners];
+template <bool kUniform>
+inline void integrate(const PolygonLanes& lanes, const Placed& placed) {
+  PolygonBatch& batch = lanes.batch;
+  const std::size_t n = batch.corners;
+  const Numbers zero{};
+  const Lanes3 normal = lanes.load3(batch.normal);
+  const auto& at = placed.at;
+  const auto& squared = placed.squared;
+  Numbers densities[PolygonBatch::kMost];
   if constexpr (!kUniform) {
-    const Numbers r[3] = {load(batch.density[0]), load(batch.density[1]), load(batch.density[2])};
+    const Numbers r[3] = {lanes.load(batch.density[0]), lanes.load(batch.density[1]), lanes.load(batch.density[2])};
     const Numbers lowest = least(least(r[0], r[1]), r[2]), highest = largest(largest(r[0], r[1]), r[2]);
-    const Numbers r_anchor = load(batch.anchor_density);
-    const Lanes3 gradient = load3(batch.gradient);
+    const Numbers r_anchor = lanes.load(batch.anchor_density);
+    const Lanes3 gradient = lanes.load3(batch.gradient);
     for (std::size_t k = 0; k < n; ++k) {
-      const Numbers value = r_anchor + dot(gradient, at[k] - anchor);
+      const Numbers value = r_anchor + dot(gradient, at[k] - placed.anchor);
       const Numbers within = least(largest(value, lowest), highest);
-      const Numbers of_corner = on_edge[k][0] ? r[0] : (on_edge[k][1] ? r[1] : r[2]);
-      densities[k] = is_corner[k] ? of_corner : within;
+      const Numbers of_corner = placed.on_edge[k][0] ? r[0] : (placed.on_edge[k][1] ? r[1] : r[2]);
+      densities[k] = placed.is_corner[k] ? of_corner : within;
     }
   }
   const Lanes3 a = at[0];
@@ -132,20 +149,23 @@ inline void compute_lanes(PolygonBatch& batch, std::size_t from) {
       const Numbers s = ra + rb + rc;
       const Lanes3 weighted = times(s + ra, a) + times(s + rb, b) + times(s + rc, c);
       const Numbers squares = (s + ra + ra) * squared[0] + (s + rb + rb) * squared[k] + (s + rc + rc) * squared[k + 1];
-      const Numbers products =
-          (s + ra + rb) * dot(a, b) + (s + rb + rc) * dot(b, c) + (s + rc + ra) * dot(c, a);
+      const Numbers products = (s + ra + rb) * dot(a, b) + (s + rb + rc) * dot(b, c) + (s + rc + ra) * dot(c, a);
       mass += (kThird * area) * s;
       first = first + times(kTwelfth * area, weighted);
       second += (kThirtieth * area) * (squares + products);
     }
   }
-  store(batch.mass, mass);
-  store3(batch.first, first);
-  store(batch.second, second);
+  lanes.store(batch.mass, mass);
+  lanes.store3(batch.first, first);
+  lanes.store(batch.second, second);
 }
 
 inline void compute(PolygonBatch& batch, bool uniform) {
-  for (std::size_t from = 0; from < PolygonBatch::kLanes; from += kWidth)
-    if (uniform) compute_lanes<true>(batch, from);
-    else compute_lanes<false>(batch, from);
+  for (std::size_t from = 0; from < PolygonBatch::kLanes; from += kWidth) {
+    const PolygonLanes lanes{batch, from};
+    Placed placed;
+    place(lanes, placed);
+    if (uniform) integrate<true>(lanes, placed);
+    else integrate<false>(lanes, placed);
+  }
 }
