@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/append_range.h"
 #include "core/marks.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -299,17 +300,13 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
   polyhedra.labels.reserve(labels);
   polyhedra.triples.reserve(vertices);
   polyhedra.vertices.reserve(vertices);
-  const auto append = [](auto& to, const auto& from, std::size_t begin, std::size_t end) {
-    to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(begin),
-              from.begin() + static_cast<std::ptrdiff_t>(end));
-  };
   for (const Item& item : items) {
     const ClippedPolyhedra& from = *item.from;
     const std::size_t k = item.place;
     polyhedra.pairs.push_back(from.pairs[k]);
-    append(polyhedra.labels, from.labels, from.label_offsets[k], from.label_offsets[k + 1]);
-    append(polyhedra.triples, from.triples, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
-    append(polyhedra.vertices, from.vertices, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
+    append_range(polyhedra.labels, from.labels, from.label_offsets[k], from.label_offsets[k + 1]);
+    append_range(polyhedra.triples, from.triples, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
+    append_range(polyhedra.vertices, from.vertices, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
     polyhedra.label_offsets.push_back(polyhedra.labels.size());
     polyhedra.vertex_offsets.push_back(polyhedra.triples.size());
   }

@@ -61,11 +61,10 @@ void KnownPolygons::add(Index index, Index slot, std::span<const Index> labels, 
     numbers.runs_on[k][lane] = facet.origin[k] == k;
   }
   put(numbers.normal, facet.normal);
-  put(numbers.anchor, facet.corners[facet.anchor]);
+  numbers.anchor[lane] = facet.anchor;
   put(numbers.seed, seeds_->x[slot]);
   if (const FacetDensity* density = surface_->density_of(index)) {
     for (int k = 0; k < 3; ++k) numbers.density[k][lane] = density->at[k];
-    numbers.anchor_density[lane] = density->at[facet.anchor];
     put(numbers.gradient, density->gradient);
   }
   for (std::size_t k = 0; k < count; ++k) {

@@ -12,9 +12,9 @@ struct PolygonBatch {
   std::size_t corners = 0;
   // Of the facet.
   alignas(64) Row corner[3][3];
-  Row normal[3], anchor[3];
-  Row runs_on[3];  // of each edge: 1 if its line runs from its own corner, else 0
-  Row density[3], anchor_density, gradient[3];
+  Row normal[3], anchor;  // which of the corners
+  Row runs_on[3];         // of each edge: 1 if its line runs from its own corner, else 0
+  Row density[3], gradient[3];
   // The seed; of each corner of the polygon, the line of the edge that starts there: the facet's edge, or -1 and the
   // other seed.
   Row seed[3];

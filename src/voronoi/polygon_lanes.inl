@@ -38,8 +38,9 @@ inline void place(const PolygonLanes& lanes, Placed& placed) {
     local[k] = lanes.load3(batch.corner[k]) - seed;
     reach = largest(reach, largest(absolute(local[k].x), largest(absolute(local[k].y), absolute(local[k].z))));
   }
-  const Lanes3 anchor = placed.anchor = lanes.load3(batch.anchor) - seed;
-  const Numbers height = dot(normal, anchor);
+  const Numbers which = lanes.load(batch.anchor);
+  placed.anchor = select(which == zero, local[0], select(which == one, local[1], local[2]));
+  const Numbers height = dot(normal, placed.anchor);
   const Lanes3 foot = times(height, normal);
 
   struct Line {
@@ -124,7 +125,8 @@ inline void integrate(const PolygonLanes& lanes, const Placed& placed) {
   if constexpr (!kUniform) {
     const Numbers r[3] = {lanes.load(batch.density[0]), lanes.load(batch.density[1]), lanes.load(batch.density[2])};
     const Numbers lowest = least(least(r[0], r[1]), r[2]), highest = largest(largest(r[0], r[1]), r[2]);
-    const Numbers r_anchor = lanes.load(batch.anchor_density);
+    const Numbers which = lanes.load(batch.anchor);
+    const Numbers r_anchor = which == zero ? r[0] : (which == zero + 1 ? r[1] : r[2]);
     const Lanes3 gradient = lanes.load3(batch.gradient);
     for (std::size_t k = 0; k < n; ++k) {
       const Numbers value = r_anchor + dot(gradient, at[k] - placed.anchor);

@@ -2,6 +2,8 @@
 
 #include <numeric>
 
+#include "core/append_range.h"
+
 namespace bisector {
 
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
@@ -28,13 +30,11 @@ std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std:
 void append_polygons(const RestrictedPolygons& from, std::size_t begin, std::size_t end, RestrictedPolygons& out) {
   if (out.offsets.empty()) out.offsets.push_back(0);
   if (begin == end) return;
-  const auto at = [](std::size_t k) { return static_cast<std::ptrdiff_t>(k); };
-  out.pairs.insert(out.pairs.end(), from.pairs.begin() + at(begin), from.pairs.begin() + at(end));
+  append_range(out.pairs, from.pairs, begin, end);
   const std::size_t first = from.offsets[begin], last = from.offsets[end], before = out.labels.size();
   for (std::size_t p = begin; p < end; ++p) out.offsets.push_back(before + from.offsets[p + 1] - first);
-  out.labels.insert(out.labels.end(), from.labels.begin() + at(first), from.labels.begin() + at(last));
-  if (!from.vertices.empty())
-    out.vertices.insert(out.vertices.end(), from.vertices.begin() + at(first), from.vertices.begin() + at(last));
+  append_range(out.labels, from.labels, first, last);
+  if (!from.vertices.empty()) append_range(out.vertices, from.vertices, first, last);
 }
 
 double polygon_area(const RestrictedPolygons& polygons, std::size_t polygon) {

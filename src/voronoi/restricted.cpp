@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "core/append_range.h"
 #include "core/marks.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -61,12 +62,6 @@ struct Chunk {
   // Appends these entries of another chunk, which follow each other.
   void append(const Chunk& from, std::size_t begin, std::size_t end);
 };
-
-template <class T>
-void append_range(std::vector<T>& to, const std::vector<T>& from, std::size_t begin, std::size_t end) {
-  const auto at = [](std::size_t k) { return static_cast<std::ptrdiff_t>(k); };
-  to.insert(to.end(), from.begin() + at(begin), from.begin() + at(end));
-}
 
 void Chunk::reserve_for(const Chunk& other) {
   const auto reserve = [](auto& room, std::size_t size) { room.reserve(size + size / 16 + 16); };
@@ -164,7 +159,7 @@ struct RestrictedVoronoi::Work {
   std::size_t chunk_of(std::size_t facet) const { return facet >> chunk_bits; }
   // What has become of a slot of the last diagram.
   Index now(Index slot) const { return followed ? slot : slot < slot_now.size() ? slot_now[slot] : kNone; }
-  std::size_t entries_end(std::size_t facet, const Chunk& chunk, const std::vector<Index>& first) const;
+  std::size_t entries_end(std::size_t facet, const Chunk& chunk) const;
   void sort_items();
   PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
@@ -242,7 +237,7 @@ bool RestrictedVoronoi::Work::recall(std::size_t begin, std::size_t end, Chunk& 
   walker.known.begin(surface, seeds, neighbours, owner.data(), walker.clipper.screens());
   for (std::size_t facet = begin; facet < end; ++facet) {
     char& changed = walker.changed[facet - begin];
-    const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk, first_entry);
+    const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk);
     if (!followed)
       for (std::size_t k = first; k < stop; ++k) changed |= !relabel(chunk.entries[k], chunk);
     const bool whole = is_whole(facet);
@@ -275,7 +270,7 @@ void RestrictedVoronoi::Work::renew(std::size_t begin, std::size_t end, Chunk& c
     std::size_t next = facet;
     while (next < end && !walker.changed[next - begin]) ++next;
     const Index first = first_entry[facet], before = static_cast<Index>(renewed.entries.size());
-    renewed.append(chunk, first, entries_end(next - 1, chunk, first_entry));
+    renewed.append(chunk, first, entries_end(next - 1, chunk));
     for (; facet < next; ++facet) first_entry[facet] += before - first;
   }
   renewed.first_label.push_back(static_cast<Index>(renewed.labels.size()));
@@ -283,10 +278,9 @@ void RestrictedVoronoi::Work::renew(std::size_t begin, std::size_t end, Chunk& c
   std::swap(chunk, renewed);
 }
 
-std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk& chunk,
-                                                 const std::vector<Index>& first) const {
-  const bool last = facet + 1 == first.size() || chunk_of(facet + 1) != chunk_of(facet);
-  return last ? chunk.entries.size() : first[facet + 1];
+std::size_t RestrictedVoronoi::Work::entries_end(std::size_t facet, const Chunk& chunk) const {
+  const bool last = facet + 1 == first_entry.size() || chunk_of(facet + 1) != chunk_of(facet);
+  return last ? chunk.entries.size() : first_entry[facet + 1];
 }
 
 Walker& RestrictedVoronoi::Work::local_walker() {
@@ -331,7 +325,7 @@ void RestrictedVoronoi::Work::sort_items() {
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
       const Chunk& chunk = chunks[chunk_of(facet)];
-      const std::size_t stop = entries_end(facet, chunk, first_entry);
+      const std::size_t stop = entries_end(facet, chunk);
       for (std::size_t k = first_entry[facet]; k < stop; ++k) visit(facet, chunk.entries[k]);
     }
   };
@@ -511,7 +505,7 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons, bool wi
       const Index facet = surface.facet_of[t];
       if (facet == kNone) continue;
       const Chunk& chunk = chunks[chunk_of(facet)];
-      const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk, first_entry);
+      const std::size_t first = first_entry[facet], stop = entries_end(facet, chunk);
       count.pair += stop - first;
       for (std::size_t k = first; k < stop; ++k)
         count.corner += chunk.entries[k].moments == kWhole ? 3 : chunk.labels_of(chunk.entries[k]).size();
@@ -536,7 +530,7 @@ void RestrictedVoronoi::Work::set_polygons(RestrictedPolygons& polygons, bool wi
       if (facet == kNone) continue;
       const Chunk& chunk = chunks[chunk_of(facet)];
       const Entry* all = chunk.entries.data();
-      entries.assign(all + first_entry[facet], all + entries_end(facet, chunk, first_entry));
+      entries.assign(all + first_entry[facet], all + entries_end(facet, chunk));
       std::sort(entries.begin(), entries.end(),
                 [&](const Entry& a, const Entry& b) { return seeds.id[a.slot] < seeds.id[b.slot]; });
       if (with_vertices) clipper.begin(surface, facet);

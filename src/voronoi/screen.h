@@ -8,26 +8,12 @@
 #include <cstdint>
 #include <limits>
 
-#if defined(__SSE__)
-#include <xmmintrin.h>
-#endif
-
 #include "core/geometry.h"
 
 namespace bisector {
 
 typedef float FourFloats __attribute__((vector_size(4 * sizeof(float)), may_alias));
 typedef std::int32_t FourMasks __attribute__((vector_size(4 * sizeof(float))));
-
-// Bit m is set if mask m is.
-inline unsigned first_bits(const FourMasks& masks) {
-#if defined(__SSE__)
-  return static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<__m128>(masks)));
-#else
-  return (static_cast<unsigned>(masks[0]) & 1) | (static_cast<unsigned>(masks[1]) & 2) |
-         (static_cast<unsigned>(masks[2]) & 4) | (static_cast<unsigned>(masks[3]) & 8);
-#endif
-}
 
 // The power of two that scales the seeds' extent to about 1.
 inline double screen_scale(double extent) { return extent > 0 ? std::ldexp(1.0, -std::ilogb(extent)) : 1; }
@@ -84,7 +70,8 @@ inline unsigned may_cut(const ScreenBlock& block, float margin, const EachVertex
   const FourFloats limit = load(block.half) - margin;
   FourMasks before = ~FourMasks{};
   each_vertex([&](const auto& px, const auto& py, const auto& pz) { before &= x * px + y * py + z * pz < limit; });
-  return 15 & ~first_bits(before);
+  return (~static_cast<unsigned>(before[0]) & 1) | (~static_cast<unsigned>(before[1]) & 2) |
+         (~static_cast<unsigned>(before[2]) & 4) | (~static_cast<unsigned>(before[3]) & 8);
 }
 
 }  // namespace bisector
