@@ -212,17 +212,32 @@ bool TetClipper::clip(const TetFrame& tet) {
     if (!bounded_) bound();
     if (list_.radius == kInfinity || reach_.is_safe_from(list_.radius * list_.radius)) return true;
     wider_ = true;
-    list_ = neighbours_->wider(slot_, list_);
-    loaded_ = 0;
+    widen();
   }
 }
 
-void TetClipper::narrow(const TetFrame& around) {
+void TetClipper::widen() {
+  list_ = neighbours_->wider(slot_, list_);
+  loaded_ = 0;
+}
+
+void TetClipper::cut_by_listed(const TetFrame& around) {
   start(around);
   const std::size_t count = static_cast<std::size_t>(list_.end - list_.begin);
-  for (std::size_t k = 0; k < count; k += 4) {
+  for (std::size_t k = 0; k < count; k += 4)
     if (!cut_by_block(k, count)) return;
-  }
+}
+
+bool TetClipper::lists_all() const { return list_.radius == kInfinity; }
+
+bool TetClipper::is_certain(std::size_t v) const {
+  const Reach reach(norm2(vertices_[v].at), vertices_[v].slack, tet_squared_, scale_);
+  return lists_all() || reach.is_safe_from(list_.radius * list_.radius);
+}
+
+void TetClipper::narrow(const TetFrame& around) {
+  cut_by_listed(around);
+  if (size_ == 0) return;
   collect();
   std::sort(bounding_.begin(), bounding_.end(), [&](Index a, Index b) {
     return planes_[a].squared != planes_[b].squared ? planes_[a].squared < planes_[b].squared

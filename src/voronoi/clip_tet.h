@@ -50,6 +50,15 @@ class TetClipper {
   // Clips the tetrahedron, which must outlive the use of the result. False if the (perturbed) intersection is empty.
   bool clip(const TetFrame& tet);
 
+  // Cuts the tetrahedron by the cell's listed neighbours alone, whatever the list leaves out; widen() takes a list that
+  // reaches farther. For a tetrahedron that the cell meets.
+  void cut_by_listed(const TetFrame& around);
+  void widen();
+  // Whether the list leaves out nothing that could bound the cell.
+  bool lists_all() const;
+  // Whether no seed that is left out can be as near to vertex v as the cell's own.
+  bool is_certain(std::size_t v) const;
+
   // Takes the polyhedron that these planes bound (labels, the tetrahedron's facets last) with these vertices, as
   // triples of positions among them, which the caller knows to be the result.
   void take(const TetFrame& tet, const std::vector<Index>& labels, const std::vector<std::array<Index, 3>>& triples);
@@ -71,6 +80,9 @@ class TetClipper {
   const Vec3& vertex(std::size_t v) const { return vertices_[v].at; }
   // Bounds the error of each coordinate of vertex v.
   double slack(std::size_t v) const { return vertices_[v].slack; }
+  // The label of plane e < 3 of vertex v, and the vertex at the other end of the edge that leaves it there.
+  Index label_at(std::size_t v, std::size_t e) const { return planes_[vertices_[v].on[e]].slot; }
+  Index adjacent(std::size_t v, std::size_t e) const { return vertices_[v].adjacent[e]; }
   // Positions in labels() of the three planes of vertex v, counter-clockwise seen from outside, the least first.
   std::array<Index, 3> triple(std::size_t v);
   // Integrals over the last polyhedron, about the seed.

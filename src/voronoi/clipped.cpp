@@ -1,11 +1,14 @@
 #include "voronoi/clipped.h"
 
 #include <algorithm>
+#include <deque>
+#include <functional>
 
 #include "core/append_range.h"
 #include "core/marks.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "voronoi/boundary_cell.h"
 #include "voronoi/clip_tet.h"
 #include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polyhedra.h"
@@ -21,7 +24,8 @@ constexpr std::size_t kWholes = 256;  // cells of a chunk that are taken whole
 struct Chunk {
   std::vector<Index> first_neighbour;  // of each cell, in `neighbours`; and one past the last
   std::vector<Index> neighbours;       // slots of the bisectors of its polyhedra
-  std::vector<Index> tets;             // of each neighbour: one where the two cells meet
+  std::vector<Index> tets;             // of each neighbour: one where the two cells meet; not for cells taken whole
+  std::vector<Index> open;             // slots of boundary cells of which only others tell what is inside
   ClippedPolyhedra polyhedra;
   PairCounts counts;
 
@@ -29,14 +33,19 @@ struct Chunk {
     first_neighbour.clear();
     neighbours.clear();
     tets.clear();
+    open.clear();
     polyhedra = {};
     counts = {};
   }
 };
 
-// Per thread: a clipper, and what the current cell has met.
+// Per thread: clippers, and what the current cell has met.
 struct Walker {
+  explicit Walker(const Surface& surface, const TetFrame& enclosure) : boundary_cell(surface, enclosure) {}
+
   TetClipper clipper;
+  BoundaryCell boundary_cell;
+  std::vector<CellPolygon> polygons;
   Marks tets, cells;
   struct Term {
     Index tet;
@@ -56,9 +65,9 @@ struct ClippedVoronoi::Work {
   RestrictedVoronoi boundary;
   std::vector<TetFrame> frames;  // of the tetrahedra
   TetFrame enclosure;
-  ThreadLocal<Walker> walkers;
+  ThreadLocal<Walker> walkers{std::cref(solid.boundary), std::cref(enclosure)};
   std::uint64_t generation = 0;
-  std::vector<std::vector<Chunk>> rounds;
+  std::deque<std::vector<Chunk>> rounds;  // those in use stay where they are
   std::size_t round_count = 0;
   std::vector<char> known;  // of each slot: it has been reached
 
@@ -72,12 +81,17 @@ struct ClippedVoronoi::Work {
   Walker& walker();
   std::vector<Chunk>& next_round(std::size_t chunks);
   template <class Starts>
-  void walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk, CellMoments& result,
-            bool want_polyhedra) const;
+  void walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk, bool want_polyhedra) const;
+  void sum_terms(Index slot, Walker& walker, CellMoments& result) const;
   void take_whole(Index slot, Walker& walker, Chunk& chunk, CellMoments& result, bool want_polyhedra) const;
-  std::vector<Start> walk_boundary(CellMoments& result, bool want_polyhedra);
+  std::vector<Index> mark_boundary(const CellMoments& result);
+  std::vector<Start> walk_boundary(const std::vector<Index>& slots, CellMoments& result, bool want_polyhedra);
   void walk_inner(std::vector<Start> frontier, CellMoments& result, bool want_polyhedra);
-  void take_inner(const std::vector<Start>& reached, CellMoments& result, bool want_polyhedra);
+  bool integrate_boundary_cell(Index slot, BoundaryCell::Side side, Walker& walker, Chunk& chunk,
+                               CellMoments& result) const;
+  std::vector<Chunk>& integrate_boundary(const std::vector<Index>& slots, CellMoments& result);
+  std::vector<Chunk>& take_all_inner(const std::vector<Index>& slots, CellMoments& result, bool want_polyhedra);
+  void take_cells_whole(const std::vector<Index>& on_boundary, CellMoments& result, bool want_polyhedra);
   std::vector<Start> newly_reached(const std::vector<Chunk>& chunks);
   void gather(ClippedPolyhedra& polyhedra) const;
   DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want, Diagram& diagram);
@@ -92,6 +106,7 @@ Walker& ClippedVoronoi::Work::walker() {
   if (walker.generation != generation) {
     walker.generation = generation;
     walker.clipper.reset(seeds(), boundary.neighbours());
+    walker.boundary_cell.reset(seeds(), boundary.neighbours());
   }
   return walker;
 }
@@ -106,7 +121,7 @@ std::vector<Chunk>& ClippedVoronoi::Work::next_round(std::size_t chunks) {
 
 // Cuts up the part of the cell that hangs together with the tetrahedra of `starts`, which it is known to meet.
 template <class Starts>
-void ClippedVoronoi::Work::walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk, CellMoments& result,
+void ClippedVoronoi::Work::walk(Index slot, const Starts& starts, Walker& walker, Chunk& chunk,
                                 bool want_polyhedra) const {
   TetClipper& clipper = walker.clipper;
   const bool uniform = solid.density.empty();
@@ -137,9 +152,13 @@ void ClippedVoronoi::Work::walk(Index slot, const Starts& starts, Walker& walker
         chunk.tets.push_back(tet);
       }
     });
-    walker.terms.push_back({tet, uniform ? clipper.integrate<true>() : clipper.integrate<false>()});
+    if (!inner_whole) walker.terms.push_back({tet, uniform ? clipper.integrate<true>() : clipper.integrate<false>()});
     if (want_polyhedra) append_polyhedron(clipper, seeds(), tet, slot, chunk.polyhedra);
   }
+}
+
+// Adds up what the last walk has found in the tetrahedra.
+void ClippedVoronoi::Work::sum_terms(Index slot, Walker& walker, CellMoments& result) const {
   std::sort(walker.terms.begin(), walker.terms.end(), [](const auto& a, const auto& b) { return a.tet < b.tet; });
   for (const Walker::Term& term : walker.terms) walker.sum.add(term.moments);
   result.cells[seeds().id[slot]] = walker.sum.finish();
@@ -178,9 +197,8 @@ std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::newly_reached(con
   return reached;
 }
 
-// The cells that meet the boundary, from the tetrahedra under the triangles that they meet. A part of such a cell that
-// the boundary does not bound would be all of the cell, so this finds every part.
-std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(CellMoments& result, bool want_polyhedra) {
+// The cells that meet the boundary, which are known from the start.
+std::vector<Index> ClippedVoronoi::Work::mark_boundary(const CellMoments& result) {
   std::vector<Index> slots;
   known.assign(seeds().x.size(), false);
   for (Index s = 0; s < known.size(); ++s)
@@ -188,6 +206,14 @@ std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(Cel
       slots.push_back(s);
       known[s] = true;
     }
+  return slots;
+}
+
+// Cuts up these cells from the tetrahedra under the triangles that they meet. A part of such a cell that the boundary
+// does not bound would be all of the cell, so this finds every part.
+std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(const std::vector<Index>& slots,
+                                                                             CellMoments& result,
+                                                                             bool want_polyhedra) {
   std::vector<Chunk>& chunks = next_round((slots.size() + kWalks - 1) / kWalks);
   parallel_chunks(slots.size(), kWalks, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Walker& local = walker();
@@ -197,10 +223,11 @@ std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(Cel
       starts.clear();
       for (const Index* t = result.triangles.begin(i); t != result.triangles.end(i); ++t)
         starts.push_back(solid.tet_of_triangle[*t]);
-      walk(slots[k], starts, local, chunks[c], result, want_polyhedra);
+      walk(slots[k], starts, local, chunks[c], want_polyhedra);
+      if (!inner_whole) sum_terms(slots[k], local, result);
     }
   });
-  return newly_reached(chunks);
+  return inner_whole ? std::vector<Start>{} : newly_reached(chunks);
 }
 
 // A cell that does not meet the boundary but shares a bisector with one inside the solid lies inside itself.
@@ -209,43 +236,91 @@ void ClippedVoronoi::Work::walk_inner(std::vector<Start> frontier, CellMoments& 
     std::vector<Chunk>& chunks = next_round((frontier.size() + kWalks - 1) / kWalks);
     parallel_chunks(frontier.size(), kWalks, [&](std::size_t c, std::size_t begin, std::size_t end) {
       Walker& local = walker();
-      for (std::size_t k = begin; k < end; ++k)
-        walk(frontier[k].slot, std::array<Index, 1>{frontier[k].tet}, local, chunks[c], result, want_polyhedra);
+      for (std::size_t k = begin; k < end; ++k) {
+        walk(frontier[k].slot, std::array<Index, 1>{frontier[k].tet}, local, chunks[c], want_polyhedra);
+        sum_terms(frontier[k].slot, local, result);
+      }
     });
     frontier = newly_reached(chunks);
   }
 }
 
-// The same, but all cells that do not meet the boundary are taken whole at first, and then those kept that are reached.
-void ClippedVoronoi::Work::take_inner(const std::vector<Start>& reached, CellMoments& result, bool want_polyhedra) {
-  std::vector<Index> slots, place(known.size(), kNone);
-  std::vector<char> inside(known.size(), false);
-  for (const Start& start : reached) inside[start.slot] = true;
-  for (Index s = 0; s < known.size(); ++s)
-    if (!known[s] || inside[s]) {
-      place[s] = static_cast<Index>(slots.size());
-      slots.push_back(s);
-    }
+// False if the cell alone does not tell what of it is inside.
+bool ClippedVoronoi::Work::integrate_boundary_cell(Index slot, BoundaryCell::Side side, Walker& walker, Chunk& chunk,
+                                                   CellMoments& result) const {
+  BoundaryCell& cell = walker.boundary_cell;
+  boundary.polygons_of(slot, walker.polygons);
+  const bool settled = cell.integrate(slot, walker.polygons, side);
+  chunk.counts.add_doubts(cell);
+  if (!settled) return false;
+  ++chunk.counts.pairs;
+  result.cells[seeds().id[slot]] = cell.moments();
+  append_range(chunk.neighbours, cell.reached(), 0, cell.reached().size());
+  return true;
+}
+
+std::vector<Chunk>& ClippedVoronoi::Work::integrate_boundary(const std::vector<Index>& slots, CellMoments& result) {
+  std::vector<Chunk>& chunks = next_round((slots.size() + kWalks - 1) / kWalks);
+  parallel_chunks(slots.size(), kWalks, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    Walker& local = walker();
+    for (std::size_t k = begin; k < end; ++k)
+      if (!integrate_boundary_cell(slots[k], BoundaryCell::Side::unknown, local, chunks[c], result))
+        chunks[c].open.push_back(slots[k]);
+  });
+  return chunks;
+}
+
+std::vector<Chunk>& ClippedVoronoi::Work::take_all_inner(const std::vector<Index>& slots, CellMoments& result,
+                                                         bool want_polyhedra) {
   std::vector<Chunk>& chunks = next_round((slots.size() + kWholes - 1) / kWholes);
   parallel_chunks(slots.size(), kWholes, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Walker& local = walker();
     for (std::size_t k = begin; k < end; ++k) take_whole(slots[k], local, chunks[c], result, want_polyhedra);
     chunks[c].first_neighbour.push_back(static_cast<Index>(chunks[c].neighbours.size()));
   });
-  std::vector<Index> queue;
-  for (const Start& start : reached) queue.push_back(start.slot);
-  for (std::size_t head = 0; head < queue.size(); ++head) {
-    const Chunk& chunk = chunks[place[queue[head]] / kWholes];
-    const std::size_t k = place[queue[head]] % kWholes;
-    for (Index n = chunk.first_neighbour[k]; n < chunk.first_neighbour[k + 1]; ++n) {
-      const Index other = chunk.neighbours[n];
-      if (known[other]) continue;
-      known[other] = inside[other] = true;
-      queue.push_back(other);
+  return chunks;
+}
+
+// Boundary cells by their boundaries. All others are taken whole at first, and then those kept that share a Voronoi
+// vertex inside with a cell that has one.
+void ClippedVoronoi::Work::take_cells_whole(const std::vector<Index>& on_boundary, CellMoments& result,
+                                            bool want_polyhedra) {
+  std::vector<Index> slots, place(known.size(), kNone), queue;
+  for (Index s = 0; s < known.size(); ++s)
+    if (!known[s]) {
+      place[s] = static_cast<Index>(slots.size());
+      slots.push_back(s);
     }
+  std::vector<char> inside(known.begin(), known.end());  // or settled anyway
+  const auto reach = [&](Index slot) {
+    if (inside[slot]) return;
+    inside[slot] = known[slot] = true;
+    queue.push_back(slot);
+  };
+  std::vector<Chunk>& outer = integrate_boundary(on_boundary, result);
+  std::vector<Chunk>& inner = take_all_inner(slots, result, want_polyhedra);
+  for (const Chunk& chunk : outer)
+    for (const Index slot : chunk.open) inside[slot] = false;
+  for (const Chunk& chunk : outer)
+    for (const Index slot : chunk.neighbours) reach(slot);
+  Chunk& late = next_round(1).front();
+  for (std::size_t head = 0; head < queue.size(); ++head) {
+    const Index slot = queue[head];
+    if (place[slot] == kNone) {
+      const std::size_t before = late.neighbours.size();
+      integrate_boundary_cell(slot, BoundaryCell::Side::inside, walker(), late, result);
+      for (std::size_t n = before; n < late.neighbours.size(); ++n) reach(late.neighbours[n]);
+      continue;
+    }
+    const Chunk& chunk = inner[place[slot] / kWholes];
+    const std::size_t k = place[slot] % kWholes;
+    for (Index n = chunk.first_neighbour[k]; n < chunk.first_neighbour[k + 1]; ++n) reach(chunk.neighbours[n]);
   }
+  for (const Chunk& chunk : outer)
+    for (const Index slot : chunk.open)
+      if (!inside[slot]) integrate_boundary_cell(slot, BoundaryCell::Side::outside, walker(), late, result);
   for (std::size_t k = 0; k < slots.size(); ++k) {
-    if (inside[slots[k]]) ++chunks[k / kWholes].counts.pairs;
+    if (inside[slots[k]]) ++inner[k / kWholes].counts.pairs;
     else result.cells[seeds().id[slots[k]]] = {};
   }
 }
@@ -259,15 +334,20 @@ DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neigh
   round_count = 0;
   result.cells.assign(given.size(), Moments{});
   const bool want_polyhedra = includes(want, Want::polyhedra);
-  std::vector<Start> reached = walk_boundary(result, want_polyhedra);
-  if (inner_whole) take_inner(reached, result, want_polyhedra);
-  else walk_inner(std::move(reached), result, want_polyhedra);
+  const std::vector<Index> on_boundary = mark_boundary(result);
+  if (inner_whole) take_cells_whole(on_boundary, result, want_polyhedra);
+  if (!inner_whole || want_polyhedra) {
+    std::vector<Start> reached = walk_boundary(on_boundary, result, want_polyhedra);
+    if (!inner_whole) walk_inner(std::move(reached), result, want_polyhedra);
+  }
   set_step_masses(seeds(), boundary.neighbours(), result);
   result.mass = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].second; });
   work.counts = {};
   for (std::size_t r = 0; r < round_count; ++r)
     for (const Chunk& chunk : rounds[r]) work.counts += chunk.counts;
+  // Where boundary cells are cut up, their pieces are the pairs.
+  if (inner_whole && want_polyhedra) work.counts.pairs -= on_boundary.size();
   work.owners += work.clip;
   work.clip = watch.seconds();
   if (want_polyhedra) gather(diagram.polyhedra);

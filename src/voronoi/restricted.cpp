@@ -163,6 +163,7 @@ struct RestrictedVoronoi::Work {
   void sort_items();
   PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
+  CellPolygon polygon_of(Index slot, const Item& item) const;
   void set_polygons(RestrictedPolygons& polygons, bool with_vertices);
   void put_vertices(const Entry& entry, const Chunk& chunk, Clipper& clipper, Vec3* to) const;
   Index* put_labels(std::size_t facet, const Entry& entry, const Chunk& chunk, Index* to) const;
@@ -378,6 +379,15 @@ PairCounts RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellM
   return counts;
 }
 
+CellPolygon RestrictedVoronoi::Work::polygon_of(Index slot, const Item& item) const {
+  if (item.moments == kWhole) {
+    const FacetSummary& summary = surface.summaries[item.facet];
+    return {item.facet, {}, moved(summary.moments, summary.anchor - seeds.x[slot])};
+  }
+  const Chunk& chunk = chunks[chunk_of(item.facet)];
+  return {item.facet, chunk.labels_of(Entry{slot, item.moments}), chunk.moments[item.moments]};
+}
+
 void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
   result.cells.assign(seed_count, Moments{});
   parallel_chunks(seeds.x.size(), kCellsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -557,6 +567,12 @@ DiagramWork RestrictedVoronoi::evaluate(const std::vector<Vec3>& seeds, Neighbou
 DiagramWork RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want,
                                      Diagram& diagram) {
   return work_->evaluate(seeds, source, false, want, diagram);
+}
+
+void RestrictedVoronoi::polygons_of(Index slot, std::vector<CellPolygon>& polygons) const {
+  polygons.clear();
+  for (std::size_t k = work_->cell_begin[slot]; k < work_->cell_begin[slot + 1]; ++k)
+    polygons.push_back(work_->polygon_of(slot, work_->items[k]));
 }
 
 const SortedSeeds& RestrictedVoronoi::seeds() const { return work_->seeds; }

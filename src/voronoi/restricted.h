@@ -10,6 +10,7 @@
 
 #include "bisector/cells.h"
 #include "core/geometry.h"
+#include "voronoi/cell_polygon.h"
 #include "voronoi/diagram.h"
 #include "voronoi/neighbours.h"
 #include "voronoi/surface.h"
@@ -29,6 +30,8 @@ class RestrictedVoronoi {
   DiagramWork trace(const std::vector<Vec3>& seeds, NeighbourSource source, Want want, Diagram& diagram);
 
   // Of the last diagram.
+  // The polygons of a cell, in ascending order of triangles.
+  void polygons_of(Index slot, std::vector<CellPolygon>& polygons) const;
   const SortedSeeds& seeds() const;
   const Neighbours& neighbours() const;
 
