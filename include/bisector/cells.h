@@ -38,10 +38,11 @@ struct RestrictedPolygons {
   std::vector<Vec3> vertices;
 };
 
-// The non-empty intersections of cells and tetrahedra, sorted by (tetrahedron, cell). Where the density is uniform,
-// cells that do not meet the boundary are not cut up: they have the tetrahedron kNone and come last. A polyhedron is
-// kept in dual form: the labels of its facets, ascending (facets of the tetrahedron after seeds), and its vertices as
-// triples of positions in that list.
+// The non-empty intersections of cells and tetrahedra, sorted by (tetrahedron, cell). A polyhedron is kept in dual
+// form: the labels of its facets, ascending (facets of the tetrahedron after seeds), and its vertices as triples of
+// positions in that list. Where the density is uniform, cells are not cut up by tetrahedra: each is one polyhedron with
+// the tetrahedron kNone. Of a cell that meets the boundary it has the bisectors that bound it inside the solid and the
+// Voronoi vertices there; the rest of its surface are the cell's polygons on the boundary.
 struct ClippedPolyhedra {
   struct Pair {
     Index tet, cell;

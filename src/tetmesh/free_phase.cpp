@@ -37,7 +37,9 @@ void free_phase(TetRun& run, StandIns& stand_ins) {
     SolidBackend* const stand_in = stand_ins.choose(counts[level], counts.back(), run.solid);
     SolidBackend& solid = stand_in ? *stand_in : run.solid;
     run.sites.change_backend(solid);
-    if (level > 0) sites = refine_sites(run.sites.diagram(Want::polyhedra), run.sites.seeds.positions(), counts[level]);
+    if (level > 0)
+      sites = refine_sites(run.sites.diagram(Want::polygons | Want::polyhedra), run.sites.seeds.positions(),
+                           counts[level]);
     fill_up(solid.solid(), counts[level], options.random_seed + level, sites);
     run.sites.seeds = PlacedSeeds(std::move(sites), {SeedPlace::Kind::interior});
     const bool finest = level > 0 && level + 1 == counts.size();

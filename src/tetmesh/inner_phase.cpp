@@ -33,7 +33,8 @@ void remove_crowded(CvtRun& sites, std::size_t boundary, std::size_t count) {
 
 // Adds so many sites where cells are large, or fewer.
 void add_sites(CvtRun& sites, std::size_t count) {
-  sites.seeds.add(far_corners(sites.diagram(Want::polyhedra), sites.seeds.positions(), count), {Kind::interior});
+  const Diagram& diagram = sites.diagram(Want::polygons | Want::polyhedra);
+  sites.seeds.add(far_corners(diagram, sites.seeds.positions(), count), {Kind::interior});
 }
 
 void match_count(TetRun& run, std::size_t boundary) {

@@ -38,19 +38,22 @@ std::vector<std::size_t> tet_level_counts(std::size_t count) {
 
 std::vector<Vec3> far_corners(const Diagram& diagram, const std::vector<Vec3>& seeds, std::size_t count) {
   const ClippedPolyhedra& polyhedra = diagram.polyhedra;
+  const RestrictedPolygons& polygons = diagram.polygons;
   const std::vector<Moments>& cells = diagram.moments.cells;
   std::vector<double> squared(seeds.size(), -1);
   std::vector<Vec3> corner(seeds.size());
-  for (std::size_t k = 0; k < polyhedra.pairs.size(); ++k) {
-    const Index cell = polyhedra.pairs[k].cell;
-    for (std::size_t e = polyhedra.vertex_offsets[k]; e < polyhedra.vertex_offsets[k + 1]; ++e) {
-      const double d = norm2(polyhedra.vertices[e] - seeds[cell]);
-      if (d > squared[cell]) {
-        squared[cell] = d;
-        corner[cell] = polyhedra.vertices[e];
-      }
-    }
-  }
+  const auto visit = [&](Index cell, const Vec3& p) {
+    const double d = norm2(p - seeds[cell]);
+    if (d <= squared[cell]) return;
+    squared[cell] = d;
+    corner[cell] = p;
+  };
+  for (std::size_t k = 0; k < polyhedra.pairs.size(); ++k)
+    for (std::size_t e = polyhedra.vertex_offsets[k]; e < polyhedra.vertex_offsets[k + 1]; ++e)
+      visit(polyhedra.pairs[k].cell, polyhedra.vertices[e]);
+  for (std::size_t k = 0; k < polygons.pairs.size(); ++k)
+    for (std::size_t e = polygons.offsets[k]; e < polygons.offsets[k + 1]; ++e)
+      visit(polygons.pairs[k].cell, polygons.vertices[e]);
   std::vector<Index> order(seeds.size());
   std::iota(order.begin(), order.end(), Index{0});
   std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return cells[a].second > cells[b].second; });

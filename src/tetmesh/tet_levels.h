@@ -18,6 +18,7 @@ std::vector<std::array<Index, 2>> dual_edges(const ClippedPolyhedra& polyhedra);
 // sites.
 std::vector<std::size_t> tet_level_counts(std::size_t count);
 
+// Of a diagram, what follows takes the polyhedra, and the polygons, where corners of cells may lie.
 // The seeds and the middles of their dual edges, those of the longest edges if that is too many for `count`; if it is
 // too few, also corners of cells that are far from their seeds, cells of the highest energy first.
 std::vector<Vec3> refine_sites(const Diagram& diagram, const std::vector<Vec3>& seeds, std::size_t count);

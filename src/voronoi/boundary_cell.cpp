@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "voronoi/error_bounds.h"
+#include "voronoi/polyhedra.h"
 
 namespace bisector {
 namespace {
@@ -58,7 +59,7 @@ void BoundaryCell::trace_polygon(const CellPolygon& polygon, Moments& sum) {
   }
 }
 
-void BoundaryCell::trace(Index slot, std::span<const CellPolygon> polygons) {
+void BoundaryCell::trace(std::span<const CellPolygon> polygons) {
   bisectors_.clear();
   crossings_.clear();
   magnitude_ = 0;
@@ -70,7 +71,7 @@ void BoundaryCell::trace(Index slot, std::span<const CellPolygon> polygons) {
     Moments edges;
     if (!polygon.labels.empty()) {
       polygons_.begin(surface_, polygon.facet);
-      polygons_.take(slot, polygon.labels.data(), polygon.labels.size());
+      polygons_.take(slot_, polygon.labels.data(), polygon.labels.size());
       trace_polygon(polygon, edges);
     }
     add(cone, edges);
@@ -200,19 +201,20 @@ void BoundaryCell::add_edges() {
 }
 
 bool BoundaryCell::integrate(Index slot, std::span<const CellPolygon> polygons, Side vertices) {
+  slot_ = slot;
   seed_ = seeds_->x[slot];
   uncertain_ = wider_ = false;
-  trace(slot, polygons);
+  trace(polygons);
   cell_.begin(slot);
   for (;;) {
     cell_.cut_by_listed(enclosure_);
     uncertain_ |= cell_.uncertain();
     const Found found = find_sides(vertices);
+    if (found == Found::settled) break;
     if (found == Found::open) {
       sum_.finish();
       return false;
     }
-    if (found == Found::settled) break;
     if (cell_.lists_all()) throw std::logic_error("a cell's polygons and its Voronoi vertices contradict each other");
     wider_ = true;
     cell_.widen();
@@ -220,12 +222,32 @@ bool BoundaryCell::integrate(Index slot, std::span<const CellPolygon> polygons, 
   add_edges();
   moments_ = sum_.finish();
   if (moments_.mass < kVisible * magnitude_) moments_ = {};
+  list_reached();
+  return true;
+}
+
+void BoundaryCell::list_reached() {
   reached_.clear();
   met_.begin(seeds_->x.size());
   for (std::size_t v = 0; v < cell_.vertex_count(); ++v)
     for (std::size_t e = 0; inside_[v] && e < 3; ++e)
       if (const Index label = cell_.label_at(v, e); met_.mark(label)) reached_.push_back(label);
-  return true;
+}
+
+void BoundaryCell::append_polyhedron(ClippedPolyhedra& polyhedra) {
+  const auto before = [&](Index a, Index b) { return seeds_->id[a] < seeds_->id[b]; };
+  labels_ = reached_;
+  labels_.insert(labels_.end(), bisectors_.begin(), bisectors_.end());
+  std::sort(labels_.begin(), labels_.end(), before);
+  labels_.erase(std::unique(labels_.begin(), labels_.end()), labels_.end());
+  place_.resize(seeds_->x.size());
+  for (Index k = 0; k < labels_.size(); ++k) place_[labels_[k]] = k;
+  std::vector<PolyhedronVertex> vertices;
+  for (std::size_t v = 0; v < cell_.vertex_count(); ++v)
+    if (inside_[v])
+      vertices.push_back({{place_[cell_.label_at(v, 0)], place_[cell_.label_at(v, 1)], place_[cell_.label_at(v, 2)]},
+                          cell_.vertex(v)});
+  bisector::append_polyhedron(labels_, vertices, *seeds_, kNone, slot_, polyhedra);
 }
 
 }  // namespace bisector

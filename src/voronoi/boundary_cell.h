@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "bisector/cells.h"
 #include "core/geometry.h"
 #include "core/marks.h"
 #include "voronoi/cell_polygon.h"
@@ -50,6 +51,9 @@ class BoundaryCell {
   const Moments& moments() const { return moments_; }
   // The neighbours that share a Voronoi vertex inside with the cell.
   const std::vector<Index>& reached() const { return reached_; }
+  // Appends what the cell's polygons leave of its boundary: the bisectors that bound it inside the surface, and the
+  // Voronoi vertices there.
+  void append_polyhedron(ClippedPolyhedra& polyhedra);
   // Whether a decision of the last call was uncertain, or its list too short.
   bool uncertain() const { return uncertain_; }
   bool wider() const { return wider_; }
@@ -68,9 +72,10 @@ class BoundaryCell {
   enum class Found { settled, open, uncertain };
 
   std::uint64_t edge_of(Index a, Index b) const;
-  void trace(Index slot, std::span<const CellPolygon> polygons);
+  void trace(std::span<const CellPolygon> polygons);
   void trace_polygon(const CellPolygon& polygon, Moments& sum);
   Found find_sides(Side vertices);
+  void list_reached();
   bool lists_bisectors();
   void count_crossings();
   bool propagate();
@@ -85,7 +90,8 @@ class BoundaryCell {
   TetClipper cell_;
   Vec3 seed_;
 
-  std::vector<Index> bisectors_;  // of polygon edges, some more than once
+  Index slot_ = 0;
+  std::vector<Index> bisectors_;     // of polygon edges, some more than once
   std::vector<Crossing> crossings_;  // by edge, then by triangle
   FixedTreeSum sum_;
   double magnitude_ = 0;  // of the volumes added
@@ -105,6 +111,7 @@ class BoundaryCell {
 
   Moments moments_;
   std::vector<Index> reached_;
+  std::vector<Index> labels_, place_;  // for append_polyhedron(): slots, and of each slot its place among them
   bool uncertain_ = false, wider_ = false;
 };
 

@@ -1,14 +1,12 @@
 #include "voronoi/clipped.h"
 
 #include <algorithm>
-#include <deque>
-#include <functional>
 
 #include "core/append_range.h"
 #include "core/marks.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "voronoi/boundary_cell.h"
+#include "voronoi/boundary_cells.h"
 #include "voronoi/clip_tet.h"
 #include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polyhedra.h"
@@ -25,7 +23,6 @@ struct Chunk {
   std::vector<Index> first_neighbour;  // of each cell, in `neighbours`; and one past the last
   std::vector<Index> neighbours;       // slots of the bisectors of its polyhedra
   std::vector<Index> tets;             // of each neighbour: one where the two cells meet; not for cells taken whole
-  std::vector<Index> open;             // slots of boundary cells of which only others tell what is inside
   ClippedPolyhedra polyhedra;
   PairCounts counts;
 
@@ -33,19 +30,14 @@ struct Chunk {
     first_neighbour.clear();
     neighbours.clear();
     tets.clear();
-    open.clear();
     polyhedra = {};
     counts = {};
   }
 };
 
-// Per thread: clippers, and what the current cell has met.
+// Per thread: a clipper, and what the current cell has met.
 struct Walker {
-  explicit Walker(const Surface& surface, const TetFrame& enclosure) : boundary_cell(surface, enclosure) {}
-
   TetClipper clipper;
-  BoundaryCell boundary_cell;
-  std::vector<CellPolygon> polygons;
   Marks tets, cells;
   struct Term {
     Index tet;
@@ -65,9 +57,10 @@ struct ClippedVoronoi::Work {
   RestrictedVoronoi boundary;
   std::vector<TetFrame> frames;  // of the tetrahedra
   TetFrame enclosure;
-  ThreadLocal<Walker> walkers{std::cref(solid.boundary), std::cref(enclosure)};
+  ThreadLocal<Walker> walkers;
+  BoundaryCells boundary_cells;  // for cells as wholes
   std::uint64_t generation = 0;
-  std::deque<std::vector<Chunk>> rounds;  // those in use stay where they are
+  std::vector<std::vector<Chunk>> rounds;
   std::size_t round_count = 0;
   std::vector<char> known;  // of each slot: it has been reached
 
@@ -87,10 +80,7 @@ struct ClippedVoronoi::Work {
   std::vector<Index> mark_boundary(const CellMoments& result);
   std::vector<Start> walk_boundary(const std::vector<Index>& slots, CellMoments& result, bool want_polyhedra);
   void walk_inner(std::vector<Start> frontier, CellMoments& result, bool want_polyhedra);
-  bool integrate_boundary_cell(Index slot, BoundaryCell::Side side, Walker& walker, Chunk& chunk,
-                               CellMoments& result) const;
-  std::vector<Chunk>& integrate_boundary(const std::vector<Index>& slots, CellMoments& result);
-  std::vector<Chunk>& take_all_inner(const std::vector<Index>& slots, CellMoments& result, bool want_polyhedra);
+  const std::vector<Chunk>& take_all_inner(const std::vector<Index>& slots, CellMoments& result, bool want_polyhedra);
   void take_cells_whole(const std::vector<Index>& on_boundary, CellMoments& result, bool want_polyhedra);
   std::vector<Start> newly_reached(const std::vector<Chunk>& chunks);
   void gather(ClippedPolyhedra& polyhedra) const;
@@ -99,14 +89,14 @@ struct ClippedVoronoi::Work {
 
 ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
     : solid(s), inner_whole(inner == InnerCells::whole && s.density.empty()), boundary(s.boundary, kListsInSpace),
-      frames(tet_frames(s)), enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0) {}
+      frames(inner_whole ? std::vector<TetFrame>{} : tet_frames(s)), enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0),
+      boundary_cells(s.boundary, enclosure) {}
 
 Walker& ClippedVoronoi::Work::walker() {
   Walker& walker = walkers.local();
   if (walker.generation != generation) {
     walker.generation = generation;
     walker.clipper.reset(seeds(), boundary.neighbours());
-    walker.boundary_cell.reset(seeds(), boundary.neighbours());
   }
   return walker;
 }
@@ -152,7 +142,7 @@ void ClippedVoronoi::Work::walk(Index slot, const Starts& starts, Walker& walker
         chunk.tets.push_back(tet);
       }
     });
-    if (!inner_whole) walker.terms.push_back({tet, uniform ? clipper.integrate<true>() : clipper.integrate<false>()});
+    walker.terms.push_back({tet, uniform ? clipper.integrate<true>() : clipper.integrate<false>()});
     if (want_polyhedra) append_polyhedron(clipper, seeds(), tet, slot, chunk.polyhedra);
   }
 }
@@ -224,10 +214,10 @@ std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(con
       for (const Index* t = result.triangles.begin(i); t != result.triangles.end(i); ++t)
         starts.push_back(solid.tet_of_triangle[*t]);
       walk(slots[k], starts, local, chunks[c], want_polyhedra);
-      if (!inner_whole) sum_terms(slots[k], local, result);
+      sum_terms(slots[k], local, result);
     }
   });
-  return inner_whole ? std::vector<Start>{} : newly_reached(chunks);
+  return newly_reached(chunks);
 }
 
 // A cell that does not meet the boundary but shares a bisector with one inside the solid lies inside itself.
@@ -245,32 +235,7 @@ void ClippedVoronoi::Work::walk_inner(std::vector<Start> frontier, CellMoments& 
   }
 }
 
-// False if the cell alone does not tell what of it is inside.
-bool ClippedVoronoi::Work::integrate_boundary_cell(Index slot, BoundaryCell::Side side, Walker& walker, Chunk& chunk,
-                                                   CellMoments& result) const {
-  BoundaryCell& cell = walker.boundary_cell;
-  boundary.polygons_of(slot, walker.polygons);
-  const bool settled = cell.integrate(slot, walker.polygons, side);
-  chunk.counts.add_doubts(cell);
-  if (!settled) return false;
-  ++chunk.counts.pairs;
-  result.cells[seeds().id[slot]] = cell.moments();
-  append_range(chunk.neighbours, cell.reached(), 0, cell.reached().size());
-  return true;
-}
-
-std::vector<Chunk>& ClippedVoronoi::Work::integrate_boundary(const std::vector<Index>& slots, CellMoments& result) {
-  std::vector<Chunk>& chunks = next_round((slots.size() + kWalks - 1) / kWalks);
-  parallel_chunks(slots.size(), kWalks, [&](std::size_t c, std::size_t begin, std::size_t end) {
-    Walker& local = walker();
-    for (std::size_t k = begin; k < end; ++k)
-      if (!integrate_boundary_cell(slots[k], BoundaryCell::Side::unknown, local, chunks[c], result))
-        chunks[c].open.push_back(slots[k]);
-  });
-  return chunks;
-}
-
-std::vector<Chunk>& ClippedVoronoi::Work::take_all_inner(const std::vector<Index>& slots, CellMoments& result,
+const std::vector<Chunk>& ClippedVoronoi::Work::take_all_inner(const std::vector<Index>& slots, CellMoments& result,
                                                          bool want_polyhedra) {
   std::vector<Chunk>& chunks = next_round((slots.size() + kWholes - 1) / kWholes);
   parallel_chunks(slots.size(), kWholes, [&](std::size_t c, std::size_t begin, std::size_t end) {
@@ -281,7 +246,7 @@ std::vector<Chunk>& ClippedVoronoi::Work::take_all_inner(const std::vector<Index
   return chunks;
 }
 
-// Boundary cells by their boundaries. All others are taken whole at first, and then those kept that share a Voronoi
+// Boundary cells by their polygons. All others are taken whole at first, and then those kept that share a Voronoi
 // vertex inside with a cell that has one.
 void ClippedVoronoi::Work::take_cells_whole(const std::vector<Index>& on_boundary, CellMoments& result,
                                             bool want_polyhedra) {
@@ -291,38 +256,37 @@ void ClippedVoronoi::Work::take_cells_whole(const std::vector<Index>& on_boundar
       place[s] = static_cast<Index>(slots.size());
       slots.push_back(s);
     }
-  std::vector<char> inside(known.begin(), known.end());  // or settled anyway
+  const BoundaryCells::PolygonsOf polygons_of = [&](Index slot, std::vector<CellPolygon>& polygons) {
+    boundary.polygons_of(slot, polygons);
+  };
+  boundary_cells.evaluate(seeds(), boundary.neighbours(), on_boundary, polygons_of, want_polyhedra, result.cells);
+  const std::vector<Chunk>& chunks = take_all_inner(slots, result, want_polyhedra);
+
+  const std::vector<Index> open = boundary_cells.open();
+  for (const Index slot : open) known[slot] = false;
   const auto reach = [&](Index slot) {
-    if (inside[slot]) return;
-    inside[slot] = known[slot] = true;
+    if (known[slot]) return;
+    known[slot] = true;
     queue.push_back(slot);
   };
-  std::vector<Chunk>& outer = integrate_boundary(on_boundary, result);
-  std::vector<Chunk>& inner = take_all_inner(slots, result, want_polyhedra);
-  for (const Chunk& chunk : outer)
-    for (const Index slot : chunk.open) inside[slot] = false;
-  for (const Chunk& chunk : outer)
-    for (const Index slot : chunk.neighbours) reach(slot);
-  Chunk& late = next_round(1).front();
+  for (const Index slot : boundary_cells.reached()) reach(slot);
   for (std::size_t head = 0; head < queue.size(); ++head) {
     const Index slot = queue[head];
     if (place[slot] == kNone) {
-      const std::size_t before = late.neighbours.size();
-      integrate_boundary_cell(slot, BoundaryCell::Side::inside, walker(), late, result);
-      for (std::size_t n = before; n < late.neighbours.size(); ++n) reach(late.neighbours[n]);
+      for (const Index next : boundary_cells.settle(slot, BoundaryCell::Side::inside)) reach(next);
       continue;
     }
-    const Chunk& chunk = inner[place[slot] / kWholes];
+    const Chunk& chunk = chunks[place[slot] / kWholes];
     const std::size_t k = place[slot] % kWholes;
     for (Index n = chunk.first_neighbour[k]; n < chunk.first_neighbour[k + 1]; ++n) reach(chunk.neighbours[n]);
   }
-  for (const Chunk& chunk : outer)
-    for (const Index slot : chunk.open)
-      if (!inside[slot]) integrate_boundary_cell(slot, BoundaryCell::Side::outside, walker(), late, result);
-  for (std::size_t k = 0; k < slots.size(); ++k) {
-    if (inside[slots[k]]) ++inner[k / kWholes].counts.pairs;
-    else result.cells[seeds().id[slots[k]]] = {};
-  }
+  for (const Index slot : open)
+    if (!known[slot]) {
+      boundary_cells.settle(slot, BoundaryCell::Side::outside);
+      known[slot] = true;
+    }
+  for (const Index slot : slots)
+    if (!known[slot]) result.cells[seeds().id[slot]] = {};
 }
 
 DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want,
@@ -336,18 +300,17 @@ DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neigh
   const bool want_polyhedra = includes(want, Want::polyhedra);
   const std::vector<Index> on_boundary = mark_boundary(result);
   if (inner_whole) take_cells_whole(on_boundary, result, want_polyhedra);
-  if (!inner_whole || want_polyhedra) {
-    std::vector<Start> reached = walk_boundary(on_boundary, result, want_polyhedra);
-    if (!inner_whole) walk_inner(std::move(reached), result, want_polyhedra);
-  }
+  else walk_inner(walk_boundary(on_boundary, result, want_polyhedra), result, want_polyhedra);
   set_step_masses(seeds(), boundary.neighbours(), result);
   result.mass = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].mass; });
   result.energy = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].second; });
   work.counts = {};
   for (std::size_t r = 0; r < round_count; ++r)
     for (const Chunk& chunk : rounds[r]) work.counts += chunk.counts;
-  // Where boundary cells are cut up, their pieces are the pairs.
-  if (inner_whole && want_polyhedra) work.counts.pairs -= on_boundary.size();
+  if (inner_whole) {
+    work.counts += boundary_cells.counts();
+    work.counts.pairs = static_cast<std::size_t>(std::count(known.begin(), known.end(), true));
+  }
   work.owners += work.clip;
   work.clip = watch.seconds();
   if (want_polyhedra) gather(diagram.polyhedra);
@@ -363,14 +326,15 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
   };
   std::vector<Item> items;
   std::size_t labels = 0, vertices = 0;
+  const auto list = [&](const ClippedPolyhedra& from) {
+    for (std::size_t k = 0; k < from.pairs.size(); ++k)
+      if (known[seeds().slot[from.pairs[k].cell]]) items.push_back({from.pairs[k].tet, from.pairs[k].cell, &from, k});
+    labels += from.labels.size();
+    vertices += from.triples.size();
+  };
   for (std::size_t r = 0; r < round_count; ++r)
-    for (const Chunk& chunk : rounds[r]) {
-      const ClippedPolyhedra& from = chunk.polyhedra;
-      for (std::size_t k = 0; k < from.pairs.size(); ++k)
-        if (known[seeds().slot[from.pairs[k].cell]]) items.push_back({from.pairs[k].tet, from.pairs[k].cell, &from, k});
-      labels += from.labels.size();
-      vertices += from.triples.size();
-    }
+    for (const Chunk& chunk : rounds[r]) list(chunk.polyhedra);
+  if (inner_whole) boundary_cells.each_part(list);
   sort_in_parallel(items,
                    [](const Item& a, const Item& b) { return a.tet != b.tet ? a.tet < b.tet : a.cell < b.cell; });
   polyhedra = {};

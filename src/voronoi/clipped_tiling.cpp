@@ -1,6 +1,9 @@
 // The certificate of a reported clipped diagram.
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cstdint>
+#include <span>
 #include <utility>
 
 #include "core/parallel.h"
@@ -28,18 +31,15 @@ class Tiling {
     while (first_whole_ < p_.pairs.size() && p_.pairs[first_whole_].tet != kNone)
       ++first_[p_.pairs[first_whole_++].tet + 1];
     for (std::size_t t = 0; t + 1 < first_.size(); ++t) first_[t + 1] += first_[t];
-    for (std::size_t k = 0; k < first_whole_; ++k)
-      for (std::size_t l = p_.label_offsets[k]; l < p_.label_offsets[k + 1]; ++l)
-        if (!is_facet(p_.labels[l])) cut_bisectors_.emplace_back(p_.pairs[k].cell, p_.labels[l]);
-    sort_in_parallel(cut_bisectors_, std::less<>());
-    cut_bisectors_.erase(std::unique(cut_bisectors_.begin(), cut_bisectors_.end()), cut_bisectors_.end());
+    for (std::size_t k = first_whole_; k < p_.pairs.size(); ++k) {
+      const Index cell = p_.pairs[k].cell;
+      if (whole_of_.size() <= cell) whole_of_.resize(cell + 1, kMissing);
+      whole_of_[cell] = k;
+    }
   }
 
   bool tet_tiled(Index tet) const {
     std::vector<FacetOf> facets = facets_of(first_[tet], first_[tet + 1]);
-    // A tetrahedron that cells taken whole fill has no polyhedra of its own.
-    if (facets.empty()) return wholes() > 0;
-    bool complete = true;
     std::vector<std::pair<Index, Index>> corner_facets;
     for (const FacetOf& f : facets) {
       if (is_facet(f.label)) {
@@ -49,12 +49,11 @@ class Tiling {
         continue;
       }
       const FacetOf* other = find(facets, f.label, f.cell);
-      if (other ? other->corners != f.corners : !whole_has(f.label, f.cell)) return false;
-      complete = complete && other;
+      if (!other || other->corners != f.corners) return false;
     }
-    // Each corner once, seen from its three facets, unless a cell taken whole holds it.
+    // Each corner once, seen from its three facets.
     std::sort(corner_facets.begin(), corner_facets.end());
-    if (complete ? corner_facets.size() != 12 : corner_facets.size() % 3 != 0) return false;
+    if (corner_facets.size() != 12) return false;
     if (std::adjacent_find(corner_facets.begin(), corner_facets.end()) != corner_facets.end()) return false;
     for (Index k = 0; k < 4; ++k) {
       const Index across = solid_.adjacent[tet][k];
@@ -70,19 +69,18 @@ class Tiling {
   }
 
   std::size_t wholes() const { return p_.pairs.size() - first_whole_; }
+  bool has_cut_cells() const { return first_whole_ > 0 || p_.pairs.empty(); }
 
+  // Whether the cells across the bisectors of a whole cell have it for a neighbour, and all four cells at each of its
+  // vertices have that vertex, in the sense that it has there.
   bool whole_tiled(std::size_t k) const {
     const Index cell = p_.pairs[first_whole_ + k].cell;
-    if (met_cell(cell)) return false;
-    for (const FacetOf& f : facets_of(first_whole_ + k, first_whole_ + k + 1)) {
-      if (is_facet(f.label)) return false;
-      if (const std::size_t other = whole_of(f.label); other != kMissing) {
-        const std::vector<FacetOf> there = facets_of(other, other + 1);
-        const FacetOf* back = find(there, f.label, cell);
-        if (!back || back->corners != f.corners) return false;
-      } else if (!std::binary_search(cut_bisectors_.begin(), cut_bisectors_.end(), std::pair{f.label, cell})) {
-        return false;
-      }
+    const std::span<const Index> labels = labels_of(first_whole_ + k);
+    for (const Index label : labels)
+      if (is_facet(label) || !whole_has(label, cell)) return false;
+    for (std::size_t v = p_.vertex_offsets[first_whole_ + k]; v < p_.vertex_offsets[first_whole_ + k + 1]; ++v) {
+      const Index a = labels[p_.triples[v][0]], b = labels[p_.triples[v][1]], c = labels[p_.triples[v][2]];
+      if (!has_vertex(a, {cell, c, b}) || !has_vertex(b, {cell, a, c}) || !has_vertex(c, {cell, b, a})) return false;
     }
     return true;
   }
@@ -137,31 +135,41 @@ class Tiling {
     return tiles;
   }
 
-  std::size_t whole_of(Index cell) const {
-    const auto begin = p_.pairs.begin() + static_cast<std::ptrdiff_t>(first_whole_);
-    const auto at = std::lower_bound(begin, p_.pairs.end(), cell,
-                                     [](const ClippedPolyhedra::Pair& pair, Index c) { return pair.cell < c; });
-    return at != p_.pairs.end() && at->cell == cell ? static_cast<std::size_t>(at - p_.pairs.begin()) : kMissing;
+  std::span<const Index> labels_of(std::size_t k) const {
+    return {p_.labels.data() + p_.label_offsets[k], p_.labels.data() + p_.label_offsets[k + 1]};
   }
 
-  // Whether `cell` was taken whole and has the label.
+  std::size_t whole_of(Index cell) const { return cell < whole_of_.size() ? whole_of_[cell] : kMissing; }
+
   bool whole_has(Index cell, Index label) const {
     const std::size_t k = whole_of(cell);
     if (k == kMissing) return false;
-    return std::binary_search(p_.labels.data() + p_.label_offsets[k], p_.labels.data() + p_.label_offsets[k + 1],
-                              label);
+    const std::span<const Index> labels = labels_of(k);
+    return std::binary_search(labels.begin(), labels.end(), label);
   }
 
-  bool met_cell(Index cell) const {
-    const auto at = std::lower_bound(cut_bisectors_.begin(), cut_bisectors_.end(), std::pair{cell, Index{0}});
-    return at != cut_bisectors_.end() && at->first == cell;
+  // Whether a whole cell has the vertex where these three meet it, counter-clockwise seen from outside.
+  bool has_vertex(Index cell, std::array<Index, 3> others) const {
+    const std::size_t k = whole_of(cell);
+    if (k == kMissing) return false;
+    std::rotate(others.begin(), std::min_element(others.begin(), others.end()), others.end());
+    const std::span<const Index> labels = labels_of(k);
+    std::array<std::uint16_t, 3> triple{};
+    for (std::size_t e = 0; e < 3; ++e) {
+      const auto at = std::lower_bound(labels.begin(), labels.end(), others[e]);
+      if (at == labels.end() || *at != others[e]) return false;
+      triple[e] = static_cast<std::uint16_t>(at - labels.begin());
+    }
+    const auto first = p_.triples.begin();
+    return std::binary_search(first + static_cast<std::ptrdiff_t>(p_.vertex_offsets[k]),
+                              first + static_cast<std::ptrdiff_t>(p_.vertex_offsets[k + 1]), triple);
   }
 
   const Solid& solid_;
   const ClippedPolyhedra& p_;
   std::vector<std::size_t> first_;  // polyhedron of each tetrahedron
   std::size_t first_whole_ = 0;
-  std::vector<std::pair<Index, Index>> cut_bisectors_;  // cell and label wherever cells are cut up, sorted
+  std::vector<std::size_t> whole_of_;  // polyhedron of each cell that is whole
 };
 
 }  // namespace
@@ -169,13 +177,14 @@ class Tiling {
 std::size_t count_untiled(const Solid& solid, const ClippedPolyhedra& polyhedra) {
   const Tiling tiling(solid, polyhedra);
   std::atomic<std::size_t> failed{0};
-  parallel_each(
-      solid.mesh.tets.size(),
-      [&](std::size_t t) {
-        if (solid.six_volumes[t] > 0 && !tiling.tet_tiled(static_cast<Index>(t)))
-          failed.fetch_add(1, std::memory_order_relaxed);
-      },
-      64);
+  if (tiling.has_cut_cells())
+    parallel_each(
+        solid.mesh.tets.size(),
+        [&](std::size_t t) {
+          if (solid.six_volumes[t] > 0 && !tiling.tet_tiled(static_cast<Index>(t)))
+            failed.fetch_add(1, std::memory_order_relaxed);
+        },
+        64);
   parallel_each(
       tiling.wholes(),
       [&](std::size_t k) {

@@ -1,13 +1,27 @@
 // What clipping reports of one pair.
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "voronoi/clip_tet.h"
 #include "voronoi/clipped.h"
 
 namespace bisector {
 
-// Appends the clipper's polyhedron; slots become the caller's indices. Throws Error if it has too many facets to
-// number.
+// A vertex relative to the seed, with the positions of its planes among the labels, counter-clockwise seen from
+// outside.
+struct PolyhedronVertex {
+  std::array<Index, 3> on;
+  Vec3 at;
+};
+
+// Appends a polyhedron; slots become the caller's indices. Labels are in their order. Throws Error if there are too
+// many of them to number.
+void append_polyhedron(const std::vector<Index>& labels, const std::vector<PolyhedronVertex>& vertices,
+                       const SortedSeeds& seeds, Index tet, Index slot, ClippedPolyhedra& polyhedra);
+
+// Appends the clipper's polyhedron.
 void append_polyhedron(TetClipper& clipper, const SortedSeeds& seeds, Index tet, Index slot,
                        ClippedPolyhedra& polyhedra);
 
