@@ -81,7 +81,7 @@ RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<S
   plan.min_angle = final_pass ? run.options.min_angle : 0;
   Context quiet = run.sites.context();
   quiet.progress = nullptr;
-  RemeshResult result = remesh(run.boundary, run.features, plan, quiet);
+  RemeshResult result = remesh(run.boundary, run.features, plan, quiet, run.make_backend);
   run.seconds_boundary += watch.seconds();
   return result;
 }

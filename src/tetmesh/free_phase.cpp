@@ -34,7 +34,7 @@ void free_phase(TetRun& run, StandIns& stand_ins) {
       options.seeds.empty() ? tet_level_counts(run.wanted) : std::vector<std::size_t>{options.seeds.size()};
   std::vector<Vec3> sites = options.seeds;
   for (std::size_t level = 0; level < counts.size(); ++level) {
-    SolidBackend* const stand_in = stand_ins.choose(counts[level], counts.back(), run.solid);
+    SolidBackend* const stand_in = stand_ins.choose(counts[level], counts.back(), run.sized.edge_length, run.solid);
     SolidBackend& solid = stand_in ? *stand_in : run.solid;
     run.sites.change_backend(solid);
     if (level > 0)

@@ -1,12 +1,10 @@
 #include "tetmesh/stand_ins.h"
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "bisector/error.h"
 #include "compute/compute.h"
-#include "remesh/remesh.h"
+#include "remesh/coarse_surface.h"
 #include "tetmesh/check_surface.h"
 #include "tetmesh/tet_sizing.h"
 #include "tetmesh/tetgen.h"
@@ -14,10 +12,7 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kManyTets = 8;          // tetrahedra of the solid for each site, from which on a stand-in pays
-constexpr int kSurfaceSteps = 20;             // iterations of its surface's optimisation, per level
-constexpr std::size_t kFewestVertices = 100;  // of its surface
-constexpr std::size_t kFewerTriangles = 4;    // triangles of the surface given for each vertex of its surface, at least
+constexpr std::size_t kManyTets = 8;  // tetrahedra of the solid for each site, from which on a stand-in pays
 
 // Without word of what goes on.
 Context quiet(Context context) {
@@ -44,18 +39,15 @@ StandIns::StandIns(const TetMesh& mesh, const TriangleMesh& surface, Backend& bo
 
 StandIns::~StandIns() = default;
 
-SolidBackend* StandIns::choose(std::size_t count, std::size_t final_count, const SolidBackend& whole) {
+SolidBackend* StandIns::choose(std::size_t count, std::size_t final_count, double edge_length,
+                               const SolidBackend& whole) {
   if (!whole.solid().density.empty()) {
     if (count == final_count) return nullptr;
     domain_ = make_sized(count);
     return domain_->backend.get();
   }
   if (whole.solid().mesh.tets.size() < kManyTets * final_count) return nullptr;
-  if (!std::exchange(tried_, true)) {
-    // Twice as many vertices as the result will have on its boundary, which has edges of the same length.
-    const double h = std::cbrt(whole.solid().volume / static_cast<double>(final_count));
-    domain_ = make_coarse(static_cast<std::size_t>(2 * boundary_.surface().area / (h * h)));
-  }
+  if (!std::exchange(tried_, true)) domain_ = make_coarse(edge_length);
   return domain_ ? domain_->backend.get() : nullptr;
 }
 
@@ -80,15 +72,11 @@ std::unique_ptr<StandIns::Domain> StandIns::make_sized(std::size_t count) const 
   return std::make_unique<Domain>(std::move(sized.mesh), std::move(density), compute_);
 }
 
-// The inside of a remeshed boundary. There is none where that does not bound a solid, or without TetGen.
-std::unique_ptr<StandIns::Domain> StandIns::make_coarse(std::size_t vertices) const {
-  if (find_tetgen().empty() || kFewerTriangles * vertices > surface_.triangles.size()) return nullptr;
-  RemeshPlan remeshing;
-  remeshing.vertices = std::max(vertices, kFewestVertices);
-  remeshing.iterations = kSurfaceSteps;
-  remeshing.topology = TopologyControl::check;
-  remeshing.min_angle = 0;
-  return make_within(remesh(boundary_, features_, remeshing, quiet(context_)).mesh);
+// The inside of a coarser boundary. There is none where that does not bound a solid, or without TetGen.
+std::unique_ptr<StandIns::Domain> StandIns::make_coarse(double edge_length) const {
+  if (find_tetgen().empty()) return nullptr;
+  const CoarseSurface coarse = coarse_surface(boundary_.surface(), features_, edge_length);
+  return coarse.surface ? make_within(coarse.surface->mesh) : nullptr;
 }
 
 std::unique_ptr<StandIns::Domain> StandIns::make_within(const TriangleMesh& boundary) const {

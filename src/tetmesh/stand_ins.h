@@ -21,10 +21,10 @@ class StandIns {
            const TetOptions& options, const SizeField* bound, Compute& compute, const Context& context);
   ~StandIns();
 
-  // The stand-in for `whole` with `count` of `final_count` sites; null if the solid itself will do. It lasts until the
-  // next call.
-  SolidBackend* choose(std::size_t count, std::size_t final_count, const SolidBackend& whole);
-  // The inside of the remeshed boundary that stood in last, for sites on the boundary and inside; null if none did.
+  // The stand-in for `whole` with `count` of `final_count` sites, with which edges will be so long; null if the solid
+  // itself will do. It lasts until the next call.
+  SolidBackend* choose(std::size_t count, std::size_t final_count, double edge_length, const SolidBackend& whole);
+  // The inside of the coarser boundary that stood in last, for sites on the boundary and inside; null if none did.
   SolidBackend* coarse();
   // What a finished boundary of the result bounds, for `count` sites of which it has the first; null if `whole` itself
   // will do. It lasts until the next call.
@@ -34,7 +34,7 @@ class StandIns {
   struct Domain;
 
   std::unique_ptr<Domain> make_sized(std::size_t count) const;
-  std::unique_ptr<Domain> make_coarse(std::size_t vertices) const;
+  std::unique_ptr<Domain> make_coarse(double edge_length) const;
   std::unique_ptr<Domain> make_within(const TriangleMesh& boundary) const;
 
   const TetMesh& mesh_;

@@ -10,6 +10,7 @@
 #include "bisector/tetmesh.h"
 #include "cvt/optimise.h"
 #include "cvt/run.h"
+#include "remesh/remesh.h"
 #include "tetmesh/tet_sizing.h"
 
 namespace bisector {
@@ -21,6 +22,7 @@ struct TetRun {
   const FeatureGraph& features;
   const SizedSolid& sized;
   const TetOptions& options;
+  MakeBackend make_backend;     // for surfaces that stand in for the boundary
   std::size_t wanted = 0;       // vertices
   double seconds_boundary = 0;  // spent on remeshing the boundary
   double done = 0;              // fraction of the whole run, for progress
