@@ -25,6 +25,7 @@ class Marks {
     rounds_[k] = now_;
     return true;
   }
+  bool has(Index k) const { return rounds_[k] == now_; }
 
  private:
   std::vector<Index> rounds_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "core/geometry.h"
@@ -14,6 +15,16 @@ inline constexpr int kFacetCorners[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0,
 inline Triangle facet_of(const Tetrahedron& tet, int k) {
   return {tet[kFacetCorners[k][0]], tet[kFacetCorners[k][1]], tet[kFacetCorners[k][2]]};
 }
+
+// A facet as one of its tetrahedra has it.
+struct TetSide {
+  Triangle corners;  // ascending
+  bool even;         // facet_of() is an even permutation of them
+  std::size_t at;    // 4 times the tetrahedron, plus the facet
+};
+
+// The sides of all facets, by corners, then tetrahedra.
+std::vector<TetSide> sorted_sides(const std::vector<Tetrahedron>& tets);
 
 // For each tetrahedron and each of its facets the tetrahedron on the other side, or kNone on the boundary. Throws
 // Error, naming the first, if a facet has more than two tetrahedra.

@@ -1,7 +1,6 @@
 #include "mesh/tet_topology.h"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 #include "bisector/quality.h"
@@ -14,41 +13,16 @@ namespace bisector {
 
 namespace {
 
-struct Side {
-  Triangle corners;  // ascending
-  std::size_t at;    // 4 tet + facet
-  bool even;         // facet_of is an even permutation of `corners`
-};
-
-std::vector<Side> sorted_sides(const std::vector<Tetrahedron>& tets) {
-  std::vector<Side> sides(4 * tets.size());
-  parallel_each(tets.size(), [&](std::size_t t) {
-    for (int k = 0; k < 4; ++k) {
-      Triangle f = facet_of(tets[t], k);
-      bool even = true;
-      for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}, std::pair{0, 1}})
-        if (f[i] > f[j]) {
-          std::swap(f[i], f[j]);
-          even = !even;
-        }
-      sides[4 * t + static_cast<std::size_t>(k)] = {f, 4 * t + static_cast<std::size_t>(k), even};
-    }
-  });
-  sort_in_parallel(sides,
-                   [](const Side& a, const Side& b) { return std::tie(a.corners, a.at) < std::tie(b.corners, b.at); });
-  return sides;
-}
-
 // Calls visit(first, last) for the sides of each facet.
 template <class Visit>
-void for_each_facet(const std::vector<Side>& sides, const Visit& visit) {
+void for_each_facet(const std::vector<TetSide>& sides, const Visit& visit) {
   for (std::size_t first = 0, last; first < sides.size(); first = last) {
     for (last = first + 1; last < sides.size() && sides[last].corners == sides[first].corners;) ++last;
     visit(first, last);
   }
 }
 
-std::vector<Triangle> boundary_of(const std::vector<Tetrahedron>& tets, const std::vector<Side>& sides) {
+std::vector<Triangle> boundary_of(const std::vector<Tetrahedron>& tets, const std::vector<TetSide>& sides) {
   std::vector<std::size_t> single;
   for_each_facet(sides, [&](std::size_t first, std::size_t last) {
     if (last - first == 1) single.push_back(sides[first].at);
@@ -81,7 +55,7 @@ void check_vertices(const TetMesh& mesh, TetTopology& topology) {
 TetTopology analyse_tet_topology(const TetMesh& mesh) {
   TetTopology topology;
   if (mesh.tets.empty()) return topology;
-  const std::vector<Side> sides = sorted_sides(mesh.tets);
+  const std::vector<TetSide> sides = sorted_sides(mesh.tets);
   DisjointSets<> parts(mesh.tets.size());
   for_each_facet(sides, [&](std::size_t first, std::size_t last) {
     if (last - first > 2) ++topology.overused_facets;

@@ -55,13 +55,17 @@ void BoundaryCell::trace_polygon(const CellPolygon& polygon, Moments& sum) {
     bisectors_.push_back(label);
     const Vec3 &p = polygons_.vertex(k), &q = polygons_.vertex(k + 1 == n ? 0 : k + 1);
     sum += cone_terms(0.5 * (seeds_->x[label] - seed_), q, p);
-    if (!is_edge(last)) crossings_.push_back({edge_of(last, label), seeds_->id[last] < seeds_->id[label] ? 1 : -1, p});
+    if (is_edge(last)) continue;
+    crossed_.mark(label);
+    crossed_.mark(last);
+    crossings_.push_back({edge_of(last, label), seeds_->id[last] < seeds_->id[label] ? 1 : -1, p});
   }
 }
 
 void BoundaryCell::trace(std::span<const CellPolygon> polygons) {
   bisectors_.clear();
   crossings_.clear();
+  crossed_.begin(seeds_->x.size());
   magnitude_ = 0;
   for (const CellPolygon& polygon : polygons) {
     const Facet& facet = surface_.facets[polygon.facet];
@@ -97,7 +101,7 @@ void BoundaryCell::count_crossings() {
   for (std::size_t v = 0; v < n; ++v)
     for (std::size_t e = 0; e < 3; ++e) {
       const Index first = cell_.label_at(v, (e + 1) % 3), second = cell_.label_at(v, (e + 2) % 3);
-      if (is_facet(first) || is_facet(second)) continue;
+      if (is_facet(first) || is_facet(second) || !crossed_.has(first) || !crossed_.has(second)) continue;
       const std::uint64_t edge = edge_of(first, second);
       auto crossing = std::lower_bound(crossings_.begin(), crossings_.end(), edge,
                                        [](const Crossing& c, std::uint64_t of) { return c.edge < of; });

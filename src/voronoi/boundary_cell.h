@@ -96,6 +96,7 @@ class BoundaryCell {
   FixedTreeSum sum_;
   double magnitude_ = 0;  // of the volumes added
 
+  Marks crossed_;  // bisectors with crossings
   Marks listed_, met_;
   // Of each vertex and plane: the first of its crossings on the edge that leaves the plane there, and how many more
   // leave the inside towards the vertex than enter it.
