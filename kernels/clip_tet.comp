@@ -14,7 +14,7 @@ layout(constant_id = 4) const bool kListed = false;  // the pairs are those of a
 layout(constant_id = 5) const bool kLabels = false;  // writes labels, and nothing else
 layout(constant_id = 6) const bool kNarrow = false;  // moments are kept in single precision
 layout(constant_id = 7) const bool kDoubleNext = false;  // uncertain pairs go to the rung of double precision
-layout(constant_id = 8) const bool kInnerWhole = false;  // cells off the boundary are clipped from the enclosure
+layout(constant_id = 8) const bool kWhole = false;  // the only tetrahedron is the enclosure, and cells lie inside it
 
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
@@ -34,7 +34,6 @@ layout(std430, binding = 14) buffer Flagged { uint flagged[]; };
 layout(std430, binding = 15) writeonly buffer Labels { uint labels[]; };
 #define PUSH_CLIP
 #include "layout/push.h"
-#define enclosure element_base
 #include "layout/counters.h"
 #include "tet.glsl"
 LOAD_POINT(seed, seed_words)
@@ -54,22 +53,15 @@ void propose(uint tet, uint slot) {
   else atomicOr(counters[kOverflow], kOverflowProposals);
 }
 
-// Everywhere, or with all inner cells clipped: the other cells of the tetrahedron. Else the cell goes on to the
-// tetrahedra across facets that it meets, and a neighbour that does not meet the boundary is known to lie inside.
+// The other cells of the tetrahedron. Of those that are taken whole a neighbour that does not meet the boundary is
+// known to lie inside; each is proposed once.
 void propose_all(uint tet) {
   [[dont_unroll]] for (uint k = 0; k < bounding_count; ++k) {
     const uint label = plane_label[bounding[k]];
-    if ((label & kFacetLabel) == 0) {
-      if (!kInnerWhole) {
-        propose(tet, label);
-      } else if ((atomicOr(cell_errors[kCellErrorWords * cell_count + label], kMarkMet) &
-                  (kMarkBoundary | kMarkMet)) == 0) {
-        propose(enclosure, label);
-      }
-    } else if (kInnerWhole) {
-      const uint across = tet_meta[tet * kTetMetaWords + kTetAcrossAt + (label & 3u)];
-      if (across != kNone) propose(across, own_slot);
-    }
+    if ((label & kFacetLabel) != 0) continue;
+    if (!kWhole || (atomicOr(cell_errors[kCellErrorWords * cell_count + label], kMarkMet) &
+                    (kMarkBoundary | kMarkMet)) == 0)
+      propose(tet, label);
   }
 }
 
@@ -132,7 +124,7 @@ void main() {
   Moments moments;
   if (status == kStatusClipped || status == kStatusWhole) {
     collect();
-    if (tet == enclosure && reaches_enclosure()) status = kStatusUnsure;
+    if (kWhole && reaches_enclosure()) status = kStatusUnsure;
     else if (!kLabels) moments = integrate(kUniform);
   }
   if (!loops_complete(two)) status = kStatusUnsure;

@@ -4,8 +4,6 @@
 // corners.
 #include "common.glsl"
 
-layout(constant_id = 0) const bool kPropose = true;
-
 layout(std430, binding = 0) buffer TetMeta { uint tet_meta[]; };
 layout(std430, binding = 1) readonly buffer Owners { uint owners[]; };
 layout(std430, binding = 2) writeonly buffer Proposals { uvec2 proposals[]; };
@@ -32,7 +30,6 @@ void main() {
     if (k == count) found[count++] = owner;
   }
   tet_meta[meta + kTetOwnerAt] = count == 1 ? found[0] : kNone;
-  if (!kPropose) return;
   const uint at = atomicAdd(counters[kProposals], count);
   if (at + count > proposal_capacity) {
     atomicOr(counters[kOverflow], kOverflowProposals);

@@ -38,16 +38,16 @@ uint order_and_anchors(const TetFrame& frame) {
 
 double device_scale(const Solid& solid) { return std::ldexp(1.0, 16 - std::ilogb(solid.box.diagonal())); }
 
-DeviceSolid::DeviceSolid(Device& device, Commands& commands, const Solid& given, double scale, bool is_double,
-                         bool with_doubles)
-    : solid(given), frames(tet_frames(given)), words(device), double_words(device), meta(device), tet_of_facet(device),
-      has_doubles(with_doubles) {
-  frames.push_back(TetFrame(solid.enclosure, {0, 1, 2, 3}, nullptr, 0));
+DeviceSolid::DeviceSolid(Device& device, Commands& commands, const Solid& given, bool as_whole, double scale,
+                         bool is_double, bool with_doubles)
+    : solid(given), whole(as_whole),
+      frames(whole ? std::vector<TetFrame>{enclosure_frame(given)} : tet_frames(given)), words(device),
+      double_words(device), meta(device), has_doubles(with_doubles) {
   const std::size_t bytes =
       is_double || with_doubles ? tet_layout(true).words * sizeof(double) : tet_layout(false).words * sizeof(float);
   if (frames.size() > device.limits().storage_range / bytes)
     throw DeviceError(
-        fmt::format("{}: {} tetrahedra are more than its buffers hold", device.description().name, tets()));
+        fmt::format("{}: {} tetrahedra are more than its buffers hold", device.description().name, frames.size()));
   std::vector<Index> place(solid.mesh.vertices.size(), kNone);
   std::vector<TetMeta> metas;
   RealWords packed(is_double), wide(true);
@@ -58,10 +58,9 @@ DeviceSolid::DeviceSolid(Device& device, Commands& commands, const Solid& given,
     if (with_doubles) pack(frames[t], scale, true, wide);
     TetMeta& tet = metas.emplace_back();
     tet.sites.fill(kNone);
-    tet.across.fill(kNone);
     tet.bits = order_and_anchors(frames[t]);
     tet.owner = kNone;
-    if (t == tets() || !(solid.six_volumes[t] > 0)) continue;
+    if (whole || !(solid.six_volumes[t] > 0)) continue;
     for (std::size_t k = 0; k < 4; ++k) {
       const Index v = solid.mesh.tets[t][k];
       if (place[v] == kNone) {
@@ -70,14 +69,10 @@ DeviceSolid::DeviceSolid(Device& device, Commands& commands, const Solid& given,
       }
       tet.sites[k] = place[v];
     }
-    std::copy(solid.adjacent[t].begin(), solid.adjacent[t].end(), tet.across.begin());
   }
-  std::vector<Index> under;
-  for (const FacetSummary& summary : solid.boundary.summaries) under.push_back(solid.tet_of_triangle[summary.triangle]);
   upload(commands, words, packed);
   if (with_doubles) upload(commands, double_words, wide);
   upload(commands, meta, metas);
-  upload(commands, tet_of_facet, under);
   commands.run();
 }
 

@@ -15,22 +15,21 @@ namespace bisector::host {
 // moments of all of a solid and of cells 2^-36 of its size are within the range of single precision.
 double device_scale(const Solid& solid);
 
-// Tetrahedra in their order, then the enclosure, as the clipping reads them on either side.
+// What cells are clipped from, as the clipping reads it on either side: the tetrahedra in their order, or the enclosure
+// alone.
 struct DeviceSolid {
   // Throws DeviceError if there are more than a binding can span.
-  DeviceSolid(Device& device, Commands& commands, const Solid& solid, double scale, bool is_double, bool with_doubles);
+  DeviceSolid(Device& device, Commands& commands, const Solid& solid, bool whole, double scale, bool is_double,
+              bool with_doubles);
 
   const Solid& solid;
+  const bool whole;  // the enclosure alone
   std::vector<TetFrame> frames;
   std::vector<Index> vertices;  // that tetrahedra with volume use
   Buffer words;                 // in the backend's precision
   Buffer double_words;          // for the rung of double precision; may be empty
   Buffer meta;
-  Buffer tet_of_facet;  // under the facets of the boundary
   bool has_doubles;
-
-  std::size_t tets() const { return solid.mesh.tets.size(); }
-  Index enclosure() const { return static_cast<Index>(tets()); }
 };
 
 }  // namespace bisector::host

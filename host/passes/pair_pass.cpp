@@ -235,6 +235,14 @@ void PairPass::label(const PairJob& job, std::size_t chunk, std::size_t first, s
        });
 }
 
+std::vector<Index> PairPass::marks(const PairJob& job) {
+  std::vector<Index> marks(job.seeds.count());
+  job.commands.download(buffers_.cell_errors, kCellErrorWords * job.seeds.count() * kWord, marks.data(),
+                        marks.size() * kWord);
+  job.commands.run();
+  return marks;
+}
+
 Counters PairPass::read_counters(const PairJob& job) {
   Counters counters{};
   job.commands.download(job.counters, 0, counters.data(), sizeof counters);

@@ -105,6 +105,8 @@ class PairPass {
   // those of CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there
   // were.
   std::size_t refine(const PairJob& job, const Buffer& cells, float share, Certification& certification);
+  // The marks that the last run has left on each slot.
+  std::vector<Index> marks(const PairJob& job);
   // Records the clipping of `count` pairs from `first` on, of one batch, for their labels.
   void label(const PairJob& job, std::size_t chunk, std::size_t first, std::size_t count, const Buffer& labels);
 

@@ -79,7 +79,6 @@ void PolyhedraPass::run(PairPass& pairs, const PairJob& job, TetPairs& domain, E
   sort_in_parallel(found, [&](const Found& a, const Found& b) {
     return a.tet != b.tet ? a.tet < b.tet : seeds.id[a.slot] < seeds.id[b.slot];
   });
-  const Index enclosure = domain.solid().enclosure();
   std::vector<ClippedPolyhedra> parts((found.size() + kChunk - 1) / kChunk);
   exact.for_each<TetClipper>(
       parts.size(),
@@ -91,7 +90,7 @@ void PolyhedraPass::run(PairPass& pairs, const PairJob& job, TetPairs& domain, E
           if (entry.exactly) clipper.clip(frame);
           else if (entry.labels.empty()) clipper.take(frame);
           else clipper.take(frame, entry.labels, entry.triples);
-          append_polyhedron(clipper, seeds, entry.tet == enclosure ? kNone : entry.tet, entry.slot, parts[c]);
+          append_polyhedron(clipper, seeds, domain.solid().whole ? kNone : entry.tet, entry.slot, parts[c]);
         }
       },
       1);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "host/passes/packing.h"
+#include "kernels/layout/counters.h"
 #include "kernels/layout/pairs.h"
 #include "mesh/tet_adjacency.h"
 
@@ -31,64 +33,71 @@ double expected_cells(const TetFrame& tet, double volume, double density) {
 
 }  // namespace
 
-TetPairs::TetPairs(bool is_double, DeviceSolid& solid, const OwnerPass& corners, ExactRung& exact, bool inner_whole,
-                   double batch_pairs)
-    : double_(is_double), solid_(solid), corners_(corners), exact_(exact), inner_whole_(inner_whole),
-      batch_pairs_(batch_pairs) {}
+TetPairs::TetPairs(bool is_double, DeviceSolid& solid, const OwnerPass& corners, ExactRung& exact, double batch_pairs)
+    : double_(is_double), solid_(solid), corners_(corners), exact_(exact), batch_pairs_(batch_pairs) {}
 
-void TetPairs::set_shell(const PairStore& pairs, const CellMoments& moments, std::size_t cells) {
-  shell_ = &pairs;
-  shell_moments_ = &moments;
+void TetPairs::plan(std::size_t cells) {
   const Solid& solid = solid_.solid;
   const double density = static_cast<double>(cells) / solid.volume;
   batches_ = {{0, 0}};
   expected_pairs_ = 0;
   double batch = 0;
-  for (std::size_t t = 0; t < solid_.tets(); ++t) {
+  for (std::size_t t = 0; t < solid_.frames.size(); ++t) {
     if (!(solid.six_volumes[t] > 0)) {
       ++batches_.back().count;
       continue;
     }
     const double expected = expected_cells(solid_.frames[t], solid.six_volumes[t] / 6, density);
     expected_pairs_ += expected;
-    if (!inner_whole_ && batch > 0 && batch + expected > batch_pairs_) {
+    if (batch > 0 && batch + expected > batch_pairs_) {
       batches_.push_back({t, 0});
       batch = 0;
     }
     batch += expected;
     ++batches_.back().count;
   }
-  if (!inner_whole_) return;
-  std::size_t on_boundary = 0;
-  for (std::size_t i = 0; i < moments.triangles.rows(); ++i) on_boundary += moments.triangles.size(i) > 0;
-  const double share = static_cast<double>(on_boundary) / static_cast<double>(cells);
-  expected_pairs_ = share * expected_pairs_ + (1 - share) * static_cast<double>(cells);
+}
+
+void TetPairs::plan_whole(std::vector<Index> starts, std::vector<Index> marks) {
+  batches_ = {{0, 1}};
+  starts_ = std::move(starts);
+  marks_ = std::move(marks);
+  for (const Index slot : starts_) marks_[slot] |= kMarkMet;
+  expected_pairs_ = static_cast<double>(marks_.size());
 }
 
 void TetPairs::start(const PairJob& job, const PairBuffers& buffers, std::size_t index) {
+  if (solid_.whole) return start_whole(job, buffers);
   const Batch& batch = batches_[index];
   const StartTetsPush push{word(batch.first), word(batch.count), word(buffers.proposal_capacity)};
   job.commands.dispatch(
-      {"start_tets", {!inner_whole_}},
+      {"start_tets", {}},
       {updates(solid_.meta), reads(corners_.owners()), updates(buffers.proposals), updates(job.counters)}, push,
       batch.count);
-  if (!inner_whole_) return;
-  const StartBoundaryPush shell{word(shell_->count), word(job.seeds.count()), word(buffers.proposal_capacity)};
-  job.commands.dispatch({"start_boundary", {}},
-                        {reads(shell_->pairs), reads(shell_->status), reads(solid_.tet_of_facet),
-                         updates(buffers.cell_errors), updates(buffers.proposals), updates(job.counters)},
-                        shell, shell_->count);
+}
+
+// Marks the cells that are not to be proposed any more, and proposes those to start from.
+void TetPairs::start_whole(const PairJob& job, const PairBuffers& buffers) const {
+  constexpr std::size_t kWord = sizeof(uint);
+  job.commands.upload(buffers.cell_errors, kCellErrorWords * job.seeds.count() * kWord, marks_.data(),
+                      marks_.size() * kWord);
+  if (starts_.size() > buffers.proposal_capacity)
+    return job.commands.fill(job.counters, kOverflow * kWord, kWord, kOverflowProposals);
+  std::vector<PairName> proposals;
+  for (const Index slot : starts_) proposals.push_back({0, slot});
+  if (!proposals.empty())
+    job.commands.upload(buffers.proposals, 0, proposals.data(), proposals.size() * sizeof(PairName));
+  job.commands.fill(job.counters, kProposals * kWord, kWord, word(proposals.size()));
 }
 
 void TetPairs::clip(const PairJob& job, const PairBuffers& buffers, std::size_t, const ClipKind& kind, ClipPush push,
                     const Buffer& labels, const ClipDispatch& dispatch) {
   const bool doubled = kind.rung == kRungDouble;
-  push.element_base = solid_.enclosure();
   const std::uint32_t planes = kind.labels || kind.rung == kRungFirst ? kMostPlanes : kWidePlanes;
   const PairStore& store = job.store;
   dispatch(kernel("clip_tet", double_ || doubled,
                   {planes, 2 * planes - 4, solid_.solid.density.empty(), kind.rung, kind.listed, kind.labels, doubled,
-                   !doubled && double_next(), inner_whole_}),
+                   !doubled && double_next(), solid_.whole}),
            {reads(doubled ? job.seeds.doubles : job.seeds.words), reads(job.seeds.ids),
             reads(doubled ? solid_.double_words : solid_.words), reads(solid_.meta), reads(job.neighbours.info()),
             updates(buffers.cell_errors), reads(job.neighbours.lists()), reads(job.neighbours.wide_lists()),
@@ -107,17 +116,14 @@ std::vector<ExactPair> TetPairs::clip_exactly(const PairJob& job, const std::vec
     if (!clipper.clip(solid_.frames[tet])) return;
     pair.empty = false;
     pair.moments = scaled(uniform ? clipper.integrate<true>() : clipper.integrate<false>(), job.seeds.scale, true);
-    for (const Index label : clipper.labels()) {
-      if (is_facet(label)) {
-        const Index across = !inner_whole_ || tet == solid_.enclosure() ? kNone : solid_.solid.adjacent[tet][label & 3];
-        if (across != kNone) pair.proposals.push_back({across, slot});
-      } else if (!inner_whole_) {
-        pair.proposals.push_back({tet, label});
-      } else if (shell_moments_->triangles.size(job.seeds.sorted.id[label]) == 0) {
-        pair.proposals.push_back({solid_.enclosure(), label});
-      }
-    }
+    for (const Index label : clipper.labels())
+      if (!is_facet(label)) pair.proposals.push_back({tet, label});
   });
+  if (solid_.whole)
+    for (ExactPair& pair : pairs) {
+      for (const PairName& name : pair.proposals) marks_[name.slot] |= kMarkMet;
+      std::erase_if(pair.proposals, [&](const PairName& name) { return marks_[name.slot] & kMarkBoundary; });
+    }
   return pairs;
 }
 

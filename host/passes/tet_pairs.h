@@ -10,13 +10,16 @@ namespace bisector::host {
 
 class TetPairs : public PairDomain {
  public:
-  // With `inner_whole` cells that do not meet the boundary are pairs of the enclosure, and pairs start from those of
-  // the boundary; else they start from the owners of the vertices.
-  TetPairs(bool is_double, DeviceSolid& solid, const OwnerPass& corners, ExactRung& exact, bool inner_whole,
-           double batch_pairs);
+  // Where cells are whole, those that do not meet the boundary are pairs of the enclosure, and start from those that are
+  // known to lie inside; else pairs start from the owners of the vertices.
+  TetPairs(bool is_double, DeviceSolid& solid, const OwnerPass& corners, ExactRung& exact, double batch_pairs);
 
-  // The pairs of the boundary's facets, and the triangles of each of the `cells` cells.
-  void set_shell(const PairStore& pairs, const CellMoments& moments, std::size_t cells);
+  // For so many cells that are cut up.
+  void plan(std::size_t cells);
+  // For whole cells: the slots to start from, and a mark for each slot that meets the boundary (kernels/layout/pairs.h).
+  void plan_whole(std::vector<Index> starts, std::vector<Index> marks);
+  // Of each slot whether a cell that was clipped exactly has it for a neighbour.
+  const std::vector<Index>& marks() const { return marks_; }
   DeviceSolid& solid() const { return solid_; }
 
   const char* elements() const override { return "tetrahedra"; }
@@ -39,14 +42,14 @@ class TetPairs : public PairDomain {
     std::size_t first, count;
   };
 
+  void start_whole(const PairJob& job, const PairBuffers& buffers) const;
+
   bool double_;
   DeviceSolid& solid_;
   const OwnerPass& corners_;
   ExactRung& exact_;
-  bool inner_whole_;
   double batch_pairs_;
-  const PairStore* shell_ = nullptr;
-  const CellMoments* shell_moments_ = nullptr;
+  std::vector<Index> starts_, marks_;
   std::vector<Batch> batches_;
   double expected_pairs_ = 0;
 };

@@ -1,11 +1,18 @@
 #include "host/passes/vulkan_solid_backend.h"
 
+#include <algorithm>
+#include <numeric>
+#include <utility>
+#include <vector>
+
 #include "backend/cpu_backend.h"
 #include "core/stopwatch.h"
+#include "host/passes/boundary_pass.h"
 #include "host/passes/cell_pass.h"
 #include "host/passes/device_backend.h"
 #include "host/passes/polyhedra_pass.h"
 #include "host/passes/surface_stage.h"
+#include "voronoi/polyhedra.h"
 
 namespace bisector::host {
 namespace {
@@ -24,18 +31,23 @@ class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
  private:
   DeviceWork compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
   void find_owners(const std::vector<Vec3>& seeds);
-  void find_boundary_moments(CellMoments& boundary, Certification& certification);
+  void find_pairs(Certification& certification);
+  void list_triangles(Csr<Index>& triangles);
   void find_moments(CellMoments& moments, Certification& certification);
+  void sum(CellMoments& moments);
+  void append_boundary(ClippedPolyhedra& polyhedra);
   PairJob job() {
     return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.scan, stage_.counters, store_, tets_};
   }
 
+  const bool whole_;  // cells are not cut up
   // The solid's boundary.
   SurfaceStage shell_;
   CellPass shell_cells_;
   // Its inside.
   DeviceSolid device_solid_;
-  OwnerPass corners_;
+  BoundaryPass boundary_;  // for whole cells
+  OwnerPass corners_;      // for cells that are cut up
   TetPairs tets_;
   PairPass pairs_;
   PairStore store_;
@@ -47,23 +59,25 @@ VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Devic
                                        const Precisions& precisions, InnerCells inner)
     : DeviceBackend(solid, std::move(device), precisions, options.neighbours, device_scale(solid), box_of(solid), true,
                     inner),
-      shell_(stage_, solid.boundary, options.capacities), shell_cells_(stage_.device(), stage_.is_double(), false),
-      device_solid_(stage_.device(), stage_.commands, solid, stage_.seeds.scale, stage_.is_double(),
+      whole_(inner == InnerCells::whole && solid.density.empty()), shell_(stage_, solid.boundary, options.capacities),
+      shell_cells_(stage_.device(), stage_.is_double(), false),
+      device_solid_(stage_.device(), stage_.commands, solid, whole_, stage_.seeds.scale, stage_.is_double(),
                     precisions.double_rung),
-      corners_(stage_.device(), stage_.is_double()),
-      tets_(stage_.is_double(), device_solid_, corners_, stage_.exact,
-            inner == InnerCells::whole && solid.density.empty(), options.capacities.batch_pairs),
+      boundary_(solid, device_solid_.frames.back()), corners_(stage_.device(), stage_.is_double()),
+      tets_(stage_.is_double(), device_solid_, corners_, stage_.exact, options.capacities.batch_pairs),
       pairs_(stage_.device(), stage_.is_double(), options.capacities), store_(stage_.device()),
       cells_(stage_.device(), stage_.is_double(), true), polyhedra_(stage_.device()) {
-  std::vector<Index> triangles, places;
-  for (const FacetSummary& summary : solid.boundary.summaries) triangles.push_back(summary.triangle);
-  shell_cells_.set_elements(stage_.commands, triangles, solid.boundary.facet_of.size());
-  // The enclosure's pairs come last.
-  for (Index t = 0; t <= device_solid_.enclosure(); ++t) places.push_back(t);
+  std::vector<Index> places(device_solid_.frames.size());
+  std::iota(places.begin(), places.end(), Index{0});
   cells_.set_elements(stage_.commands, places, places.size());
-  std::vector<Vec3> points;
-  for (const Index v : device_solid_.vertices) points.push_back(solid.mesh.vertices[v]);
-  corners_.set_points(stage_.commands, points, stage_.seeds.scale);
+  if (!whole_) {
+    std::vector<Index> triangles;
+    for (const FacetSummary& summary : solid.boundary.summaries) triangles.push_back(summary.triangle);
+    shell_cells_.set_elements(stage_.commands, triangles, solid.boundary.facet_of.size());
+    std::vector<Vec3> points;
+    for (const Index v : device_solid_.vertices) points.push_back(solid.mesh.vertices[v]);
+    corners_.set_points(stage_.commands, points, stage_.seeds.scale);
+  }
   stage_.commands.run();
 }
 
@@ -74,22 +88,33 @@ DeviceWork VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds,
   find_owners(seeds);
   work.searched = watch.lap();
 
-  CellMoments shell;
-  find_boundary_moments(shell, work.certification);
-  if (includes(want, Want::labels)) shell_.polygons(diagram.polygons);
-  tets_.set_shell(shell_.store(), shell, stage_.seeds.count());
+  shell_.find_pairs(work.certification);
+  Csr<Index> triangles;
+  if (whole_) {
+    shell_.polygons(diagram.polygons);
+    boundary_.run(stage_.seeds.sorted, stage_.exact.neighbours(), diagram.polygons, includes(want, Want::polyhedra));
+    triangles = boundary_.triangles();
+  } else {
+    list_triangles(triangles);
+    if (includes(want, Want::labels)) shell_.polygons(diagram.polygons);
+    tets_.plan(stage_.seeds.count());
+  }
   work.paired = watch.lap();
 
   find_moments(moments, work.certification);
-  moments.triangles = std::move(shell.triangles);
+  moments.triangles = std::move(triangles);
   stage_.set_step_masses(moments);
   work.clipped = watch.lap();
-  if (includes(want, Want::polyhedra)) polyhedra_.run(pairs_, job(), tets_, stage_.exact, diagram.polyhedra);
+  if (includes(want, Want::polyhedra)) {
+    polyhedra_.run(pairs_, job(), tets_, stage_.exact, diagram.polyhedra);
+    if (whole_) append_boundary(diagram.polyhedra);
+  }
   return work;
 }
 
 void VulkanSolidBackend::find_owners(const std::vector<Vec3>& seeds) {
   shell_.find_owners(seeds);
+  if (whole_) return;
   if (stage_.sorted_anew()) corners_.forget();
   stage_.commands.fill(stage_.counters, kUncertainOwners * sizeof(uint), sizeof(uint), 0);
   corners_.record(stage_.commands, stage_.seeds, stage_.neighbours.grid(), stage_.counters, true);
@@ -97,22 +122,52 @@ void VulkanSolidBackend::find_owners(const std::vector<Vec3>& seeds) {
   corners_.complete(stage_.commands, counters[kUncertainOwners], stage_.exact);
 }
 
-void VulkanSolidBackend::find_boundary_moments(CellMoments& boundary, Certification& certification) {
-  shell_.find_pairs(certification);
+void VulkanSolidBackend::find_pairs(Certification& certification) {
+  if (!whole_) return pairs_.run(job(), certification);
+  std::vector<Index> marks;
+  do {
+    tets_.plan_whole(boundary_.slots_inside(), boundary_.marks());
+    pairs_.run(job(), certification);
+    if (boundary_.is_settled()) return;
+    marks = pairs_.marks(job());
+    for (std::size_t s = 0; s < marks.size(); ++s) marks[s] |= tets_.marks()[s];
+  } while (!boundary_.settle(marks));
+}
+
+void VulkanSolidBackend::list_triangles(Csr<Index>& triangles) {
+  CellMoments shell;
   shell_cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, shell_.store());
-  shell_cells_.sum(stage_, shell_.store(), boundary);
+  shell_cells_.sum(stage_, shell_.store(), shell);
+  triangles = std::move(shell.triangles);
 }
 
 void VulkanSolidBackend::find_moments(CellMoments& moments, Certification& certification) {
-  pairs_.run(job(), certification);
+  find_pairs(certification);
   cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, store_);
-  const auto sum = [&] { cells_.sum(stage_, store_, moments); };
-  sum();
+  sum(moments);
   if (!stage_.is_double()) {
     const auto refine = [&](float share) { return pairs_.refine(job(), cells_.cells(), share, certification); };
-    refine_masses(mass(), moments, refine, sum);
+    refine_masses(mass(), moments, refine, [&] { sum(moments); });
   }
-  certification.pairs = moments.triangles.values.size();
+  certification.pairs = moments.triangles.values.size() + (whole_ ? boundary_.count() : 0);
+}
+
+void VulkanSolidBackend::sum(CellMoments& moments) {
+  cells_.sum(stage_, store_, moments);
+  if (!whole_) return;
+  boundary_.put_moments(moments.cells);
+  const std::size_t n = moments.cells.size();
+  moments.mass = fixed_sum(n, [&](std::size_t i) { return moments.cells[i].mass; });
+  moments.energy = fixed_sum(n, [&](std::size_t i) { return moments.cells[i].second; });
+  // The device's medians lack the masses at the boundary.
+  std::fill(moments.step_mass.begin(), moments.step_mass.end(), -1);
+}
+
+void VulkanSolidBackend::append_boundary(ClippedPolyhedra& polyhedra) {
+  const ClippedPolyhedra inner = std::move(polyhedra);
+  std::vector<const ClippedPolyhedra*> parts{&inner};
+  boundary_.cells().each_part([&](const ClippedPolyhedra& part) { parts.push_back(&part); });
+  gather_polyhedra(parts, [](const ClippedPolyhedra::Pair&) { return true; }, polyhedra);
 }
 
 }  // namespace

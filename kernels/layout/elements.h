@@ -40,13 +40,11 @@ LAYOUT_CONSTANT uint kTetGradientAfterDensity = 4;
 LAYOUT_CONSTANT uint kTetMomentsAfterDensity = 7;
 LAYOUT_CONSTANT uint kTetWordsAfterDensity = 12;
 
-// Whole numbers of a tetrahedron: sites of the corners (none if it has no volume or is the enclosure), tetrahedra
-// across the facets, bits: of two bits each the corners in order and the facets' anchors; the cell that owns all
-// corners, or none.
-LAYOUT_CONSTANT uint kTetMetaWords = 10;
-LAYOUT_CONSTANT uint kTetAcrossAt = 4;
-LAYOUT_CONSTANT uint kTetBitsAt = 8;
-LAYOUT_CONSTANT uint kTetOwnerAt = 9;
+// Whole numbers of a tetrahedron: sites of the corners (none if it has no volume or is the enclosure); bits: of two bits
+// each the corners in order and the facets' anchors; the cell that owns all corners, or none.
+LAYOUT_CONSTANT uint kTetMetaWords = 6;
+LAYOUT_CONSTANT uint kTetBitsAt = 4;
+LAYOUT_CONSTANT uint kTetOwnerAt = 5;
 LAYOUT_CONSTANT uint kTetAnchorShift = 8;
 
 LAYOUT_END
@@ -59,14 +57,13 @@ struct FacetMeta {
   uint triangle, bits;
 };
 struct TetMeta {
-  std::array<uint, 4> sites, across;
+  std::array<uint, 4> sites;
   uint bits, owner;
 };
 static_assert(sizeof(FacetMeta) == kFacetMetaWords * sizeof(uint));
 static_assert(offsetof(FacetMeta, triangle) == kFacetTriangleAt * sizeof(uint));
 static_assert(offsetof(FacetMeta, bits) == kFacetBitsAt * sizeof(uint));
 static_assert(sizeof(TetMeta) == kTetMetaWords * sizeof(uint));
-static_assert(offsetof(TetMeta, across) == kTetAcrossAt * sizeof(uint));
 static_assert(offsetof(TetMeta, bits) == kTetBitsAt * sizeof(uint));
 static_assert(offsetof(TetMeta, owner) == kTetOwnerAt * sizeof(uint));
 

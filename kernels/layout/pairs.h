@@ -47,7 +47,7 @@ LAYOUT_CONSTANT uint kCellErrorWords = 2;
 LAYOUT_CONSTANT uint kEnergyErrorAt = 1;
 LAYOUT_CONSTANT uint kMarkWords = 1;
 LAYOUT_CONSTANT uint kMarkBoundary = 1;  // the cell meets the solid's boundary
-LAYOUT_CONSTANT uint kMarkMet = 2;       // some inner cell has it for a neighbour
+LAYOUT_CONSTANT uint kMarkMet = 2;       // some cell inside has it for a neighbour
 
 // Labels of a polygon: their number (or none where it is uncertain), then the labels.
 LAYOUT_CONSTANT uint kPolygonHeader = 1;

@@ -82,14 +82,6 @@ PUSH_CONSTANTS(StartTetsPush) {
 };
 #endif
 
-#if LAYOUT_CPLUSPLUS || defined(PUSH_START_BOUNDARY)
-PUSH_CONSTANTS(StartBoundaryPush) {
-  uint pair_count;  // of the boundary's facets
-  uint cell_count;
-  uint proposal_capacity;
-};
-#endif
-
 #if LAYOUT_CPLUSPLUS || defined(PUSH_ADVANCE)
 PUSH_CONSTANTS(AdvancePush) {
   uint of_pairs;     // else of proposals
@@ -109,8 +101,7 @@ PUSH_CONSTANTS(AdmitPush) {
 // Of clip.comp and clip_tet.comp.
 #if LAYOUT_CPLUSPLUS || defined(PUSH_CLIP)
 PUSH_CONSTANTS(ClipPush) {
-  // The first facet of the buffers; of a solid the enclosure, which is the element after the last tetrahedron.
-  uint element_base;
+  uint element_base;  // the first facet of the buffers
   float residual;   // what a difference of two positions may lack in single precision; 0 in double
   uint two;         // 2: see loops_complete() of common.glsl
   uint first_pair;  // of the range; for listed pairs: the list's first entry
@@ -165,7 +156,6 @@ static_assert(sizeof(WideTargetsPush) == 8 && offsetof(WideTargetsPush, target_c
 static_assert(sizeof(StartFacetsPush) == 20 && offsetof(StartFacetsPush, pair_capacity) == 16);
 static_assert(sizeof(StartSamplesPush) == 16 && offsetof(StartSamplesPush, proposal_capacity) == 12);
 static_assert(sizeof(StartTetsPush) == 12 && offsetof(StartTetsPush, proposal_capacity) == 8);
-static_assert(sizeof(StartBoundaryPush) == 12 && offsetof(StartBoundaryPush, proposal_capacity) == 8);
 static_assert(sizeof(AdvancePush) == 16 && offsetof(AdvancePush, most_items) == 12);
 static_assert(sizeof(AdmitPush) == 8 && offsetof(AdmitPush, pair_capacity) == 4);
 static_assert(sizeof(ClipPush) == 32 && offsetof(ClipPush, residual) == 4 && offsetof(ClipPush, cell_count) == 28);

@@ -20,14 +20,17 @@ class BoundaryCells {
       : workers_([&surface, &enclosure] { return Worker{BoundaryCell(surface, enclosure), {}, 0}; }) {}
 
   // Sets the moments of the cells of these slots, which meet the surface, and their polyhedra if they are wanted. All
-  // arguments must outlive the calls of settle().
+  // arguments must outlive the calls of the functions that settle.
   void evaluate(const SortedSeeds& seeds, const Neighbours& neighbours, const std::vector<Index>& slots,
                 const PolygonsOf& polygons_of, bool want_polyhedra, std::vector<Moments>& cells);
-  // Cells whose polygons do not tell on which side their Voronoi vertices lie. They are inside if a cell that has
-  // vertices inside reaches one of them, and outside if none does.
-  std::vector<Index> open() const;
-  // Evaluates one of these. Returns the slots that share a Voronoi vertex inside with it, until the next call.
-  const std::vector<Index>& settle(Index slot, BoundaryCell::Side vertices);
+  // Cells are open as long as neither their polygons nor other cells at the boundary tell on which side of it their
+  // Voronoi vertices lie. They lie inside if a cell that has vertices inside is a neighbour, and outside if none is.
+  const std::vector<Index>& open() const { return open_; }
+  bool is_open(Index slot) const { return !open_.empty() && is_open_[slot]; }
+  // Evaluates one that is open and lies inside, and those that follow from it. Returns the slots that share a Voronoi
+  // vertex inside with one of these.
+  std::vector<Index> settle_inside(Index slot);
+  void settle_others_outside();
 
   // The slots that share a Voronoi vertex inside with one of the cells; some more than once.
   std::vector<Index> reached() const;
@@ -41,7 +44,7 @@ class BoundaryCells {
  private:
   // What some of the cells contribute.
   struct Chunk {
-    std::vector<Index> open, reached;
+    std::vector<Index> open, reached;  // open at first
     ClippedPolyhedra polyhedra;
     PairCounts counts;
   };
@@ -52,7 +55,8 @@ class BoundaryCells {
   };
 
   Worker& worker();
-  void evaluate_one(Index slot, BoundaryCell::Side vertices, Worker& worker, Chunk& chunk);
+  void list_open();
+  bool evaluate_one(Index slot, BoundaryCell::Side vertices, Worker& worker, Chunk& chunk);
 
   ThreadLocal<Worker> workers_;
   std::uint64_t generation_ = 0;
@@ -62,6 +66,8 @@ class BoundaryCells {
   bool want_polyhedra_ = false;
   std::vector<Moments>* cells_ = nullptr;
   std::vector<Chunk> chunks_;  // the last one is that of cells settled afterwards
+  std::vector<Index> open_;
+  std::vector<char> is_open_;  // of each slot; only if any is
 };
 
 }  // namespace bisector

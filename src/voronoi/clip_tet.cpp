@@ -57,6 +57,8 @@ TetFrame::TetFrame(const std::array<Vec3, 4>& given, const Tetrahedron& ranks, c
   }
 }
 
+TetFrame enclosure_frame(const Solid& solid) { return {solid.enclosure, {0, 1, 2, 3}, nullptr, 0}; }
+
 std::vector<TetFrame> tet_frames(const Solid& solid) {
   std::vector<TetFrame> frames(solid.mesh.tets.size());
   parallel_each(frames.size(), [&](std::size_t t) {

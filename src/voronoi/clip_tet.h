@@ -32,6 +32,8 @@ struct TetFrame {
   unsigned char anchor[4];  // of each facet: its first corner in order
 };
 
+// That of the solid's enclosure.
+TetFrame enclosure_frame(const Solid& solid);
 // Those of all tetrahedra of a solid; of no use for one of no volume.
 std::vector<TetFrame> tet_frames(const Solid& solid);
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "core/append_range.h"
 #include "core/marks.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -89,7 +88,7 @@ struct ClippedVoronoi::Work {
 
 ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
     : solid(s), inner_whole(inner == InnerCells::whole && s.density.empty()), boundary(s.boundary, kListsInSpace),
-      frames(inner_whole ? std::vector<TetFrame>{} : tet_frames(s)), enclosure(s.enclosure, {0, 1, 2, 3}, nullptr, 0),
+      frames(inner_whole ? std::vector<TetFrame>{} : tet_frames(s)), enclosure(enclosure_frame(s)),
       boundary_cells(s.boundary, enclosure) {}
 
 Walker& ClippedVoronoi::Work::walker() {
@@ -262,8 +261,7 @@ void ClippedVoronoi::Work::take_cells_whole(const std::vector<Index>& on_boundar
   boundary_cells.evaluate(seeds(), boundary.neighbours(), on_boundary, polygons_of, want_polyhedra, result.cells);
   const std::vector<Chunk>& chunks = take_all_inner(slots, result, want_polyhedra);
 
-  const std::vector<Index> open = boundary_cells.open();
-  for (const Index slot : open) known[slot] = false;
+  for (const Index slot : boundary_cells.open()) known[slot] = false;
   const auto reach = [&](Index slot) {
     if (known[slot]) return;
     known[slot] = true;
@@ -272,19 +270,17 @@ void ClippedVoronoi::Work::take_cells_whole(const std::vector<Index>& on_boundar
   for (const Index slot : boundary_cells.reached()) reach(slot);
   for (std::size_t head = 0; head < queue.size(); ++head) {
     const Index slot = queue[head];
-    if (place[slot] == kNone) {
-      for (const Index next : boundary_cells.settle(slot, BoundaryCell::Side::inside)) reach(next);
+    if (place[slot] == kNone) {  // an open one, or one that others have settled
+      if (boundary_cells.is_open(slot))
+        for (const Index next : boundary_cells.settle_inside(slot)) reach(next);
       continue;
     }
     const Chunk& chunk = chunks[place[slot] / kWholes];
     const std::size_t k = place[slot] % kWholes;
     for (Index n = chunk.first_neighbour[k]; n < chunk.first_neighbour[k + 1]; ++n) reach(chunk.neighbours[n]);
   }
-  for (const Index slot : open)
-    if (!known[slot]) {
-      boundary_cells.settle(slot, BoundaryCell::Side::outside);
-      known[slot] = true;
-    }
+  for (const Index slot : on_boundary) known[slot] = true;
+  boundary_cells.settle_others_outside();
   for (const Index slot : slots)
     if (!known[slot]) result.cells[seeds().id[slot]] = {};
 }
@@ -317,43 +313,12 @@ DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neigh
   return work;
 }
 
-// Polyhedra lie in chunks by cells; the result is in order of tetrahedra, then cells.
 void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
-  struct Item {
-    Index tet, cell;
-    const ClippedPolyhedra* from;
-    std::size_t place;
-  };
-  std::vector<Item> items;
-  std::size_t labels = 0, vertices = 0;
-  const auto list = [&](const ClippedPolyhedra& from) {
-    for (std::size_t k = 0; k < from.pairs.size(); ++k)
-      if (known[seeds().slot[from.pairs[k].cell]]) items.push_back({from.pairs[k].tet, from.pairs[k].cell, &from, k});
-    labels += from.labels.size();
-    vertices += from.triples.size();
-  };
+  std::vector<const ClippedPolyhedra*> parts;
   for (std::size_t r = 0; r < round_count; ++r)
-    for (const Chunk& chunk : rounds[r]) list(chunk.polyhedra);
-  if (inner_whole) boundary_cells.each_part(list);
-  sort_in_parallel(items,
-                   [](const Item& a, const Item& b) { return a.tet != b.tet ? a.tet < b.tet : a.cell < b.cell; });
-  polyhedra = {};
-  polyhedra.pairs.reserve(items.size());
-  polyhedra.label_offsets.reserve(items.size() + 1);
-  polyhedra.vertex_offsets.reserve(items.size() + 1);
-  polyhedra.labels.reserve(labels);
-  polyhedra.triples.reserve(vertices);
-  polyhedra.vertices.reserve(vertices);
-  for (const Item& item : items) {
-    const ClippedPolyhedra& from = *item.from;
-    const std::size_t k = item.place;
-    polyhedra.pairs.push_back(from.pairs[k]);
-    append_range(polyhedra.labels, from.labels, from.label_offsets[k], from.label_offsets[k + 1]);
-    append_range(polyhedra.triples, from.triples, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
-    append_range(polyhedra.vertices, from.vertices, from.vertex_offsets[k], from.vertex_offsets[k + 1]);
-    polyhedra.label_offsets.push_back(polyhedra.labels.size());
-    polyhedra.vertex_offsets.push_back(polyhedra.triples.size());
-  }
+    for (const Chunk& chunk : rounds[r]) parts.push_back(&chunk.polyhedra);
+  if (inner_whole) boundary_cells.each_part([&](const ClippedPolyhedra& part) { parts.push_back(&part); });
+  gather_polyhedra(parts, [&](const auto& pair) { return known[seeds().slot[pair.cell]] != 0; }, polyhedra);
 }
 
 ClippedVoronoi::ClippedVoronoi(const Solid& solid, InnerCells inner) : work_(std::make_unique<Work>(solid, inner)) {}

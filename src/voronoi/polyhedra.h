@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "voronoi/clip_tet.h"
@@ -24,5 +25,9 @@ void append_polyhedron(const std::vector<Index>& labels, const std::vector<Polyh
 // Appends the clipper's polyhedron.
 void append_polyhedron(TetClipper& clipper, const SortedSeeds& seeds, Index tet, Index slot,
                        ClippedPolyhedra& polyhedra);
+
+// Brings the polyhedra of all parts for which `keep(pair)` holds into the order of tetrahedra, then cells.
+void gather_polyhedra(const std::vector<const ClippedPolyhedra*>& parts,
+                      const std::function<bool(const ClippedPolyhedra::Pair&)>& keep, ClippedPolyhedra& polyhedra);
 
 }  // namespace bisector
