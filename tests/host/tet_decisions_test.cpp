@@ -143,7 +143,7 @@ struct Answers {
 Answers ask(const Solid& solid, const Problems& problems, bool is_double) {
   Commands commands(*device());
   const double scale = device_scale(solid);
-  const DeviceSolid device_solid(*device(), commands, solid, scale, is_double, false);
+  const DeviceSolid device_solid(*device(), commands, solid, false, scale, is_double, false);
   RealWords words(is_double);
   std::vector<std::uint32_t> ids;
   double largest = 0;

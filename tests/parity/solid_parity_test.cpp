@@ -78,6 +78,8 @@ std::vector<Model> models() {
       {"frame", [] { return crate(3, [](Index i, Index j, Index k) { return (i != 1) + (j != 1) + (k != 1) >= 2; }); },
        80},
       {"hollow", [] { return hollow(); }, 150},
+      {"pores", [] { return pores(); }, 150},
+      {"specks", [] { return specks(); }, 150},
       {"islands", [] { return crate(3, [](Index i, Index j, Index k) { return i != 1 && j != 1 && k != 1; }); }, 60},
       {"slivers", [] { return slivers(); }, 40},
       {"plate",

@@ -73,6 +73,35 @@ TetMesh hollow() { return without_cubes(3, 3, 3, {13}); }
 
 TetMesh two_cubes() { return without_cubes(3, 1, 1, {1}); }
 
+namespace {
+
+// Of the grid of 5 x 5 x 5 cubes, every other layer thinner by far.
+TetMesh with_thin_layers(TetMesh mesh) {
+  constexpr double kThin = 0.02;
+  for (Vec3& p : mesh.vertices)
+    for (int k = 0; k < 3; ++k) {
+      const double thick = std::ceil(0.5 * p[k]);
+      p[k] = thick + kThin * (p[k] - thick);
+    }
+  return mesh;
+}
+
+constexpr int cube_of_five(int x, int y, int z) { return x + 5 * (y + 5 * z); }
+
+}  // namespace
+
+TetMesh pores() {
+  return with_thin_layers(
+      without_cubes(5, 5, 5, {cube_of_five(1, 1, 1), cube_of_five(3, 1, 3), cube_of_five(3, 3, 3)}));
+}
+
+TetMesh specks() {
+  std::vector<int> removed;
+  for (int k = 0; k < 125; ++k)
+    if (k != cube_of_five(1, 1, 1) && k != cube_of_five(3, 1, 3) && k != cube_of_five(4, 4, 4)) removed.push_back(k);
+  return with_thin_layers(without_cubes(5, 5, 5, removed));
+}
+
 TetMesh slivers() { return around_square(0x1p-40); }
 TetMesh flat_among_good() { return around_square(0); }
 

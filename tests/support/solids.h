@@ -17,6 +17,8 @@ TetMesh five_tets();            // the unit cube in five
 TetMesh step();                 // an L: a grid of 2 x 1 x 2 cubes without one of them
 TetMesh hollow();               // a grid of 3 x 3 x 3 cubes without the middle one
 TetMesh two_cubes();            // disjoint
+TetMesh pores();                // a cube with three cavities, each far smaller than their distances
+TetMesh specks();               // two cubes as small, far from a large one
 TetMesh slivers();              // octahedron around a tetrahedron 2^-40 high
 TetMesh flat_among_good();      // octahedron around one of exactly no volume
 TetMesh inverted_among_good();  // grid of 2 x 1 x 1 cubes with every other tetrahedron inverted

@@ -249,6 +249,8 @@ std::vector<SolidCase> medium_solids() {
                                   {"shaken grid", shaken(tet_grid(5, 4, 3), 0.2, 21)},
                                   {"step", step()},
                                   {"hollow", hollow()},
+                                  {"pores", pores()},
+                                  {"specks", specks()},
                                   {"two cubes", two_cubes()},
                                   {"slivers", slivers()},
                                   {"flat among good", flat_among_good()}};
