@@ -11,7 +11,7 @@ std::unique_ptr<Backend> make_vulkan_backend(const Surface&, std::shared_ptr<Dev
 }
 
 std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid&, std::shared_ptr<Device>, const VulkanOptions&,
-                                                        InnerCells) {
+                                                        SolidCells) {
   throw std::logic_error("a build without Vulkan has opened a device");
 }
 

@@ -26,7 +26,7 @@ Box box_of(const Solid& solid) {
 class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
  public:
   VulkanSolidBackend(const Solid& solid, std::shared_ptr<Device> device, const VulkanOptions& options,
-                     const Precisions& precisions, InnerCells inner);
+                     const Precisions& precisions, SolidCells how);
 
  private:
   DeviceWork compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
@@ -56,10 +56,10 @@ class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
 };
 
 VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Device> device, const VulkanOptions& options,
-                                       const Precisions& precisions, InnerCells inner)
+                                       const Precisions& precisions, SolidCells how)
     : DeviceBackend(solid, std::move(device), precisions, options.neighbours, device_scale(solid), box_of(solid), true,
-                    inner),
-      whole_(inner == InnerCells::whole && solid.density.empty()), shell_(stage_, solid.boundary, options.capacities),
+                    how),
+      whole_(how == SolidCells::whole && solid.density.empty()), shell_(stage_, solid.boundary, options.capacities),
       shell_cells_(stage_.device(), stage_.is_double(), false),
       device_solid_(stage_.device(), stage_.commands, solid, whole_, stage_.seeds.scale, stage_.is_double(),
                     precisions.double_rung),
@@ -173,9 +173,9 @@ void VulkanSolidBackend::append_boundary(ClippedPolyhedra& polyhedra) {
 }  // namespace
 
 std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid& solid, std::shared_ptr<Device> device,
-                                                        const VulkanOptions& options, InnerCells inner) {
+                                                        const VulkanOptions& options, SolidCells how) {
   const Precisions precisions = choose_precisions(*device, options.precision, options.double_rung);
-  return std::make_unique<VulkanSolidBackend>(solid, std::move(device), options, precisions, inner);
+  return std::make_unique<VulkanSolidBackend>(solid, std::move(device), options, precisions, how);
 }
 
 }  // namespace bisector::host

@@ -10,11 +10,11 @@
 
 namespace bisector::host {
 
-// The solid must outlive the backend. InnerCells::whole is only heeded where the density is uniform. Throws
+// The solid must outlive the backend. SolidCells::whole is only heeded where the density is uniform. Throws
 // DeviceError; precision `double_` on a device without double does, and a solid of more tetrahedra than its buffers
 // hold.
 std::unique_ptr<SolidBackend> make_vulkan_solid_backend(const Solid& solid, std::shared_ptr<Device> device,
                                                         const VulkanOptions& options,
-                                                        InnerCells inner = InnerCells::whole);
+                                                        SolidCells how = SolidCells::whole);
 
 }  // namespace bisector::host

@@ -34,7 +34,7 @@ template class CpuBackendOf<SolidBackend, ClippedVoronoi>;
 CpuBackend::CpuBackend(const Surface& surface, NeighbourSource source, std::string fallback)
     : CpuBackendOf(surface, source, std::move(fallback)) {}
 
-CpuSolidBackend::CpuSolidBackend(const Solid& solid, NeighbourSource source, InnerCells inner, std::string fallback)
-    : CpuBackendOf(solid, source, std::move(fallback), inner) {}
+CpuSolidBackend::CpuSolidBackend(const Solid& solid, NeighbourSource source, SolidCells how, std::string fallback)
+    : CpuBackendOf(solid, source, std::move(fallback), how) {}
 
 }  // namespace bisector

@@ -38,7 +38,7 @@ class CpuBackend : public CpuBackendOf<Backend, RestrictedVoronoi> {
 
 class CpuSolidBackend : public CpuBackendOf<SolidBackend, ClippedVoronoi> {
  public:
-  CpuSolidBackend(const Solid& solid, NeighbourSource source, InnerCells inner = InnerCells::whole,
+  CpuSolidBackend(const Solid& solid, NeighbourSource source, SolidCells how = SolidCells::whole,
                   std::string fallback = {});
 };
 

@@ -46,7 +46,7 @@ FallbackSolidBackend::FallbackSolidBackend(std::unique_ptr<SolidBackend> device,
     : FallbackOf(
           device->solid(), std::move(device),
           [&solid = device->solid(), source](const std::string& reason) {
-            return std::make_unique<CpuSolidBackend>(solid, source, InnerCells::whole, reason);
+            return std::make_unique<CpuSolidBackend>(solid, source, SolidCells::whole, reason);
           },
           std::move(context)) {}
 

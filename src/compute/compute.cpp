@@ -19,7 +19,7 @@ std::unique_ptr<Backend> cpu_backend(const Surface& surface, NeighbourSource sou
   return std::make_unique<CpuBackend>(surface, source, std::move(fallback));
 }
 std::unique_ptr<SolidBackend> cpu_backend(const Solid& solid, NeighbourSource source, std::string fallback) {
-  return std::make_unique<CpuSolidBackend>(solid, source, InnerCells::whole, std::move(fallback));
+  return std::make_unique<CpuSolidBackend>(solid, source, SolidCells::whole, std::move(fallback));
 }
 
 std::unique_ptr<Backend> device_backend(const Surface& surface, std::shared_ptr<host::Device> device,

@@ -11,6 +11,7 @@
 namespace bisector {
 namespace {
 
+constexpr std::size_t kFirstNeighbours = 32;  // of most cells these bound all that is inside
 constexpr int kUnset = std::numeric_limits<int>::min();
 // A volume below this part of the sum of its terms' absolute values may be nothing but rounding.
 constexpr double kVisible = 64 * kUnit;
@@ -210,6 +211,7 @@ bool BoundaryCell::integrate(Index slot, std::span<const CellPolygon> polygons, 
   uncertain_ = wider_ = false;
   trace(polygons);
   cell_.begin(slot);
+  cell_.shorten(kFirstNeighbours);
   for (;;) {
     cell_.cut_by_listed(enclosure_);
     uncertain_ |= cell_.uncertain();
@@ -220,7 +222,7 @@ bool BoundaryCell::integrate(Index slot, std::span<const CellPolygon> polygons, 
       return false;
     }
     if (cell_.lists_all()) throw std::logic_error("a cell's polygons and its Voronoi vertices contradict each other");
-    wider_ = true;
+    wider_ |= !cell_.is_shortened();
     cell_.widen();
   }
   add_edges();

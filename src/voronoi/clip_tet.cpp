@@ -85,6 +85,7 @@ void TetClipper::begin(Index slot) {
   slot_ = slot;
   seed_ = seeds_->x[slot];
   list_ = neighbours_->list(slot);
+  shortened_ = false;
   loaded_ = 0;
 }
 
@@ -218,8 +219,19 @@ bool TetClipper::clip(const TetFrame& tet) {
   }
 }
 
+void TetClipper::shorten(std::size_t most) {
+  if (static_cast<std::size_t>(list_.end - list_.begin) <= most) return;
+  shortened_ = true;
+  unshortened_ = list_;
+  list_.end = list_.begin + most;
+  // Those that follow are as far, or farther by what sorting may have missed.
+  list_.radius = std::min(list_.radius, (1 - 1e-9) * norm(seeds_->x[*list_.end] - seed_));
+}
+
 void TetClipper::widen() {
-  list_ = neighbours_->wider(slot_, list_);
+  if (shortened_) list_ = unshortened_;
+  else list_ = neighbours_->wider(slot_, list_);
+  shortened_ = false;
   loaded_ = 0;
 }
 

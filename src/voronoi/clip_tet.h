@@ -52,10 +52,12 @@ class TetClipper {
   // Clips the tetrahedron, which must outlive the use of the result. False if the (perturbed) intersection is empty.
   bool clip(const TetFrame& tet);
 
-  // Cuts the tetrahedron by the cell's listed neighbours alone, whatever the list leaves out; widen() takes a list that
-  // reaches farther. For a tetrahedron that the cell meets.
+  // Cuts the tetrahedron by the cell's listed neighbours alone, whatever the list leaves out. For a tetrahedron that the
+  // cell meets. The list can be shortened to the nearest few at first, and widen() takes one that reaches farther.
   void cut_by_listed(const TetFrame& around);
+  void shorten(std::size_t most);
   void widen();
+  bool is_shortened() const { return shortened_; }
   // Whether the list leaves out nothing that could bound the cell.
   bool lists_all() const;
   // Whether no seed that is left out can be as near to vertex v as the cell's own.
@@ -152,6 +154,8 @@ class TetClipper {
   Index slot_ = 0;
   Vec3 seed_;
   NeighbourList list_;
+  NeighbourList unshortened_;  // if list_ is the first part of one
+  bool shortened_ = false;
   std::vector<Index> narrowed_;
   std::size_t loaded_ = 0;
   std::vector<Plane> listed_;

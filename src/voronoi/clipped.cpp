@@ -52,7 +52,7 @@ struct Walker {
 
 struct ClippedVoronoi::Work {
   const Solid& solid;
-  const bool inner_whole;
+  const bool whole;
   RestrictedVoronoi boundary;
   std::vector<TetFrame> frames;  // of the tetrahedra
   TetFrame enclosure;
@@ -67,7 +67,7 @@ struct ClippedVoronoi::Work {
     Index slot, tet;
   };
 
-  Work(const Solid& s, InnerCells inner);
+  Work(const Solid& s, SolidCells how);
 
   const SortedSeeds& seeds() const { return boundary.seeds(); }
   Walker& walker();
@@ -86,9 +86,9 @@ struct ClippedVoronoi::Work {
   DiagramWork evaluate(const std::vector<Vec3>& given, NeighbourSource source, Want want, Diagram& diagram);
 };
 
-ClippedVoronoi::Work::Work(const Solid& s, InnerCells inner)
-    : solid(s), inner_whole(inner == InnerCells::whole && s.density.empty()), boundary(s.boundary, kListsInSpace),
-      frames(inner_whole ? std::vector<TetFrame>{} : tet_frames(s)), enclosure(enclosure_frame(s)),
+ClippedVoronoi::Work::Work(const Solid& s, SolidCells how)
+    : solid(s), whole(how == SolidCells::whole && s.density.empty()), boundary(s.boundary, kListsInSpace),
+      frames(whole ? std::vector<TetFrame>{} : tet_frames(s)), enclosure(enclosure_frame(s)),
       boundary_cells(s.boundary, enclosure) {}
 
 Walker& ClippedVoronoi::Work::walker() {
@@ -295,7 +295,7 @@ DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neigh
   result.cells.assign(given.size(), Moments{});
   const bool want_polyhedra = includes(want, Want::polyhedra);
   const std::vector<Index> on_boundary = mark_boundary(result);
-  if (inner_whole) take_cells_whole(on_boundary, result, want_polyhedra);
+  if (whole) take_cells_whole(on_boundary, result, want_polyhedra);
   else walk_inner(walk_boundary(on_boundary, result, want_polyhedra), result, want_polyhedra);
   set_step_masses(seeds(), boundary.neighbours(), result);
   result.mass = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].mass; });
@@ -303,7 +303,7 @@ DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neigh
   work.counts = {};
   for (std::size_t r = 0; r < round_count; ++r)
     for (const Chunk& chunk : rounds[r]) work.counts += chunk.counts;
-  if (inner_whole) {
+  if (whole) {
     work.counts += boundary_cells.counts();
     work.counts.pairs = static_cast<std::size_t>(std::count(known.begin(), known.end(), true));
   }
@@ -317,11 +317,11 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
   std::vector<const ClippedPolyhedra*> parts;
   for (std::size_t r = 0; r < round_count; ++r)
     for (const Chunk& chunk : rounds[r]) parts.push_back(&chunk.polyhedra);
-  if (inner_whole) boundary_cells.each_part([&](const ClippedPolyhedra& part) { parts.push_back(&part); });
+  if (whole) boundary_cells.each_part([&](const ClippedPolyhedra& part) { parts.push_back(&part); });
   gather_polyhedra(parts, [&](const auto& pair) { return known[seeds().slot[pair.cell]] != 0; }, polyhedra);
 }
 
-ClippedVoronoi::ClippedVoronoi(const Solid& solid, InnerCells inner) : work_(std::make_unique<Work>(solid, inner)) {}
+ClippedVoronoi::ClippedVoronoi(const Solid& solid, SolidCells how) : work_(std::make_unique<Work>(solid, how)) {}
 ClippedVoronoi::~ClippedVoronoi() = default;
 
 DiagramWork ClippedVoronoi::evaluate(const std::vector<Vec3>& seeds, NeighbourSource source, Want want,

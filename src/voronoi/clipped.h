@@ -16,17 +16,17 @@
 
 namespace bisector {
 
-// How cells that do not meet the boundary are treated.
-enum class InnerCells {
-  whole,    // taken whole, without regard to the tetrahedra, once they are proven to lie inside; only where the density
-            // is uniform
-  clipped,  // cut up like the others
+// How cells are treated.
+enum class SolidCells {
+  whole,    // as wholes, without regard to the tetrahedra: by the polygons in which they meet the boundary and their
+            // Voronoi vertices inside; only where the density is uniform
+  clipped,  // cut up by the tetrahedra
 };
 
 class ClippedVoronoi {
  public:
-  // The solid must outlive the object. InnerCells::whole is only heeded where the density is uniform.
-  explicit ClippedVoronoi(const Solid& solid, InnerCells inner = InnerCells::whole);
+  // The solid must outlive the object. SolidCells::whole is only heeded where the density is uniform.
+  explicit ClippedVoronoi(const Solid& solid, SolidCells how = SolidCells::whole);
   ~ClippedVoronoi();
 
   // Sets the moments of every cell in the solid, zero for a seed whose cell lies outside, and of the polygons of the

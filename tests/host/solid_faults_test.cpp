@@ -37,9 +37,9 @@ Processor processor_of(Precision precision) {
 }
 
 std::unique_ptr<SolidBackend> device_backend(const Solid& solid, const VulkanOptions& options,
-                                             InnerCells inner = InnerCells::whole) {
+                                             SolidCells how = SolidCells::whole) {
   return host::make_vulkan_solid_backend(solid, Device::open(device_for(processor_of(options.precision)).value()),
-                                         options, inner);
+                                         options, how);
 }
 
 bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
@@ -138,12 +138,12 @@ TEST_P(SolidFaults, BuffersGrow) {
                                            {plenty.batch_pairs, plenty.table, 64, 0},
                                            {plenty.batch_pairs, plenty.table, plenty.proposals, 64}},
       all{{20, 16, 16, 16}};
-  for (const InnerCells inner : {InnerCells::whole, InnerCells::clipped}) {
-    const Evaluated roomy = evaluated(*device_backend(solid_, with_precision(GetParam()), inner), seeds_);
-    for (const host::Capacities& capacities : inner == InnerCells::whole ? each : all) {
+  for (const SolidCells how : {SolidCells::whole, SolidCells::clipped}) {
+    const Evaluated roomy = evaluated(*device_backend(solid_, with_precision(GetParam()), how), seeds_);
+    for (const host::Capacities& capacities : how == SolidCells::whole ? each : all) {
       VulkanOptions options = with_precision(GetParam());
       options.capacities = capacities;
-      const auto backend = device_backend(solid_, options, inner);
+      const auto backend = device_backend(solid_, options, how);
       for (int round = 0; round < 2; ++round) {
         const Evaluated found = evaluated(*backend, seeds_);
         EXPECT_TRUE(bisector::same_bits(found.moments, roomy.moments));

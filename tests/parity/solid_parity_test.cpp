@@ -234,13 +234,13 @@ void expect_parity(const Solid& solid, const Evaluated& reference, const Evaluat
   }
 }
 
-std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Setup& setup, InnerCells inner) {
-  if (setup.processor == Processor::cpu) return std::make_unique<CpuSolidBackend>(solid, setup.source, inner);
+std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Setup& setup, SolidCells how) {
+  if (setup.processor == Processor::cpu) return std::make_unique<CpuSolidBackend>(solid, setup.source, how);
   host::VulkanOptions options;
   options.precision = precision_of(setup.processor);
   options.neighbours = setup.source;
   return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor).value()), options,
-                                         inner);
+                                         how);
 }
 
 struct ModelCase {
@@ -261,18 +261,18 @@ TEST_P(Solids, AreTheCpus) {
   struct Mode {
     const char* name;
     bool uniform;
-    InnerCells inner;
+    SolidCells how;
   };
-  for (const auto& [name, uniform, inner] :
-       {Mode{"whole", true, InnerCells::whole}, Mode{"clipped", true, InnerCells::clipped},
-        Mode{"weighted", false, InnerCells::whole}}) {
+  for (const auto& [name, uniform, how] :
+       {Mode{"whole", true, SolidCells::whole}, Mode{"clipped", true, SolidCells::clipped},
+        Mode{"weighted", false, SolidCells::whole}}) {
     SCOPED_TRACE(name);
     const Solid solid(mesh, uniform ? std::vector<double>{} : varied_density(mesh));
-    CpuSolidBackend cpu(solid, NeighbourSource::nearest, inner);
-    const std::unique_ptr<SolidBackend> backend = backend_of(solid, setup, inner);
+    CpuSolidBackend cpu(solid, NeighbourSource::nearest, how);
+    const std::unique_ptr<SolidBackend> backend = backend_of(solid, setup, how);
     EXPECT_EQ(backend->description().precision, setup.processor == Processor::single ? "single" : "double");
     std::vector<CellMoments> first_run;
-    const std::vector<SeedSet> sets = seed_sets(mesh, model.seeds, uniform && inner == InnerCells::whole);
+    const std::vector<SeedSet> sets = seed_sets(mesh, model.seeds, uniform && how == SolidCells::whole);
     for (const SeedSet& set : sets) {
       SCOPED_TRACE(set.name);
       Evaluated found = solid_diagram_of(*backend, set.seeds);
@@ -317,7 +317,7 @@ TEST_P(SolidParities, DegenerateDiagramsAreTheCpus) {
     SCOPED_TRACE(name);
     const Solid solid(mesh);
     CpuSolidBackend cpu(solid, NeighbourSource::nearest);
-    const std::unique_ptr<SolidBackend> backend = backend_of(solid, GetParam(), InnerCells::whole);
+    const std::unique_ptr<SolidBackend> backend = backend_of(solid, GetParam(), SolidCells::whole);
     expect_parity(solid, solid_diagram_of(cpu, seeds), solid_diagram_of(*backend, seeds), GetParam().processor);
   }
 }

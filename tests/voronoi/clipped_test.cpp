@@ -30,8 +30,8 @@ Diagram diagram_of(ClippedVoronoi& voronoi, const std::vector<Vec3>& seeds, Neig
   return d;
 }
 
-Diagram diagram_of(const Solid& solid, const std::vector<Vec3>& seeds, NeighbourSource source, InnerCells inner) {
-  ClippedVoronoi voronoi(solid, inner);
+Diagram diagram_of(const Solid& solid, const std::vector<Vec3>& seeds, NeighbourSource source, SolidCells how) {
+  ClippedVoronoi voronoi(solid, how);
   return diagram_of(voronoi, seeds, source);
 }
 
@@ -184,13 +184,13 @@ void expect_oracle(const SolidCase& problem, bool every_way) {
       if (label >= 0) labels.insert(label);
   }
   for (const NeighbourSource source : kSources)
-    for (const InnerCells inner : {InnerCells::clipped, InnerCells::whole}) {
-      if (!every_way && (source == NeighbourSource::nearest) != (inner == InnerCells::whole)) continue;
+    for (const SolidCells how : {SolidCells::clipped, SolidCells::whole}) {
+      if (!every_way && (source == NeighbourSource::nearest) != (how == SolidCells::whole)) continue;
       SCOPED_TRACE(source == NeighbourSource::nearest ? "nearest" : "delaunay");
-      SCOPED_TRACE(inner == InnerCells::whole ? "whole" : "clipped");
-      const Diagram got = diagram_of(solid, seeds, source, inner);
+      SCOPED_TRACE(how == SolidCells::whole ? "whole" : "clipped");
+      const Diagram got = diagram_of(solid, seeds, source, how);
       expect_sound(solid, got);
-      if (inner == InnerCells::clipped) {
+      if (how == SolidCells::clipped) {
         expect_oracle_polyhedra(got.polyhedra, want, seeds, reach);
       } else {
         std::map<Index, std::set<std::int64_t>> labels;
@@ -275,10 +275,10 @@ class MediumSolid : public testing::TestWithParam<SolidCase> {};
 
 TEST_P(MediumSolid, EverySourceAndThreadCountGivesTheSameBits) {
   const Solid solid(GetParam().mesh);
-  for (const InnerCells inner : {InnerCells::clipped, InnerCells::whole}) {
+  for (const SolidCells how : {SolidCells::clipped, SolidCells::whole}) {
     const auto with = [&](NeighbourSource source, unsigned threads) {
       const ThreadLimit limit(threads);
-      return diagram_of(solid, GetParam().seeds, source, inner);
+      return diagram_of(solid, GetParam().seeds, source, how);
     };
     const Diagram reference = with(NeighbourSource::nearest, 1);
     expect_sound(solid, reference);
@@ -306,8 +306,8 @@ std::map<std::array<Index, 4>, Vec3> inner_vertices(const ClippedPolyhedra& p) {
 TEST_P(MediumSolid, WholeCellsAreTheSumOfTheirPieces) {
   const Solid solid(GetParam().mesh);
   const std::vector<Vec3>& seeds = GetParam().seeds;
-  const Diagram cut = diagram_of(solid, seeds, NeighbourSource::delaunay, InnerCells::clipped);
-  const Diagram whole = diagram_of(solid, seeds, NeighbourSource::delaunay, InnerCells::whole);
+  const Diagram cut = diagram_of(solid, seeds, NeighbourSource::delaunay, SolidCells::clipped);
+  const Diagram whole = diagram_of(solid, seeds, NeighbourSource::delaunay, SolidCells::whole);
   EXPECT_EQ(dual_tets(cut.polyhedra), dual_tets(whole.polyhedra));
   EXPECT_EQ(cut.moments.triangles.values, whole.moments.triangles.values);
   const double reach = reach_of(solid, seeds);
@@ -334,7 +334,7 @@ TEST_P(MediumSolid, AUsedObjectAnswersAsAFreshOne) {
   for (Vec3& x : moved) x += 1e-3 * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
   diagram_of(used, moved, NeighbourSource::nearest);
   const Diagram again = diagram_of(used, GetParam().seeds, NeighbourSource::nearest);
-  expect_same_diagram(again, diagram_of(solid, GetParam().seeds, NeighbourSource::nearest, InnerCells::whole));
+  expect_same_diagram(again, diagram_of(solid, GetParam().seeds, NeighbourSource::nearest, SolidCells::whole));
 }
 
 INSTANTIATE_TEST_SUITE_P(Clipped, MediumSolid, testing::ValuesIn(medium_solids()),
@@ -385,8 +385,8 @@ TEST(ClippedMoments, ADensityThatIsLinearThroughoutWeighsTheUniformCells) {
   const TetMesh mesh = shaken(tet_grid(3, 2, 2), 0.2, 33);
   const std::vector<Vec3> seeds = seeds_about(mesh, 100, 0.2, 34);
   const Solid uniform(mesh), weighted(mesh, linear_density(mesh));
-  const Diagram a = diagram_of(uniform, seeds, NeighbourSource::nearest, InnerCells::clipped);
-  const Diagram b = diagram_of(weighted, seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram a = diagram_of(uniform, seeds, NeighbourSource::nearest, SolidCells::clipped);
+  const Diagram b = diagram_of(weighted, seeds, NeighbourSource::nearest, SolidCells::whole);
   expect_sound(weighted, b);
   EXPECT_TRUE(pairs_of(a.polyhedra) == pairs_of(b.polyhedra));
   for (std::size_t i = 0; i < seeds.size(); ++i) {
@@ -400,8 +400,8 @@ TEST(ClippedMoments, AConstantDensityScalesThem) {
   const TetMesh mesh = hollow();
   const std::vector<Vec3> seeds = seeds_about(mesh, 300, 0.1, 35);
   const Solid plain(mesh), tripled(mesh, std::vector<double>(mesh.vertices.size(), 3.0));
-  const Diagram a = diagram_of(plain, seeds, NeighbourSource::nearest, InnerCells::whole);
-  const Diagram b = diagram_of(tripled, seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram a = diagram_of(plain, seeds, NeighbourSource::nearest, SolidCells::whole);
+  const Diagram b = diagram_of(tripled, seeds, NeighbourSource::nearest, SolidCells::whole);
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     EXPECT_NEAR(b.moments.cells[i].mass, 3 * a.moments.cells[i].mass, 1e-13 * tripled.mass);
     EXPECT_LE(norm(b.moments.cells[i].first - 3 * a.moments.cells[i].first), 1e-13 * tripled.mass * 3);
@@ -414,7 +414,7 @@ TEST(ClippedMoments, AgreeWithCountingPoints) {
   const TetMesh mesh = tet_grid(2, 2, 2);
   const std::vector<Vec3> seeds = seeds_about(mesh, 8, 0, 36);
   const Solid solid(mesh, linear_density(mesh));
-  const Diagram d = diagram_of(solid, seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram d = diagram_of(solid, seeds, NeighbourSource::nearest, SolidCells::whole);
   constexpr int kPoints = 64;
   constexpr double kCell = 2.0 / kPoints;
   std::vector<Moments> counted(seeds.size());
@@ -446,7 +446,7 @@ TEST(Clipped, ACellOutsideOwnsNothing) {
        {Vec3{0.05, 0, 0}, Vec3{-0.05, 0, 0}, Vec3{0, 0.05, 0}, Vec3{0, -0.05, 0}, Vec3{0, 0, 0.05}, Vec3{0, 0, -0.05}})
     seeds.push_back(Vec3{1.5, 1.5, 1.5} + d);
   seeds.push_back({9, 9, 9});
-  const Diagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, InnerCells::whole);
+  const Diagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, SolidCells::whole);
   EXPECT_EQ(d.moments.cells[inside].mass, 0);
   EXPECT_EQ(d.moments.cells.back().mass, 0);
   for (const auto& pair : d.polyhedra.pairs) EXPECT_NE(pair.cell, inside);
@@ -455,7 +455,7 @@ TEST(Clipped, ACellOutsideOwnsNothing) {
 TEST(Clipped, EmptyCellsOfEqualSeedsHaveNoMass) {
   const TetMesh mesh = tet_grid(2, 2, 2);
   const std::vector<Vec3> seeds = repeated(seeds_about(mesh, 50, 0, 42), 2);
-  const Diagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::delaunay, InnerCells::whole);
+  const Diagram d = diagram_of(Solid(mesh), seeds, NeighbourSource::delaunay, SolidCells::whole);
   for (std::size_t i = 50; i < 100; ++i) EXPECT_EQ(d.moments.cells[i].mass, 0);
 }
 
@@ -468,7 +468,7 @@ TEST(Clipped, TheDualOfSeedsInTheSolidIsTheirDelaunayTriangulation) {
   for (Vec3& p : mesh.vertices) p = 1e6 * (p - Vec3{0.5, 0.5, 0.5});
   const std::vector<Vec3> seeds = seeds_about(tet_grid(1, 1, 1), 200, 0, 43);
   const std::vector<Tetrahedron> tets =
-      dual_tets(diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, InnerCells::whole).polyhedra);
+      dual_tets(diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, SolidCells::whole).polyhedra);
   std::set<std::array<Index, 2>> edges;
   std::map<Triangle, int> facets;
   std::set<Index> vertices;
@@ -496,8 +496,8 @@ TEST(Clipped, TheDualOfSeedsInTheSolidIsTheirDelaunayTriangulation) {
 
 TEST(Clipped, TilingFailsWhereAPolyhedronIsMissingOrWrong) {
   const Solid solid(tet_grid(2, 2, 2));
-  for (const InnerCells inner : {InnerCells::clipped, InnerCells::whole}) {
-  const Diagram d = diagram_of(solid, seeds_about(solid.mesh, 40, 0, 44), NeighbourSource::nearest, inner);
+  for (const SolidCells how : {SolidCells::clipped, SolidCells::whole}) {
+  const Diagram d = diagram_of(solid, seeds_about(solid.mesh, 40, 0, 44), NeighbourSource::nearest, how);
   ASSERT_EQ(count_untiled(solid, d.polyhedra), 0u);
   const std::size_t k = d.polyhedra.pairs.size() / 2;
   ClippedPolyhedra relabelled = d.polyhedra;
@@ -513,7 +513,7 @@ TEST(Clipped, TilingFailsWhereAPolyhedronIsMissingOrWrong) {
   EXPECT_GT(count_untiled(solid, cut), 0u);
   ClippedPolyhedra turned = d.polyhedra;
   std::swap(turned.triples[turned.vertex_offsets[k]][1], turned.triples[turned.vertex_offsets[k]][2]);
-  if (inner == InnerCells::whole) {
+  if (how == SolidCells::whole) {
     EXPECT_GT(count_untiled(solid, turned), 0u);
   }
   }
@@ -584,7 +584,7 @@ TEST(SolidBackends, TheCpuIsOne) {
   const std::vector<Vec3> seeds = seeds_about(solid.mesh, 100, 0, 46);
   Diagram d;
   backend->evaluate(seeds, Want::polygons | Want::polyhedra, d);
-  expect_same_diagram(d, diagram_of(solid, seeds, NeighbourSource::nearest, InnerCells::whole));
+  expect_same_diagram(d, diagram_of(solid, seeds, NeighbourSource::nearest, SolidCells::whole));
   options.precision = Precision::single;
   EXPECT_THROW(make_backend(solid, options), Error);
 }
