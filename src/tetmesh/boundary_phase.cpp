@@ -89,7 +89,7 @@ RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<S
 // Sites inside whose cells have come to the boundary join it while that has fewer than `room`; where the solid is thin,
 // all of them. True if any did.
 bool join_boundary(CvtRun& sites, double room, bool thin) {
-  const std::vector<Index> at_boundary = inner_sites_at_boundary(sites);
+  const std::vector<Index> at_boundary = inner_sites_at_boundary(sites.seeds, sites.diagram().moments.triangles);
   const std::span<SeedPlace> places = sites.seeds.edit_places();
   const auto held =
       std::count_if(places.begin(), places.end(), [](const SeedPlace& place) { return place.kind != Kind::interior; });

@@ -5,31 +5,53 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/grouping.h"
 #include "mesh/tet_adjacency.h"
 
 namespace bisector {
 
 namespace {
 
-// The same for all three rotations of a triangle, but not for its other side.
-Triangle rotated(Triangle t) {
-  std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-  return t;
-}
-
-// One side of each triangle of the boundary, as the facet of a tetrahedron there.
+// Which triangle of a boundary a facet is, and on which side of it. Few triangles share their lowest vertex.
 class Sides {
  public:
-  void add(const Triangle& facet, Index triangle) { sides_.emplace_back(rotated(facet), triangle); }
-  void sort() { std::sort(sides_.begin(), sides_.end()); }
-  // The triangle with this side, as rotated() gives it, or kNone.
-  Index find(const Triangle& facet) const {
-    const auto at = std::lower_bound(sides_.begin(), sides_.end(), std::pair(facet, Index{0}));
-    return at != sides_.end() && at->first == facet ? at->second : kNone;
+  explicit Sides(const std::vector<Triangle>& triangles) {
+    Index vertices = 0;
+    for (const Triangle& t : triangles) vertices = std::max(vertices, *std::max_element(t.begin(), t.end()) + 1);
+    by_lowest_ = group_into_rows<Side>(vertices, [&](const auto& put) {
+      for (Index i = 0; i < triangles.size(); ++i) {
+        const Triangle t = rotated(triangles[i]);
+        put(t[0], Side{t[1], t[2], i});
+      }
+    });
+  }
+  struct Found {
+    Index inner = kNone, outer = kNone;  // triangles of which the facet is that side
+  };
+  Found find(const Triangle& facet) const {
+    const Triangle t = rotated(facet);
+    Found found;
+    if (t[0] >= by_lowest_.rows()) return found;
+    for (const Side* side = by_lowest_.begin(t[0]); side != by_lowest_.end(t[0]); ++side) {
+      if (side->b == t[1] && side->c == t[2]) found.inner = std::min(found.inner, side->triangle);
+      if (side->b == t[2] && side->c == t[1]) found.outer = std::min(found.outer, side->triangle);
+    }
+    return found;
   }
 
  private:
-  std::vector<std::pair<Triangle, Index>> sides_;
+  struct Side {
+    Index b, c;  // the corners after the lowest
+    Index triangle;
+  };
+
+  // The same for all three rotations of a triangle, but not for its other side.
+  static Triangle rotated(Triangle t) {
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    return t;
+  }
+
+  Csr<Side> by_lowest_;
 };
 
 // Spreads inside and outside from the triangles of the boundary over the tetrahedra.
@@ -41,19 +63,11 @@ class Carver {
 
   // Marks the tetrahedra at the boundary. Returns the triangles that are not facets.
   std::vector<Index> mark_at_boundary(const std::vector<Triangle>& boundary) {
-    Sides inner, outer;
-    for (Index i = 0; i < boundary.size(); ++i) {
-      const Triangle& t = boundary[i];
-      inner.add(t, i);
-      outer.add({t[0], t[2], t[1]}, i);
-    }
-    inner.sort();
-    outer.sort();
+    const Sides sides(boundary);
     std::vector<char> found(boundary.size(), 0);
     for (Index t = 0; t < tets_.size(); ++t)
       for (int k = 0; k < 4; ++k) {
-        const Triangle facet = rotated(facet_of(tets_[t], k));
-        const Index in = inner.find(facet), out = outer.find(facet);
+        const auto [in, out] = sides.find(facet_of(tets_[t], k));
         if (in == kNone && out == kNone) continue;
         wall_[t][static_cast<std::size_t>(k)] = true;
         if (in != kNone) found[in] = 1;

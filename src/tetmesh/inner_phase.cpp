@@ -44,13 +44,13 @@ void match_count(TetRun& run, std::size_t boundary) {
 }
 
 // Moves sites that own a part of the boundary away from it, along its normal.
-void push(CvtRun& run, const std::vector<Index>& sites, double usual_edge) {
-  const CellMoments& moments = run.diagram().moments;
-  std::vector<Vec3> feet = run.seeds.positions(), normals;
-  project_to_cells(run.surface(), moments.triangles, {}, feet, normals);
-  const std::span<Vec3> positions = run.seeds.edit_positions();
+void push(const Surface& boundary, const Csr<Index>& triangles, const std::vector<Index>& sites,
+          const std::vector<Moments>& cells, double usual_edge, PlacedSeeds& seeds) {
+  std::vector<Vec3> feet = seeds.positions(), normals;
+  project_to_cells(boundary, triangles, {}, feet, normals);
+  const std::span<Vec3> positions = seeds.edit_positions();
   for (const Index i : sites) {
-    const Moments& cell = moments.cells[i];
+    const Moments& cell = cells[i];
     // The cell's radius stands for the edge length there.
     const double edge = cell.mass > 0 ? 2 * std::sqrt(cell.second / cell.mass) : usual_edge;
     const double height = dot(feet[i] - positions[i], normals[i]);
@@ -59,16 +59,21 @@ void push(CvtRun& run, const std::vector<Index>& sites, double usual_edge) {
 }
 
 // The dual contains the boundary only if no cell of a site inside meets it: such sites are pushed away from it, and
-// those that nothing helps are removed.
-void clear_boundary(TetRun& run) {
+// those that nothing helps are removed. `triangles` tells which ones each cell of the seeds meets, and `cells` how large
+// the cells were before.
+template <class Triangles>
+void clear_boundary(TetRun& run, const Surface& boundary, const std::vector<Moments>& cells,
+                    const Triangles& triangles) {
+  PlacedSeeds& seeds = run.sites.seeds;
   for (int round = 0;; ++round) {
-    const std::vector<Index> at_boundary = inner_sites_at_boundary(run.sites);
+    const Csr<Index>& met = triangles();
+    const std::vector<Index> at_boundary = inner_sites_at_boundary(seeds, met);
     if (at_boundary.empty()) return;
     if (round == kPushRounds) {
-      run.sites.seeds.remove(at_boundary);
+      seeds.remove(at_boundary);
       return;
     }
-    push(run.sites, at_boundary, run.sized.edge_length);
+    push(boundary, met, at_boundary, cells, run.sized.edge_length, seeds);
   }
 }
 
@@ -89,10 +94,17 @@ void inner_phase(TetRun& run, const RemeshResult& surface, SolidBackend* stand_i
   if (stand_in) run.sites.change_backend(*stand_in);
   match_count(run, boundary);
   optimise_sites(run, "inside", kInnerShare, false);
-  // Most of what has to be pushed away is found there, and only the rest in the solid itself.
-  if (stand_in) clear_boundary(run);
+  const std::vector<Moments> cells = run.sites.diagram().moments.cells;
+  // Most of what has to be pushed away is found there, and only the rest at the boundary itself.
+  if (stand_in)
+    clear_boundary(run, run.sites.surface(), cells,
+                   [&]() -> const Csr<Index>& { return run.sites.diagram().moments.triangles; });
   run.sites.change_backend(run.solid);
-  clear_boundary(run);
+  Diagram on_boundary;
+  clear_boundary(run, run.boundary.surface(), cells, [&]() -> const Csr<Index>& {
+    run.boundary.evaluate(run.sites.seeds.positions(), Want::moments, on_boundary);
+    return on_boundary.moments.triangles;
+  });
   complete(run.sites, false);
 }
 

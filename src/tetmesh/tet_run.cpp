@@ -29,11 +29,10 @@ PlacedSeeds with_boundary(const RemeshResult& surface, const std::vector<Vec3>& 
   return seeds;
 }
 
-std::vector<Index> inner_sites_at_boundary(CvtRun& sites) {
-  const Csr<Index>& triangles = sites.diagram().moments.triangles;
+std::vector<Index> inner_sites_at_boundary(const PlacedSeeds& seeds, const Csr<Index>& triangles) {
   std::vector<Index> found;
-  for (Index i = 0; i < sites.seeds.size(); ++i)
-    if (sites.seeds.kind(i) == SeedPlace::Kind::interior && triangles.size(i) > 0) found.push_back(i);
+  for (Index i = 0; i < seeds.size(); ++i)
+    if (seeds.kind(i) == SeedPlace::Kind::interior && triangles.size(i) > 0) found.push_back(i);
   return found;
 }
 

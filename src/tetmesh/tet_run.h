@@ -35,7 +35,7 @@ void optimise_sites(TetRun& run, const std::string& phase, double share, bool co
 // The boundary's vertices, then the sites inside.
 PlacedSeeds with_boundary(const RemeshResult& surface, const std::vector<Vec3>& inside);
 
-// Sites inside that own a part of the boundary, ascending.
-std::vector<Index> inner_sites_at_boundary(CvtRun& sites);
+// Sites inside that own a part of the boundary, ascending; `triangles` are those that each cell meets.
+std::vector<Index> inner_sites_at_boundary(const PlacedSeeds& seeds, const Csr<Index>& triangles);
 
 }  // namespace bisector
