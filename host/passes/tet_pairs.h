@@ -10,13 +10,14 @@ namespace bisector::host {
 
 class TetPairs : public PairDomain {
  public:
-  // Where cells are whole, those that do not meet the boundary are pairs of the enclosure, and start from those that are
-  // known to lie inside; else pairs start from the owners of the vertices.
+  // Where cells are whole, those that do not meet the boundary are pairs of the enclosure, and start from those that
+  // are known to lie inside; else pairs start from the owners of the vertices.
   TetPairs(bool is_double, DeviceSolid& solid, const OwnerPass& corners, ExactRung& exact, double batch_pairs);
 
   // For so many cells that are cut up.
   void plan(std::size_t cells);
-  // For whole cells: the slots to start from, and a mark for each slot that meets the boundary (kernels/layout/pairs.h).
+  // For whole cells: the slots to start from, and a mark for each slot that meets the boundary
+  // (kernels/layout/pairs.h).
   void plan_whole(std::vector<Index> starts, std::vector<Index> marks);
   // Of each slot whether a cell that was clipped exactly has it for a neighbour.
   const std::vector<Index>& marks() const { return marks_; }

@@ -167,7 +167,8 @@ void VulkanSolidBackend::append_boundary(ClippedPolyhedra& polyhedra) {
   const ClippedPolyhedra inner = std::move(polyhedra);
   std::vector<const ClippedPolyhedra*> parts{&inner};
   boundary_.cells().each_part([&](const ClippedPolyhedra& part) { parts.push_back(&part); });
-  gather_polyhedra(parts, [](const ClippedPolyhedra::Pair&) { return true; }, polyhedra);
+  gather_polyhedra(
+      parts, [](const ClippedPolyhedra::Pair&) { return true; }, polyhedra);
 }
 
 }  // namespace

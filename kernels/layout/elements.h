@@ -40,8 +40,8 @@ LAYOUT_CONSTANT uint kTetGradientAfterDensity = 4;
 LAYOUT_CONSTANT uint kTetMomentsAfterDensity = 7;
 LAYOUT_CONSTANT uint kTetWordsAfterDensity = 12;
 
-// Whole numbers of a tetrahedron: sites of the corners (none if it has no volume or is the enclosure); bits: of two bits
-// each the corners in order and the facets' anchors; the cell that owns all corners, or none.
+// Whole numbers of a tetrahedron: sites of the corners (none if it has no volume or is the enclosure); bits: of two
+// bits each the corners in order and the facets' anchors; the cell that owns all corners, or none.
 LAYOUT_CONSTANT uint kTetMetaWords = 6;
 LAYOUT_CONSTANT uint kTetBitsAt = 4;
 LAYOUT_CONSTANT uint kTetOwnerAt = 5;

@@ -102,10 +102,10 @@ PUSH_CONSTANTS(AdmitPush) {
 #if LAYOUT_CPLUSPLUS || defined(PUSH_CLIP)
 PUSH_CONSTANTS(ClipPush) {
   uint element_base;  // the first facet of the buffers
-  float residual;   // what a difference of two positions may lack in single precision; 0 in double
-  uint two;         // 2: see loops_complete() of common.glsl
-  uint first_pair;  // of the range; for listed pairs: the list's first entry
-  uint pair_count;  // none (0xffffffff): as many as the counters say
+  float residual;     // what a difference of two positions may lack in single precision; 0 in double
+  uint two;           // 2: see loops_complete() of common.glsl
+  uint first_pair;    // of the range; for listed pairs: the list's first entry
+  uint pair_count;    // none (0xffffffff): as many as the counters say
   uint proposal_capacity;
   uint flagged_capacity;  // of one list of flagged pairs
   uint cell_count;

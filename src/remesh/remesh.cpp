@@ -258,8 +258,9 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     if (run_.has_features()) {
       return_to_input();
       clear_features(run_, trace_, measure_, step_);
+      if (!finest) begin_on_stand_in(level);
     }
-    if (level + 1 < counts.size()) to_next_level(counts[level + 1]);
+    if (!finest) to_next_level(counts[level + 1]);
     return_to_input();
     stand_ins_[level] = {};
   }

@@ -38,8 +38,8 @@ void free_phase(TetRun& run, StandIns& stand_ins) {
     SolidBackend& solid = stand_in ? *stand_in : run.solid;
     run.sites.change_backend(solid);
     if (level > 0)
-      sites = refine_sites(run.sites.diagram(Want::polygons | Want::polyhedra), run.sites.seeds.positions(),
-                           counts[level]);
+      sites =
+          refine_sites(run.sites.diagram(Want::polygons | Want::polyhedra), run.sites.seeds.positions(), counts[level]);
     fill_up(solid.solid(), counts[level], options.random_seed + level, sites);
     run.sites.seeds = PlacedSeeds(std::move(sites), {SeedPlace::Kind::interior});
     const bool finest = level > 0 && level + 1 == counts.size();

@@ -59,8 +59,8 @@ void push(const Surface& boundary, const Csr<Index>& triangles, const std::vecto
 }
 
 // The dual contains the boundary only if no cell of a site inside meets it: such sites are pushed away from it, and
-// those that nothing helps are removed. `triangles` tells which ones each cell of the seeds meets, and `cells` how large
-// the cells were before.
+// those that nothing helps are removed. `triangles` tells which ones each cell of the seeds meets, and `cells` how
+// large the cells were before.
 template <class Triangles>
 void clear_boundary(TetRun& run, const Surface& boundary, const std::vector<Moments>& cells,
                     const Triangles& triangles) {

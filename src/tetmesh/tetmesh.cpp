@@ -250,8 +250,14 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   StandIns stand_ins(mesh, surface, *boundary_backend, features, options, bound, compute, context);
   const FeatureCurves curves(features, solid.mesh.vertices);
   const std::size_t wanted = options.seeds.empty() ? sized.vertices : options.seeds.size();
-  TetRun run{CvtRun(*backend, curves, context), *backend, *boundary_backend, features, sized, options,
-             [&](const Surface& domain) { return compute.backend(domain); }, wanted};
+  TetRun run{CvtRun(*backend, curves, context),
+             *backend,
+             *boundary_backend,
+             features,
+             sized,
+             options,
+             [&](const Surface& domain) { return compute.backend(domain); },
+             wanted};
   TetResult result = mesh_sized(run, stand_ins);
   set_regions(sized.mesh, result.mesh);
   result.background_tets = sized.mesh.tets.size();

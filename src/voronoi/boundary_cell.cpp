@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
+#include "bisector/error.h"
 #include "voronoi/error_bounds.h"
 #include "voronoi/polyhedra.h"
 
@@ -221,7 +221,9 @@ bool BoundaryCell::integrate(Index slot, std::span<const CellPolygon> polygons, 
       sum_.finish();
       return false;
     }
-    if (cell_.lists_all()) throw std::logic_error("a cell's polygons and its Voronoi vertices contradict each other");
+    // Of a surface that bounds a solid, polygons and Voronoi vertices cannot contradict each other.
+    if (cell_.lists_all())
+      throw Error("the boundary of the solid crosses itself, or tetrahedra overlap; repair the mesh");
     wider_ |= !cell_.is_shortened();
     cell_.widen();
   }

@@ -42,7 +42,8 @@ class BoundaryCell {
   // Forgets what is kept about the seeds; to be called whenever they or their neighbours change.
   void reset(const SortedSeeds& seeds, const Neighbours& neighbours);
 
-  // Sets the moments of the cell, whose polygons are given in ascending order of triangles. False if the polygons do
+  // Sets the moments of the cell, whose polygons are given in ascending order of triangles. Throws Error if they cannot
+  // be those of a surface that bounds a solid. False if the polygons do
   // not tell on which side of the surface the cell's Voronoi vertices lie, which then is the same for all of them and
   // can be given as `vertices`.
   bool integrate(Index slot, std::span<const CellPolygon> polygons, Side vertices = Side::unknown);
@@ -62,7 +63,8 @@ class BoundaryCell {
   // A polygon's corner on the Voronoi edge of two neighbours, named by their indices, the lower first.
   struct Crossing {
     std::uint64_t edge;
-    int sign;  // 1 where the edge leaves the inside in its direction, the cross product of the vectors to the two; or -1
+    int sign;  // 1 where the edge leaves the inside in its direction, the cross product of the vectors to the two; or
+               // -1
     Vec3 at;
   };
   struct Term {
@@ -105,9 +107,9 @@ class BoundaryCell {
     int net;
   };
   std::vector<Edge> edges_;
-  std::vector<int> level_;      // of each vertex, up to a constant: 1 more inside than outside
+  std::vector<int> level_;  // of each vertex, up to a constant: 1 more inside than outside
   std::vector<Index> queue_;
-  std::vector<char> inside_;    // of each vertex
+  std::vector<char> inside_;  // of each vertex
   std::vector<Term> terms_;
 
   Moments moments_;

@@ -17,7 +17,9 @@ class BoundaryCells {
 
   // The solid's boundary and its enclosure must outlive the object.
   BoundaryCells(const Surface& surface, const TetFrame& enclosure)
-      : workers_([&surface, &enclosure] { return Worker{BoundaryCell(surface, enclosure), {}, 0}; }) {}
+      : workers_([&surface, &enclosure] {
+          return Worker{BoundaryCell(surface, enclosure), {}, 0};
+        }) {}
 
   // Sets the moments of the cells of these slots, which meet the surface, and their polyhedra if they are wanted. All
   // arguments must outlive the calls of the functions that settle.

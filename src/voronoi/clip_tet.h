@@ -52,8 +52,8 @@ class TetClipper {
   // Clips the tetrahedron, which must outlive the use of the result. False if the (perturbed) intersection is empty.
   bool clip(const TetFrame& tet);
 
-  // Cuts the tetrahedron by the cell's listed neighbours alone, whatever the list leaves out. For a tetrahedron that the
-  // cell meets. The list can be shortened to the nearest few at first, and widen() takes one that reaches farther.
+  // Cuts the tetrahedron by the cell's listed neighbours alone, whatever the list leaves out. For a tetrahedron that
+  // the cell meets. The list can be shortened to the nearest few at first, and widen() takes one that reaches farther.
   void cut_by_listed(const TetFrame& around);
   void shorten(std::size_t most);
   void widen();

@@ -201,8 +201,7 @@ std::vector<Index> ClippedVoronoi::Work::mark_boundary(const CellMoments& result
 // Cuts up these cells from the tetrahedra under the triangles that they meet. A part of such a cell that the boundary
 // does not bound would be all of the cell, so this finds every part.
 std::vector<ClippedVoronoi::Work::Start> ClippedVoronoi::Work::walk_boundary(const std::vector<Index>& slots,
-                                                                             CellMoments& result,
-                                                                             bool want_polyhedra) {
+                                                                             CellMoments& result, bool want_polyhedra) {
   std::vector<Chunk>& chunks = next_round((slots.size() + kWalks - 1) / kWalks);
   parallel_chunks(slots.size(), kWalks, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Walker& local = walker();
@@ -235,7 +234,7 @@ void ClippedVoronoi::Work::walk_inner(std::vector<Start> frontier, CellMoments& 
 }
 
 const std::vector<Chunk>& ClippedVoronoi::Work::take_all_inner(const std::vector<Index>& slots, CellMoments& result,
-                                                         bool want_polyhedra) {
+                                                               bool want_polyhedra) {
   std::vector<Chunk>& chunks = next_round((slots.size() + kWholes - 1) / kWholes);
   parallel_chunks(slots.size(), kWholes, [&](std::size_t c, std::size_t begin, std::size_t end) {
     Walker& local = walker();
@@ -318,7 +317,8 @@ void ClippedVoronoi::Work::gather(ClippedPolyhedra& polyhedra) const {
   for (std::size_t r = 0; r < round_count; ++r)
     for (const Chunk& chunk : rounds[r]) parts.push_back(&chunk.polyhedra);
   if (whole) boundary_cells.each_part([&](const ClippedPolyhedra& part) { parts.push_back(&part); });
-  gather_polyhedra(parts, [&](const auto& pair) { return known[seeds().slot[pair.cell]] != 0; }, polyhedra);
+  gather_polyhedra(
+      parts, [&](const auto& pair) { return known[seeds().slot[pair.cell]] != 0; }, polyhedra);
 }
 
 ClippedVoronoi::ClippedVoronoi(const Solid& solid, SolidCells how) : work_(std::make_unique<Work>(solid, how)) {}

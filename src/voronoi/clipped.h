@@ -44,9 +44,9 @@ class ClippedVoronoi {
 std::vector<Tetrahedron> dual_tets(const ClippedPolyhedra& polyhedra);
 
 // The certificate of a reported diagram. Where cells are cut up, each inner facet {i, j} of each tetrahedron must occur
-// once in cell i and once in j with the same vertices, and each facet of the tetrahedron must be tiled as from its other
-// side. Of whole cells each bisector must be one of its two cells', and each vertex one of its four. Returns the number
-// of tetrahedra and whole cells where that fails; the boundary's polygons have a certificate of their own.
+// once in cell i and once in j with the same vertices, and each facet of the tetrahedron must be tiled as from its
+// other side. Of whole cells each bisector must be one of its two cells', and each vertex one of its four. Returns the
+// number of tetrahedra and whole cells where that fails; the boundary's polygons have a certificate of their own.
 std::size_t count_untiled(const Solid& solid, const ClippedPolyhedra& polyhedra);
 
 }  // namespace bisector

@@ -239,8 +239,7 @@ std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Setup& setup,
   host::VulkanOptions options;
   options.precision = precision_of(setup.processor);
   options.neighbours = setup.source;
-  return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor).value()), options,
-                                         how);
+  return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor).value()), options, how);
 }
 
 struct ModelCase {
@@ -345,6 +344,18 @@ TEST_P(SolidParities, WhatIsKeptBetweenDiagramsDoesNotShow) {
   check(seeds, "reversed");
   check(seeds_in(mesh, 500, 46), "more");
   check(seeds_in(mesh, 5, 47), "fewer");
+}
+
+// A cell that only cells with cavities surround, of which nothing but their neighbours tells what is inside.
+TEST_P(SolidParities, CellsBehindCavitiesAreFound) {
+  SKIP_WITHOUT_DEVICE(GetParam().processor);
+  const Solid solid(shell_of_pores());
+  const std::unique_ptr<SolidBackend> backend = make_backend(solid, options_of(GetParam()));
+  CpuSolidBackend cpu(solid, NeighbourSource::nearest);
+  const std::vector<Vec3> seeds = lattice_of_pores();
+  const Evaluated found = solid_diagram_of(*backend, seeds);
+  EXPECT_EQ(found.polyhedra.pairs.size(), seeds.size());
+  expect_parity(solid, solid_diagram_of(cpu, seeds), found, GetParam().processor);
 }
 
 // Cells of a grid are settled by equal coordinates on the device, those apart that the tetrahedra tie with.

@@ -75,9 +75,10 @@ TetMesh two_cubes() { return without_cubes(3, 1, 1, {1}); }
 
 namespace {
 
-// Of the grid of 5 x 5 x 5 cubes, every other layer thinner by far.
+constexpr double kThin = 0.02;
+
+// Of a grid of cubes, every other layer thinner by far.
 TetMesh with_thin_layers(TetMesh mesh) {
-  constexpr double kThin = 0.02;
   for (Vec3& p : mesh.vertices)
     for (int k = 0; k < 3; ++k) {
       const double thick = std::ceil(0.5 * p[k]);
@@ -100,6 +101,25 @@ TetMesh specks() {
   for (int k = 0; k < 125; ++k)
     if (k != cube_of_five(1, 1, 1) && k != cube_of_five(3, 1, 3) && k != cube_of_five(4, 4, 4)) removed.push_back(k);
   return with_thin_layers(without_cubes(5, 5, 5, removed));
+}
+
+TetMesh shell_of_pores() {
+  std::vector<int> removed;
+  for (int x : {5, 7, 9})
+    for (int y : {5, 7, 9})
+      for (int z : {5, 7, 9})
+        if (x != 7 || y != 7 || z != 7) removed.push_back(x + 15 * (y + 15 * z));
+  return with_thin_layers(without_cubes(15, 15, 15, removed));
+}
+
+std::vector<Vec3> lattice_of_pores() {
+  SplitMix64 random(29);
+  std::vector<Vec3> points;
+  const auto at = [&](int k) { return (k + 1) + kThin * (k + 0.5) + random.range(-0.05, 0.05); };
+  for (int x = 0; x < 7; ++x)
+    for (int y = 0; y < 7; ++y)
+      for (int z = 0; z < 7; ++z) points.push_back({at(x), at(y), at(z)});
+  return points;
 }
 
 TetMesh slivers() { return around_square(0x1p-40); }

@@ -497,26 +497,36 @@ TEST(Clipped, TheDualOfSeedsInTheSolidIsTheirDelaunayTriangulation) {
 TEST(Clipped, TilingFailsWhereAPolyhedronIsMissingOrWrong) {
   const Solid solid(tet_grid(2, 2, 2));
   for (const SolidCells how : {SolidCells::clipped, SolidCells::whole}) {
-  const Diagram d = diagram_of(solid, seeds_about(solid.mesh, 40, 0, 44), NeighbourSource::nearest, how);
-  ASSERT_EQ(count_untiled(solid, d.polyhedra), 0u);
-  const std::size_t k = d.polyhedra.pairs.size() / 2;
-  ClippedPolyhedra relabelled = d.polyhedra;
-  ++relabelled.pairs[k].cell;
-  EXPECT_GT(count_untiled(solid, relabelled), 0u);
-  ClippedPolyhedra wrong = d.polyhedra;
-  std::swap(wrong.labels[wrong.label_offsets[k]], wrong.labels[wrong.label_offsets[k] + 1]);
-  EXPECT_GT(count_untiled(solid, wrong), 0u);
-  ClippedPolyhedra cut = d.polyhedra;
-  cut.pairs.erase(cut.pairs.begin());
-  cut.label_offsets.erase(cut.label_offsets.begin());
-  cut.vertex_offsets.erase(cut.vertex_offsets.begin());
-  EXPECT_GT(count_untiled(solid, cut), 0u);
-  ClippedPolyhedra turned = d.polyhedra;
-  std::swap(turned.triples[turned.vertex_offsets[k]][1], turned.triples[turned.vertex_offsets[k]][2]);
-  if (how == SolidCells::whole) {
-    EXPECT_GT(count_untiled(solid, turned), 0u);
+    const Diagram d = diagram_of(solid, seeds_about(solid.mesh, 40, 0, 44), NeighbourSource::nearest, how);
+    ASSERT_EQ(count_untiled(solid, d.polyhedra), 0u);
+    const std::size_t k = d.polyhedra.pairs.size() / 2;
+    ClippedPolyhedra relabelled = d.polyhedra;
+    ++relabelled.pairs[k].cell;
+    EXPECT_GT(count_untiled(solid, relabelled), 0u);
+    ClippedPolyhedra wrong = d.polyhedra;
+    std::swap(wrong.labels[wrong.label_offsets[k]], wrong.labels[wrong.label_offsets[k] + 1]);
+    EXPECT_GT(count_untiled(solid, wrong), 0u);
+    ClippedPolyhedra cut = d.polyhedra;
+    cut.pairs.erase(cut.pairs.begin());
+    cut.label_offsets.erase(cut.label_offsets.begin());
+    cut.vertex_offsets.erase(cut.vertex_offsets.begin());
+    EXPECT_GT(count_untiled(solid, cut), 0u);
+    ClippedPolyhedra turned = d.polyhedra;
+    std::swap(turned.triples[turned.vertex_offsets[k]][1], turned.triples[turned.vertex_offsets[k]][2]);
+    if (how == SolidCells::whole) {
+      EXPECT_GT(count_untiled(solid, turned), 0u);
+    }
   }
-  }
+}
+
+TEST(Clipped, TetrahedraThatOverlapAreRefused) {
+  TetMesh mesh = tet_grid(1, 1, 1);
+  const auto first = static_cast<Index>(mesh.vertices.size());
+  const TetMesh other = mesh;
+  for (const Vec3& p : other.vertices) mesh.vertices.push_back(p + Vec3{0.31, 0.27, 0.23});
+  for (const Tetrahedron& t : other.tets) mesh.tets.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
+  const std::vector<Vec3> seeds = seeds_about(mesh, 300, 0, 45);
+  EXPECT_THROW(diagram_of(Solid(mesh), seeds, NeighbourSource::nearest, SolidCells::whole), Error);
 }
 
 TEST(Solid, KeepsFlatTetrahedraOutOfTheWay) {
