@@ -4,6 +4,7 @@
 
 #include "core/marks.h"
 #include "core/parallel.h"
+#include "mesh/half_edges.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -17,17 +18,16 @@ constexpr std::size_t kPointsAtOnce = 16;  // of a parallel loop
 class Balls {
  public:
   explicit Balls(const TriangleMesh& mesh) : mesh_(mesh), twin_(3 * mesh.triangles.size(), kNone) {
-    const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
+    const Csr<EdgeSide> sides = edge_sides(mesh.triangles, mesh.vertices.size());
+    each_edge(sides, [&](std::span<const EdgeSide> edge) {
+      if (edge.size() != 2) return;
+      twin_[edge[0].half_edge] = edge[1].half_edge;
+      twin_[edge[1].half_edge] = edge[0].half_edge;
+    });
     on_border_.assign(mesh.vertices.size(), 0);
-    for (std::size_t e = 0; e < table.edges.size(); ++e) {
-      const std::size_t* h = table.half_edges.begin(e);
-      if (table.half_edges.size(e) == 2) {
-        twin_[h[0]] = static_cast<Index>(h[1]);
-        twin_[h[1]] = static_cast<Index>(h[0]);
-      } else {
-        for (const Index v : table.edges[e]) on_border_[v] = 1;
-      }
-    }
+    for (std::size_t h = 0; h < twin_.size(); ++h)
+      if (twin_[h] == kNone)
+        for (const std::size_t end : {h, next_half_edge(h)}) on_border_[origin(mesh.triangles, end)] = 1;
   }
 
   struct Visit {

@@ -67,32 +67,39 @@ std::array<bool, 3> edges_among(const Triangle& t, const std::vector<std::array<
   return among;
 }
 
-EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
-  struct Record {
-    Index high, half_edge;  // of an edge: its higher vertex
-  };
+Csr<EdgeSide> edge_sides(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
   const std::size_t n = 3 * triangles.size();
   if (n > std::numeric_limits<Index>::max())
     throw Error(fmt::format("{} triangles are too many; at most {} can be indexed", triangles.size(),
                             std::numeric_limits<Index>::max() / 3));
-  Csr<Record> records = group_into_rows<Record>(vertex_count, [&](const auto& put) {
+  Csr<EdgeSide> sides = group_into_rows<EdgeSide>(vertex_count, [&](const auto& put) {
     for (std::size_t h = 0; h < n; ++h) {
       const auto [low, high] = std::minmax({origin(triangles, h), origin(triangles, next_half_edge(h))});
-      put(low, Record{high, static_cast<Index>(h)});
+      put(low, EdgeSide{high, static_cast<Index>(h)});
     }
   });
+  EdgeSide* const all = sides.values.data();
+  parallel_each(
+      vertex_count,
+      [&](std::size_t v) {
+        std::sort(all + sides.offsets[v], all + sides.offsets[v + 1], [](const EdgeSide& x, const EdgeSide& y) {
+          return x.high != y.high ? x.high < y.high : x.half_edge < y.half_edge;
+        });
+      },
+      kVerticesAtOnce);
+  return sides;
+}
+
+EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  const Csr<EdgeSide> records = edge_sides(triangles, vertex_count);
+  const std::size_t n = records.values.size();
   const auto is_first = [&](std::size_t row, std::size_t k) {
     return k == records.offsets[row] || records.values[k].high != records.values[k - 1].high;
   };
   std::vector<std::size_t> first((vertex_count + kVerticesAtOnce - 1) / kVerticesAtOnce + 1, 0);  // edge of each block
   parallel_chunks(vertex_count, kVerticesAtOnce, [&](std::size_t block, std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      Record* const row = records.values.data();
-      std::sort(row + records.offsets[v], row + records.offsets[v + 1], [](const Record& x, const Record& y) {
-        return x.high != y.high ? x.high < y.high : x.half_edge < y.half_edge;
-      });
+    for (std::size_t v = begin; v < end; ++v)
       for (std::size_t k = records.offsets[v]; k < records.offsets[v + 1]; ++k) first[block + 1] += is_first(v, k);
-    }
   });
   std::partial_sum(first.begin(), first.end(), first.begin());
   EdgeTable table;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <map>
+#include <mutex>
 #include <numeric>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -63,10 +65,9 @@ class Complex {
   Complex(const Surface& surface, const RestrictedPolygons& polygons)
       : triangles_(surface.mesh.triangles), diagram_(polygons), begin_(first_polygons(polygons, triangles_.size())),
         twin_(3 * triangles_.size(), kBorder) {
-    const std::size_t vertices = surface.mesh.vertices.size();
-    link_triangles(edge_table(triangles_, vertices));
-    polygon_at_.assign(vertices, kNone);
-    piece_at_.assign(vertices, kNone);
+    polygon_at_.assign(surface.mesh.vertices.size(), kNone);
+    piece_at_.assign(surface.mesh.vertices.size(), kNone);
+    link_triangles();
     parts_ = singletons(polygons.pairs.size());
     lines_ = singletons(polygons.labels.size());
     Index cells = 0;
@@ -106,23 +107,24 @@ class Complex {
     twin_[h] = static_cast<Index>(g);
   }
 
-  void link_triangles(const EdgeTable& table) {
-    parallel_each(table.edges.size(), [&](std::size_t e) {
-      if (table.half_edges.size(e) != 2) return;
-      const std::size_t g = table.half_edges.begin(e)[0], h = table.half_edges.begin(e)[1];
+  void link_triangles() {
+    std::mutex mutex;
+    each_edge(edge_sides(triangles_, polygon_at_.size()), [&](std::span<const EdgeSide> sides) {
+      if (sides.size() > 2) return link_several(sides, mutex);
+      if (sides.size() < 2) return;
+      const Index g = sides[0].half_edge, h = sides[1].half_edge;
       if (is_read(g / 3) && is_read(h / 3)) make_twins(g, h);
     });
-    for (std::size_t e = 0; e < table.edges.size(); ++e)
-      if (table.half_edges.size(e) > 2) link_several(table.half_edges.begin(e), table.half_edges.end(e));
   }
 
   // An edge of more than two triangles, some of which may have no polygons.
-  void link_several(const std::size_t* begin, const std::size_t* end) {
+  void link_several(std::span<const EdgeSide> sides, std::mutex& mutex) {
     std::vector<std::size_t> around;
-    for (const std::size_t* h = begin; h != end; ++h)
-      if (is_read(*h / 3)) around.push_back(*h);
+    for (const EdgeSide& side : sides)
+      if (is_read(side.half_edge / 3)) around.push_back(side.half_edge);
     if (around.size() == 2) make_twins(around[0], around[1]);
     if (around.size() <= 2) return;
+    const std::lock_guard lock(mutex);
     for (const std::size_t h : around) {
       twin_[h] = kSeveral;
       several_[h] = around;
