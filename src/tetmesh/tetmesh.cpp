@@ -163,6 +163,11 @@ TriangleMesh boundary_of(const TetMesh& mesh) {
   return surface;
 }
 
+// The same of a solid refined from one whose boundary is known.
+TriangleMesh boundary_of(const SizedSolid& sized, const TetMesh& given, const TriangleMesh& boundary) {
+  return sized.mesh.tets.size() == given.tets.size() ? boundary : boundary_of(sized.mesh);
+}
+
 // Edges of a boundary that are shared by two triangles; marks inside the solid are none of its features.
 void keep_boundary_edges(TriangleMesh& surface) {
   const EdgeTable table = edge_table(surface.triangles, surface.vertices.size());
@@ -211,13 +216,15 @@ struct BoundaryDetail {
 };
 
 // `plain` is the solid refined for sizes without details.
-BoundaryDetail plan_boundary(const TriangleMesh& surface, const SizedSolid& plain, const TetOptions& options) {
+BoundaryDetail plan_boundary(const TetMesh& mesh, const TriangleMesh& surface, const SizedSolid& plain,
+                             const TetOptions& options) {
   BoundaryDetail detail;
   detail.features = detect_features(surface, options.features);
   if (options.detail == DetailMode::off || !options.seeds.empty()) return detail;
   std::vector<double> lengths(surface.vertices.size(), plain.edge_length);
   std::copy_n(plain.lengths.begin(), std::min(plain.lengths.size(), lengths.size()), lengths.begin());
-  const MeshEstimate without = estimate_mesh(boundary_of(plain.mesh), {plain.surface_density(), plain.edge_length});
+  const MeshEstimate without =
+      estimate_mesh(boundary_of(plain, mesh, surface), {plain.surface_density(), plain.edge_length});
   DetailPlan plan = plan_details(surface, detail.features, lengths, static_cast<std::size_t>(without.vertices),
                                  options.detail == DetailMode::all);
   detail.features = std::move(plan.features);
@@ -233,7 +240,7 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
   const SizingTarget target = options.seeds.empty() ? SizingTarget{options.vertices, options.edge_length}
                                                     : SizingTarget{options.seeds.size(), 0};
   SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
-  const BoundaryDetail detail = plan_boundary(surface, sized, options);
+  const BoundaryDetail detail = plan_boundary(mesh, surface, sized, options);
   const SizeField* bound = detail.bound ? &*detail.bound : nullptr;
   if (bound) sized = refine_for_sizes(mesh, surface, options.sizing, target, bound, options.detail == DetailMode::all);
   if (sized.vertices < kFewest)
@@ -241,7 +248,7 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
                             options.edge_length, sized.vertices, kFewest));
   const FeatureGraph features = split_features(detail.features, sized.splits);
   const Solid solid(sized.mesh, sized.volume_density());
-  TriangleMesh outside = boundary_of(sized.mesh);
+  TriangleMesh outside = boundary_of(sized, mesh, surface);
   const Surface boundary(std::move(outside), sized.surface_density());
   const double preparing = watch.seconds();
   Compute compute(options.compute, context);

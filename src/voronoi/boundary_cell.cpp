@@ -153,13 +153,18 @@ BoundaryCell::Found BoundaryCell::find_sides(Side vertices) {
       if (inside_[v] && (!cell_.is_certain(v) || reaches_out(v))) return Found::uncertain;
     return Found::settled;
   }
-  bool bounded = true;
+  // All vertices are on one side.
+  bool some_certain = false, all_certain = true, outside = vertices == Side::outside;
   for (std::size_t v = 0; v < n; ++v) {
-    if (!cell_.is_certain(v)) return Found::uncertain;
-    bounded &= !reaches_out(v);
+    const bool certain = cell_.is_certain(v);
+    some_certain |= certain;
+    all_certain &= certain;
+    outside |= certain && reaches_out(v);
   }
-  if (bounded && vertices == Side::unknown) return Found::open;
-  inside_.assign(n, bounded && vertices == Side::inside);
+  if (!some_certain) return Found::uncertain;
+  if (!outside && vertices == Side::unknown) return Found::open;
+  if (!outside && !all_certain) return Found::uncertain;
+  inside_.assign(n, !outside);
   return Found::settled;
 }
 

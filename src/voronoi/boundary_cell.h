@@ -29,8 +29,9 @@ namespace bisector {
 // Voronoi vertices come from a list of neighbours that need not be complete. Seeds that it lacks can only cut off what
 // lies outside, if it has all those that bound polygons and if it reaches twice as far as every vertex that is held to
 // be inside: a face of a seed that is not listed meets no polygon, so all of it is on one side; were that the inside, a
-// Voronoi edge between listed seeds would lead from it to a vertex that is held to be inside and is not certain. Where
-// no edge is crossed more often one way than the other there may be no such edge, and all vertices have to be certain.
+// Voronoi edge between listed seeds would lead from it to a vertex that is held to be inside and is not certain. Only
+// if the cell has no edge between listed seeds there is none; it has one if some edge is crossed more often one way
+// than the other, or if some vertex is certain.
 class BoundaryCell {
  public:
   // On which side of the surface the Voronoi vertices of a cell lie where its polygons do not tell.
