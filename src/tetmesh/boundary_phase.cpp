@@ -81,7 +81,9 @@ RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<S
   plan.min_angle = final_pass ? run.options.min_angle : 0;
   Context quiet = run.sites.context();
   quiet.progress = nullptr;
-  RemeshResult result = remesh(run.boundary, run.features, plan, quiet, run.make_backend);
+  // On a surface that stands in for it the boundary would not be as near to the input afterwards.
+  const MakeBackend no_stand_ins;
+  RemeshResult result = remesh(run.boundary, run.features, plan, quiet, final_pass ? no_stand_ins : run.make_backend);
   run.seconds_boundary += watch.seconds();
   return result;
 }

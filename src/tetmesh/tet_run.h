@@ -22,7 +22,7 @@ struct TetRun {
   const FeatureGraph& features;
   const SizedSolid& sized;
   const TetOptions& options;
-  MakeBackend make_backend;     // for surfaces that stand in for the boundary
+  MakeBackend make_backend;     // for surfaces that stand in for the boundary at first
   std::size_t wanted = 0;       // vertices
   double seconds_boundary = 0;  // spent on remeshing the boundary
   double done = 0;              // fraction of the whole run, for progress
