@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "bisector/error.h"
 #include "voronoi/error_bounds.h"
@@ -59,7 +60,8 @@ void BoundaryCell::trace_polygon(const CellPolygon& polygon, Moments& sum) {
     if (is_edge(last)) continue;
     crossed_.mark(label);
     crossed_.mark(last);
-    crossings_.push_back({edge_of(last, label), seeds_->id[last] < seeds_->id[label] ? 1 : -1, p});
+    const auto order = static_cast<Index>(crossings_.size());
+    crossings_.push_back({edge_of(last, label), order, seeds_->id[last] < seeds_->id[label] ? 1 : -1, p});
   }
 }
 
@@ -68,6 +70,7 @@ void BoundaryCell::trace(std::span<const CellPolygon> polygons) {
   crossings_.clear();
   crossed_.begin(seeds_->x.size());
   magnitude_ = 0;
+  sum_.finish();  // of a cell that was left open
   for (const CellPolygon& polygon : polygons) {
     const Facet& facet = surface_.facets[polygon.facet];
     const double height = dot(facet.normal, facet.corners[facet.anchor] - seed_);
@@ -81,8 +84,8 @@ void BoundaryCell::trace(std::span<const CellPolygon> polygons) {
     }
     add(cone, edges);
   }
-  std::stable_sort(crossings_.begin(), crossings_.end(),
-                   [](const Crossing& a, const Crossing& b) { return a.edge < b.edge; });
+  std::sort(crossings_.begin(), crossings_.end(),
+            [](const Crossing& a, const Crossing& b) { return std::tie(a.edge, a.order) < std::tie(b.edge, b.order); });
 }
 
 // Whether the list has all seeds that are known to bound the cell.
@@ -141,7 +144,7 @@ BoundaryCell::Found BoundaryCell::find_sides(Side vertices) {
   const auto reaches_out = [&](std::size_t v) {  // to the enclosure's facets
     return is_facet(cell_.label_at(v, 0)) || is_facet(cell_.label_at(v, 1)) || is_facet(cell_.label_at(v, 2));
   };
-  if (!lists_bisectors()) return Found::uncertain;
+  if (n == 0 || !lists_bisectors()) return Found::uncertain;
   count_crossings();
   if (!propagate()) return Found::uncertain;
   const auto [least, most] = std::minmax_element(level_.begin(), level_.end());
@@ -222,10 +225,7 @@ bool BoundaryCell::integrate(Index slot, std::span<const CellPolygon> polygons, 
     uncertain_ |= cell_.uncertain();
     const Found found = find_sides(vertices);
     if (found == Found::settled) break;
-    if (found == Found::open) {
-      sum_.finish();
-      return false;
-    }
+    if (found == Found::open) return false;
     // Of a surface that bounds a solid, polygons and Voronoi vertices cannot contradict each other.
     if (cell_.lists_all())
       throw Error("the boundary of the solid crosses itself, or tetrahedra overlap; repair the mesh");

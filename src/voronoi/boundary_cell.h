@@ -44,9 +44,8 @@ class BoundaryCell {
   void reset(const SortedSeeds& seeds, const Neighbours& neighbours);
 
   // Sets the moments of the cell, whose polygons are given in ascending order of triangles. Throws Error if they cannot
-  // be those of a surface that bounds a solid. False if the polygons do
-  // not tell on which side of the surface the cell's Voronoi vertices lie, which then is the same for all of them and
-  // can be given as `vertices`.
+  // be those of a surface that bounds a solid. False if the polygons do not tell on which side of the surface the cell's
+  // Voronoi vertices lie, which then is the same for all of them and can be given as `vertices`.
   bool integrate(Index slot, std::span<const CellPolygon> polygons, Side vertices = Side::unknown);
 
   // About the seed, with density 1. Zero where the volume is less than its rounding error.
@@ -64,8 +63,8 @@ class BoundaryCell {
   // A polygon's corner on the Voronoi edge of two neighbours, named by their indices, the lower first.
   struct Crossing {
     std::uint64_t edge;
-    int sign;  // 1 where the edge leaves the inside in its direction, the cross product of the vectors to the two; or
-               // -1
+    Index order;  // by triangle
+    int sign;     // 1 where the edge leaves the inside along the cross product of the vectors to the two, else -1
     Vec3 at;
   };
   struct Term {
