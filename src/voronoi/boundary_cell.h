@@ -44,8 +44,8 @@ class BoundaryCell {
   void reset(const SortedSeeds& seeds, const Neighbours& neighbours);
 
   // Sets the moments of the cell, whose polygons are given in ascending order of triangles. Throws Error if they cannot
-  // be those of a surface that bounds a solid. False if the polygons do not tell on which side of the surface the cell's
-  // Voronoi vertices lie, which then is the same for all of them and can be given as `vertices`.
+  // be those of a surface that bounds a solid. False if the polygons do not tell on which side of the surface the
+  // cell's Voronoi vertices lie, which then is the same for all of them and can be given as `vertices`.
   bool integrate(Index slot, std::span<const CellPolygon> polygons, Side vertices = Side::unknown);
 
   // About the seed, with density 1. Zero where the volume is less than its rounding error.
