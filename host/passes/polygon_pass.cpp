@@ -22,7 +22,8 @@ struct Found {
 
 }  // namespace
 
-void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, RestrictedPolygons& polygons) {
+void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, bool with_vertices,
+                      RestrictedPolygons& polygons) {
   const PairStore& store = job.store;
   labels_.reserve(kWindow * kStride * sizeof(Index));
   std::vector<PairName> names(store.count);
@@ -80,9 +81,15 @@ void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, R
     Clipper clipper;
     clipper.reset(seeds);
     for (std::size_t k = begin; k < end; ++k) {
-      clipper.begin(surface, found[k].facet);
-      clipper.take(found[k].slot, labels.data() + found[k].first_label, found[k].count);
-      append_polygon(clipper, seeds, triangle(found[k]), found[k].slot, parts[c]);
+      const auto [facet, slot, count, first_label] = found[k];
+      if (!with_vertices) {
+        append_labels(surface.facets[facet], seeds, triangle(found[k]), slot, {labels.data() + first_label, count},
+                      parts[c]);
+        continue;
+      }
+      clipper.begin(surface, facet);
+      clipper.take(slot, labels.data() + first_label, count);
+      append_polygon(clipper, seeds, triangle(found[k]), slot, parts[c]);
     }
   });
   polygons = {};

@@ -12,7 +12,7 @@ class PolygonPass {
   explicit PolygonPass(Device& device) : labels_(device) {}
 
   // The polygons of all pairs in the store, in order of triangles, then cells.
-  void run(PairPass& pairs, const PairJob& job, FacetPairs& domain, RestrictedPolygons& polygons);
+  void run(PairPass& pairs, const PairJob& job, FacetPairs& domain, bool with_vertices, RestrictedPolygons& polygons);
 
  private:
   Buffer labels_;

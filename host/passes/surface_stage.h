@@ -17,7 +17,9 @@ class SurfaceStage {
   std::size_t refine(const Buffer& cells, float share, Certification& certification) {
     return pairs_.refine(job(), cells, share, certification);
   }
-  void polygons(RestrictedPolygons& polygons) { polygon_pass_.run(pairs_, job(), domain_, polygons); }
+  void polygons(bool with_vertices, RestrictedPolygons& polygons) {
+    polygon_pass_.run(pairs_, job(), domain_, with_vertices, polygons);
+  }
 
   const PairStore& store() const { return store_; }
 

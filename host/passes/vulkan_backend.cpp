@@ -41,7 +41,7 @@ DeviceWork VulkanBackend::compute_on_device(const std::vector<Vec3>& seeds, Want
   find_moments(diagram.moments, work.certification);
   stage_.set_step_masses(diagram.moments);
   work.clipped = watch.lap();
-  if (includes(want, Want::labels)) pairs_.polygons(diagram.polygons);
+  if (includes(want, Want::labels)) pairs_.polygons(includes(want, Want::polygons), diagram.polygons);
   return work;
 }
 

@@ -91,12 +91,12 @@ DeviceWork VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds,
   shell_.find_pairs(work.certification);
   Csr<Index> triangles;
   if (whole_) {
-    shell_.polygons(diagram.polygons);
+    shell_.polygons(includes(want, Want::polygons), diagram.polygons);
     boundary_.run(stage_.seeds.sorted, stage_.exact.neighbours(), diagram.polygons, includes(want, Want::polyhedra));
     triangles = boundary_.triangles();
   } else {
     list_triangles(triangles);
-    if (includes(want, Want::labels)) shell_.polygons(diagram.polygons);
+    if (includes(want, Want::labels)) shell_.polygons(includes(want, Want::polygons), diagram.polygons);
     tets_.plan(stage_.seeds.count());
   }
   work.paired = watch.lap();

@@ -1,5 +1,7 @@
 #include "voronoi/polygons.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <numeric>
 
 #include "core/append_range.h"
@@ -18,6 +20,21 @@ void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index tria
     out.vertices[begin + e] = seeds.x[slot] + clipper.vertex(k);
   }
   out.offsets.push_back(begin + size);
+}
+
+void append_labels(const Facet& facet, const SortedSeeds& seeds, Index triangle, Index slot,
+                   std::span<const Index> labels, RestrictedPolygons& out) {
+  const auto key = [&](Index label) {
+    return is_edge(label) ? std::uint64_t{facet.rank[label & ~kEdgeLabel]} : std::uint64_t{3} + seeds.id[label];
+  };
+  const auto first = std::min_element(labels.begin(), labels.end(), [&](Index a, Index b) { return key(a) < key(b); });
+  const auto put = [&](auto begin, auto end) {
+    for (; begin != end; ++begin) out.labels.push_back(is_edge(*begin) ? *begin : seeds.id[*begin]);
+  };
+  out.pairs.push_back({triangle, seeds.id[slot]});
+  put(first, labels.end());
+  put(labels.begin(), first);
+  out.offsets.push_back(out.labels.size());
 }
 
 std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "voronoi/clip.h"
@@ -13,6 +14,10 @@ namespace bisector {
 // the caller's indices.
 void append_polygon(const Clipper& clipper, const SortedSeeds& seeds, Index triangle, Index slot,
                     RestrictedPolygons& out);
+
+// The same without vertices, from the labels of a polygon on the facet in cyclic order.
+void append_labels(const Facet& facet, const SortedSeeds& seeds, Index triangle, Index slot,
+                   std::span<const Index> labels, RestrictedPolygons& out);
 
 // The first polygon of each triangle, and one past the last.
 std::vector<std::size_t> first_polygons(const RestrictedPolygons& polygons, std::size_t triangles);
