@@ -163,7 +163,7 @@ struct RestrictedVoronoi::Work {
   void sort_items();
   PairCounts list_triangles(std::size_t seed_count, CellMoments& result);
   void sum_cells(std::size_t seed_count, CellMoments& result);
-  CellPolygon polygon_of(Index slot, const Item& item) const;
+  Moments moments_of(Index slot, const Item& item) const;
   void set_polygons(RestrictedPolygons& polygons, bool with_vertices);
   void put_vertices(const Entry& entry, const Chunk& chunk, Clipper& clipper, Vec3* to) const;
   Index* put_labels(std::size_t facet, const Entry& entry, const Chunk& chunk, Index* to) const;
@@ -379,13 +379,11 @@ PairCounts RestrictedVoronoi::Work::list_triangles(std::size_t seed_count, CellM
   return counts;
 }
 
-CellPolygon RestrictedVoronoi::Work::polygon_of(Index slot, const Item& item) const {
-  if (item.moments == kWhole) {
-    const FacetSummary& summary = surface.summaries[item.facet];
-    return {item.facet, {}, moved(summary.moments, summary.anchor - seeds.x[slot])};
-  }
-  const Chunk& chunk = chunks[chunk_of(item.facet)];
-  return {item.facet, chunk.labels_of(Entry{slot, item.moments}), chunk.moments[item.moments]};
+// About the slot's seed.
+inline Moments RestrictedVoronoi::Work::moments_of(Index slot, const Item& item) const {
+  const FacetSummary& summary = surface.summaries[item.facet];
+  return item.moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[slot])
+                                : chunks[chunk_of(item.facet)].moments[item.moments];
 }
 
 void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& result) {
@@ -393,11 +391,8 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
   parallel_chunks(seeds.x.size(), kCellsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
     FixedTreeSum sum;
     for (std::size_t s = begin; s < end; ++s) {
-      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k) {
-        const FacetSummary& summary = surface.summaries[items[k].facet];
-        sum.add(items[k].moments == kWhole ? moved(summary.moments, summary.anchor - seeds.x[s])
-                                           : chunks[chunk_of(items[k].facet)].moments[items[k].moments]);
-      }
+      for (std::size_t k = cell_begin[s]; k < cell_begin[s + 1]; ++k)
+        sum.add(moments_of(static_cast<Index>(s), items[k]));
       result.cells[seeds.id[s]] = sum.finish();
     }
   });
@@ -571,8 +566,13 @@ DiagramWork RestrictedVoronoi::trace(const std::vector<Vec3>& seeds, NeighbourSo
 
 void RestrictedVoronoi::polygons_of(Index slot, std::vector<CellPolygon>& polygons) const {
   polygons.clear();
-  for (std::size_t k = work_->cell_begin[slot]; k < work_->cell_begin[slot + 1]; ++k)
-    polygons.push_back(work_->polygon_of(slot, work_->items[k]));
+  for (std::size_t k = work_->cell_begin[slot]; k < work_->cell_begin[slot + 1]; ++k) {
+    const Work::Item& item = work_->items[k];
+    std::span<const Index> labels;
+    if (item.moments != kWhole)
+      labels = std::as_const(work_->chunks[work_->chunk_of(item.facet)]).labels_of(Entry{slot, item.moments});
+    polygons.push_back({item.facet, labels, work_->moments_of(slot, item)});
+  }
 }
 
 const SortedSeeds& RestrictedVoronoi::seeds() const { return work_->seeds; }
