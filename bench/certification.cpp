@@ -90,18 +90,18 @@ void run_once(Options options) {
   Diagram diagram;
   const CellMoments& moments = diagram.moments;
   const Stopwatch cold_watch;
-  EvaluationReport report = backend->evaluate(seeds, Want::moments, diagram);
+  EvaluationReport report = backend->evaluate(seeds, Want::triangles, diagram);
   const double cold = cold_watch.seconds();
   std::string warm = "-";
   if (seeds.size() < kMany) {
-    backend->evaluate({seeds.begin(), seeds.end() - 1}, Want::moments, diagram);
+    backend->evaluate({seeds.begin(), seeds.end() - 1}, Want::triangles, diagram);
     const Stopwatch watch;
-    report = backend->evaluate(seeds, Want::moments, diagram);
+    report = backend->evaluate(seeds, Want::triangles, diagram);
     warm = fmt::format("{:.2f}", watch.seconds());
   }
   // After all that counts for the memory: the CPU needs less.
   Diagram reference;
-  CpuBackend(surface, NeighbourSource::nearest).evaluate(seeds, Want::moments, reference);
+  CpuBackend(surface, NeighbourSource::nearest).evaluate(seeds, Want::triangles, reference);
   const bool same = moments.triangles.offsets == reference.moments.triangles.offsets &&
                     moments.triangles.values == reference.moments.triangles.values;
   const Certification& c = report.certification;

@@ -15,8 +15,8 @@ layout(std430, binding = 3) buffer Counters { uint counters[]; };
 const uint kProbes = 256;
 
 void main() {
-  const uint place = counters[kProposalsBegin] + invocation();
-  if (place >= counters[kProposalsEnd]) return;
+  const uint place = counters[kProposals + kBeginAfter] + invocation();
+  if (place >= counters[kProposals + kEndAfter]) return;
   const uvec2 proposal = proposals[place];
   uint h = proposal.x * 0x9e3779b1u ^ proposal.y * 0x85ebca77u;
   h ^= h >> 15;

@@ -59,19 +59,22 @@ void propose(uint facet) {
     if ((corner_label[k] & kEdgeLabel) == 0) proposals[at++] = uvec2(facet, corner_label[k]);
 }
 
-void flag(uint list, uint counter, uint pair) {
-  flagged[list * flagged_capacity + atomicAdd(counters[counter], 1u)] = pair;
+void flag(uint list, uint pair) {
+  const uint at = atomicAdd(counters[kWorkWords * (kWorkShort + list)], 1u);
+  if (at < flagged_capacity) flagged[list * flagged_capacity + at] = pair;
+  else atomicOr(counters[kOverflow], kOverflowFlagged);
 }
 
 void main() {
   const uint index = invocation();
-  uint pair;
-  if (kListed) {
+  uint pair = first_pair + index;
+  if (kLabels) {
     if (index >= pair_count) return;
-    pair = flagged[first_pair + index];
   } else {
-    pair = (pair_count == kNone ? counters[kPairsBegin] : first_pair) + index;
-    if (pair >= (pair_count == kNone ? counters[kPairsEnd] : first_pair + pair_count)) return;
+    const uint work = kWorkWords * (!kListed ? kWorkPairs : kRung == kRungDouble ? kWorkUnsure : kWorkShort);
+    const uint item = counters[work + kBeginAfter] + index;
+    if (item >= counters[work + kEndAfter]) return;
+    pair = kListed ? flagged[first_pair + item] : item;
   }
   const uint facet = pairs[pair].x, slot = pairs[pair].y;
   if (kLabels && status_of[pair] == kStatusEmpty) {
@@ -106,10 +109,10 @@ void main() {
 #endif
     propose(facet);
   } else if (kRung == kRungFirst && (status == kStatusShortList || status == kStatusCrowded)) {
-    flag(kFlaggedShort, kShortLists, pair);
+    flag(kFlaggedShort, pair);
   } else if (kDoubleNext && status == kStatusUnsure) {
-    flag(kFlaggedUncertain, kUncertain, pair);
+    flag(kFlaggedUncertain, pair);
   } else if (status != kStatusEmpty) {
-    flag(kFlaggedForCpu, kForCpu, pair);
+    flag(kFlaggedForCpu, pair);
   }
 }

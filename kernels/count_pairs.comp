@@ -1,7 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Incident pairs per triangle and per cell.
+// Incident pairs per cell, and per triangle where they are to be sorted by that first.
 #include "common.glsl"
+
+layout(constant_id = 0) const bool kByTriangle = false;
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) readonly buffer Status { uint status_of[]; };
@@ -14,6 +16,6 @@ layout(std430, binding = 4) buffer ByCell { uint by_cell[]; };
 void main() {
   const uint pair = invocation();
   if (pair >= count || status_of[pair] == kStatusEmpty) return;
-  atomicAdd(by_triangle[triangle_of[pairs[pair].x]], 1u);
+  if (kByTriangle) atomicAdd(by_triangle[triangle_of[pairs[pair].x]], 1u);
   atomicAdd(by_cell[pairs[pair].y], 1u);
 }

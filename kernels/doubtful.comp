@@ -14,9 +14,10 @@ const float kMassError = kSolid ? 3e-3 : 4e-4, kEnergyError = kSolid ? 9e-3 : 1.
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) readonly buffer Status { uint status_of[]; };
 layout(std430, binding = 2) readonly buffer CellErrors { uint cell_errors[]; };
-layout(std430, binding = 3) readonly buffer Cells { float cells[]; }; 
+layout(std430, binding = 3) readonly buffer Cells { float cells[]; };  // by the caller's index
 layout(std430, binding = 4) buffer Counters { uint counters[]; };
 layout(std430, binding = 5) writeonly buffer Flagged { uint flagged[]; };
+layout(std430, binding = 6) readonly buffer Ids { uvec4 ids[]; };
 #define PUSH_DOUBTFUL
 #include "layout/push.h"
 #include "layout/counters.h"
@@ -26,16 +27,17 @@ void main() {
   if (index >= pair_count) return;
   const uint pair = first_pair + index, slot = pairs[pair].y;
   if (status_of[pair] != kStatusClipped) return;
-  precise float least = 0.25 * cells[kCellWords * slot + kCellMedianAt];
-  precise float mass = max(cells[kCellWords * slot], least);
+  const uint cell = kCellWords * ids[slot].x;
+  const float mass = max(cells[cell], cells[cell + kCellStepMassAt]);
   const float extent = mass / mean_density;
   precise float energy =
-      max(cells[kCellWords * slot + kSecondMomentAt], mass * (kSolid ? pow(extent, 2.0 / 3.0) : extent));
+      max(cells[cell + kSecondMomentAt], mass * (kSolid ? pow(extent, 2.0 / 3.0) : extent));
   precise float most_mass = kMassError * share * mass;
   precise float most_energy = kEnergyError * share * energy;
   if (!(uintBitsToFloat(cell_errors[kCellErrorWords * slot]) > most_mass) &&
       !(uintBitsToFloat(cell_errors[kCellErrorWords * slot + kEnergyErrorAt]) > most_energy))
     return;
-  const uint at = atomicAdd(counters[kDoubleNext ? kUncertain : kForCpu], 1u);
-  if (at < flagged_capacity) flagged[(kDoubleNext ? kFlaggedUncertain : kFlaggedForCpu) * flagged_capacity + at] = pair;
+  const uint list = kDoubleNext ? kFlaggedUncertain : kFlaggedForCpu;
+  const uint at = atomicAdd(counters[kDoubleNext ? kUnsure : kForCpu], 1u);
+  if (at < flagged_capacity) flagged[list * flagged_capacity + at] = pair;
 }

@@ -5,72 +5,78 @@
 #include "real.glsl"
 #include "points.glsl"
 
-const int kRings = 5;
-const uint kExamined = 2048;
+const uint kOpened = 4096;  // boxes that are looked at
 
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
-layout(std430, binding = 1) readonly buffer Ends { uint bucket_end[]; };
-layout(std430, binding = 2) readonly buffer Slots { uint bucket_slots[]; };
-layout(std430, binding = 3) readonly buffer Points { real point_words[]; };
-layout(std430, binding = 4) buffer Owners { uint owners[]; };  // in: guesses; out: slots; kNone: unknown
-layout(std430, binding = 5) buffer Counters { uint counters[]; };
-layout(std430, binding = 6) writeonly buffer Uncertain { uint uncertain[]; };
+layout(std430, binding = 1) readonly buffer Boxes { float boxes[]; };
+layout(std430, binding = 2) readonly buffer Points { real point_words[]; };
+layout(std430, binding = 3) buffer Owners { uint owners[]; };  // in: guesses; out: slots; kNone: unknown
+layout(std430, binding = 4) buffer Counters { uint counters[]; };
+layout(std430, binding = 5) writeonly buffer Uncertain { uint uncertain[]; };
 #define PUSH_OWNERS
 #include "layout/push.h"
 #include "layout/counters.h"
-#include "grid.glsl"
+#include "seed_tree.glsl"
 LOAD_POINT(seed, seed_words)
 LOAD_POINT(point, point_words)
+
+Point own;
+uint best = kNone;
+real nearest = kInfinity, second = kInfinity;  // squared distances
+float limit = 3e38;  // squared; boxes farther away hold nothing that matters
+
+real error_at(real squared) {
+  precise real error = real(32.0) * kUnit * squared + real(16.0) * real(residual) * sqrt(squared);
+  return error;
+}
+
+void see(uint other) {
+  const real squared = norm2(difference(own, seed(other)));
+  if (squared < nearest) {
+    second = nearest;
+    nearest = squared;
+    best = other;
+    precise real far = nearest + real(4.0) * error_at(nearest);
+    precise float rounded = float(far) * 1.00001 + 1e-30;
+    limit = rounded;
+  } else {
+    second = min(second, squared);
+  }
+}
 
 void main() {
   const uint i = invocation();
   if (i >= point_count) return;
-  const Point q = point(i);
-  const ivec3 home = cell_at(q);
+  own = point(i);
+  const vec3 at = vec3(own.high);
+  // The leaf of the guess, or the one where the nearest is likely to be, is seen first.
   const uint guess = owners[i];
-  uint best = kNone;
-  real nearest = kInfinity, second = kInfinity;
-  if (guess < seed_count) {
-    best = guess;
-    nearest = norm2(difference(q, seed(guess)));
-  }
-  bool closed = false;
-  uint seen = 0, examined = 0;
-  [[dont_unroll]] for (int ring = 0; ring <= kRings && !closed; ++ring) {
-    [[dont_unroll]] for (int z = -ring; z <= ring; ++z)
-      [[dont_unroll]] for (int y = -ring; y <= ring; ++y) {
-        const bool face = abs(z) == ring || abs(y) == ring;
-        [[dont_unroll]] for (int step = -ring; step <= ring; step += face || ring == 0 ? 1 : 2 * ring) {
-          const ivec3 cell = home + ivec3(step, y, z);
-          const uint bucket = bucket_of(cell);
-          const uint end = bucket_end[bucket];
-          [[dont_unroll]] for (uint k = bucket == 0 ? 0 : bucket_end[bucket - 1]; k < end && examined <= kExamined;
-                               ++k) {
-            ++examined;
-            const uint other = bucket_slots[k];
-            const Point p = seed(other);
-            if (cell_at(p) != cell) continue;
-            ++seen;
-            if (other == guess) continue;
-            const real squared = norm2(difference(q, p));
-            if (squared < nearest) {
-              second = nearest;
-              nearest = squared;
-              best = other;
-            } else {
-              second = min(second, squared);
-            }
-          }
-        }
+  const uint home = guess < seed_count ? guess / kTreeArity : likely_leaf(at);
+  const uint end_of_home = min((home + 1) * kTreeArity, seed_count);
+  [[dont_unroll]] for (uint other = home * kTreeArity; other < end_of_home; ++other) see(other);
+  uint level = top_level, node = 0, opened = 0;
+  bool more = true, left_out = false;
+  [[dont_unroll]] while (more && opened < kOpened) {
+    ++opened;
+    if (box_distance(level, node, at) > limit) {
+      left_out = true;
+    } else {
+      if (level > 0) {
+        --level;
+        node *= kTreeArity;
+        continue;
       }
-    if (examined > kExamined) break;
-    const real reach = ring_distance(q, ring, residual);
-    precise real reach_squared = reach * (reach * real(0.999) - real(16.0) * real(residual));
-    closed = seen == seed_count || reach_squared > nearest;
+      if (node != home) {
+        const uint end = min((node + 1) * kTreeArity, seed_count);
+        [[dont_unroll]] for (uint other = node * kTreeArity; other < end; ++other) see(other);
+      }
+    }
+    more = next_node(level, node);
   }
-  precise real error = real(32.0) * kUnit * second + real(16.0) * real(residual) * sqrt(second);
+  if (left_out) second = min(second, real(limit));
+  precise real apart = nearest + error_at(second);
   const bool certain =
-      loops_complete(two) && closed && best != kNone && (second == kInfinity || nearest + error < second);
+      loops_complete(two) && !more && best != kNone && (second == kInfinity || apart < second);
   owners[i] = certain ? best : kNone;
   if (!certain && report_uncertain != 0) uncertain[atomicAdd(counters[kUncertainOwners], 1u)] = i;
 }

@@ -13,9 +13,9 @@ layout(std430, binding = 4) buffer Counters { uint counters[]; };
 #include "layout/counters.h"
 
 void main() {
-  const uint index = invocation();
-  if (index >= flagged_count) return;
-  const uint slot = pairs[flagged[index]].y;
+  const uint item = counters[kShortLists + kBeginAfter] + invocation();
+  if (item >= counters[kShortLists + kEndAfter]) return;
+  const uint slot = pairs[flagged[first_flagged + item]].y;
   if (atomicExchange(wide[slot], 1u) != 0) return;
   const uint at = atomicAdd(counters[kWideTargets], 1u);
   if (at < target_capacity) targets[at] = slot;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/parallel.h"
 #include "host/device/buffer_impl.h"
 #include "host/device/descriptors.h"
 #include "host/device/device_impl.h"
@@ -47,6 +48,11 @@ struct Commands::Impl {
     void* to;
     std::size_t bytes;
   };
+  struct ItemReadback {
+    const std::byte* from;
+    std::size_t item_bytes, first, count;
+    ReadItems read;
+  };
 
   Device::Impl& device;
   vk::raii::CommandPool pool;
@@ -57,6 +63,8 @@ struct Commands::Impl {
   Timestamps timestamps;
   Hazards hazards;
   std::vector<Readback> readbacks;
+  std::vector<ItemReadback> item_readbacks;
+  CommandCounts counts;
   Phase phase = &DeviceSeconds::transfer;
   bool recording = false;
 
@@ -78,24 +86,25 @@ struct Commands::Impl {
   }
 
   // Staging memory; what was recorded is run first if there is none left.
-  Staging::Span stage(std::size_t bytes) {
-    Staging::Span span = staging.take(bytes);
+  Staging::Span stage(std::size_t bytes, std::size_t unit = 1) {
+    Staging::Span span = staging.take(bytes, unit);
     if (!span.bytes) {
       submit();
-      span = staging.take(bytes);
+      span = staging.take(bytes, unit);
     }
     return span;
   }
 
   void submit() {
     if (!recording) return;
-    if (!readbacks.empty()) {
+    if (!readbacks.empty() || !item_readbacks.empty()) {
       commands.pipelineBarrier(Stage::eTransfer, Stage::eHost, {},
                                vk::MemoryBarrier(AccessBit::eTransferWrite, AccessBit::eHostRead), {}, {});
     }
     timestamps.finish(commands);
     device.attempt("vkEndCommandBuffer", [&] { commands.end(); });
     recording = false;
+    ++counts.submits;
     try {
       device.attempt("vkQueueSubmit", [&] { device.queue.submit(vk::SubmitInfo({}, {}, *commands), *fence); });
       const vk::Result result =
@@ -110,6 +119,12 @@ struct Commands::Impl {
     timestamps.collect();
     for (const Readback& readback : readbacks) std::memcpy(readback.to, readback.from, readback.bytes);
     readbacks.clear();
+    for (const ItemReadback& readback : item_readbacks) {
+      parallel_chunks(readback.count, kItemChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+        readback.read(readback.from + begin * readback.item_bytes, readback.first + begin, end - begin);
+      });
+    }
+    item_readbacks.clear();
     hazards.reset();
     descriptors.reset();
     staging.reset();
@@ -162,9 +177,27 @@ void Commands::upload(const Buffer& buffer, std::size_t offset, const void* data
     impl_->prepare();
     impl_->commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer,
                                vk::BufferCopy(span.offset, offset, span.bytes));
+    impl_->counts.bytes_up += span.bytes;
     from += span.bytes;
     offset += span.bytes;
     bytes -= span.bytes;
+  }
+}
+
+void Commands::upload_items(const Buffer& buffer, std::size_t item_bytes, std::size_t count, const WriteItems& write) {
+  check_range(buffer, 0, item_bytes * count);
+  for (std::size_t first = 0; first < count;) {
+    const Staging::Span span = impl_->stage((count - first) * item_bytes, item_bytes);
+    const std::size_t items = span.bytes / item_bytes;
+    parallel_chunks(items, kItemChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+      write(span.mapped + begin * item_bytes, first + begin, end - begin);
+    });
+    impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+    impl_->prepare();
+    impl_->commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer,
+                               vk::BufferCopy(span.offset, first * item_bytes, span.bytes));
+    impl_->counts.bytes_up += span.bytes;
+    first += items;
   }
 }
 
@@ -178,9 +211,27 @@ void Commands::download(const Buffer& buffer, std::size_t offset, void* to, std:
     impl_->commands.copyBuffer(*buffer.impl().allocation.buffer, span.buffer,
                                vk::BufferCopy(offset, span.offset, span.bytes));
     impl_->readbacks.push_back({span.mapped, target, span.bytes});
+    impl_->counts.bytes_down += span.bytes;
     target += span.bytes;
     offset += span.bytes;
     bytes -= span.bytes;
+  }
+}
+
+void Commands::download_items(const Buffer& buffer, std::size_t item_bytes, std::size_t count, ReadItems read) {
+  check_range(buffer, 0, item_bytes * count);
+  for (std::size_t first = 0; first < count;) {
+    // Whole chunks, but for the last.
+    const std::size_t bytes = (count - first) * item_bytes, chunk = std::min(bytes, kItemChunk * item_bytes);
+    Staging::Span span = impl_->stage(bytes, chunk);
+    const std::size_t items = span.bytes / item_bytes;
+    impl_->use(buffer, Stage::eTransfer, AccessBit::eTransferRead, {});
+    impl_->prepare();
+    impl_->commands.copyBuffer(*buffer.impl().allocation.buffer, span.buffer,
+                               vk::BufferCopy(first * item_bytes, span.offset, span.bytes));
+    impl_->item_readbacks.push_back({span.mapped, item_bytes, first, items, read});
+    impl_->counts.bytes_down += span.bytes;
+    first += items;
   }
 }
 
@@ -215,6 +266,7 @@ void Commands::dispatch(const Kernel& kernel, std::initializer_list<Binding> bin
   if (y > most) throw std::logic_error("kernel " + kernel.name + " has too many items");
   impl_->bind(kernel, bindings, push, push_bytes);
   impl_->commands.dispatch(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), 1);
+  ++impl_->counts.dispatches;
 }
 
 void Commands::dispatch_indirect(const Kernel& kernel, std::initializer_list<Binding> bindings, const void* push,
@@ -223,10 +275,13 @@ void Commands::dispatch_indirect(const Kernel& kernel, std::initializer_list<Bin
   impl_->use(arguments, Stage::eDrawIndirect, AccessBit::eIndirectCommandRead, {});
   impl_->bind(kernel, bindings, push, push_bytes);
   impl_->commands.dispatchIndirect(*arguments.impl().allocation.buffer, offset);
+  ++impl_->counts.dispatches;
 }
 
 void Commands::run() { impl_->submit(); }
 
 DeviceSeconds Commands::take_seconds() { return impl_->timestamps.take(); }
+
+CommandCounts Commands::take_counts() { return std::exchange(impl_->counts, {}); }
 
 }  // namespace bisector::host

@@ -11,11 +11,12 @@ constexpr std::size_t kSmallestChunk = std::size_t{1} << 20;
 constexpr std::size_t kLargestChunk = std::size_t{64} << 20;
 constexpr std::size_t kBudget = std::size_t{256} << 20;
 constexpr std::size_t kAlignment = 16;
+static_assert(Staging::kLargestUnit <= kSmallestChunk);
 
 }  // namespace
 
-Staging::Span Staging::take(std::size_t bytes) {
-  if (current_ < chunks_.size() && used_ >= chunks_[current_].bytes) {
+Staging::Span Staging::take(std::size_t bytes, std::size_t unit) {
+  if (current_ < chunks_.size() && used_ + unit > chunks_[current_].bytes) {
     ++current_;
     used_ = 0;
   }
@@ -29,7 +30,8 @@ Staging::Span Staging::take(std::size_t bytes) {
     total_ += chunks_.back().bytes;
   }
   const Allocation& chunk = chunks_[current_];
-  const Span span{*chunk.buffer, used_, std::min(bytes, chunk.bytes - used_), chunk.mapped + used_};
+  const std::size_t room = (chunk.bytes - used_) / unit * unit;
+  const Span span{*chunk.buffer, used_, std::min(bytes, room), chunk.mapped + used_};
   used_ += (span.bytes + kAlignment - 1) / kAlignment * kAlignment;
   return span;
 }

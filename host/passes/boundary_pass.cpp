@@ -89,4 +89,8 @@ void BoundaryPass::put_moments(std::vector<Moments>& cells) const {
   for (const Index slot : slots_) cells[seeds_->id[slot]] = moments_[seeds_->id[slot]];
 }
 
+double BoundaryPass::mass() const {
+  return fixed_sum(slots_.size(), [&](std::size_t k) { return moments_[seeds_->id[slots_[k]]].mass; });
+}
+
 }  // namespace bisector::host

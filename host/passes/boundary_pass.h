@@ -32,6 +32,8 @@ class BoundaryPass {
   std::size_t count() const { return slots_.size(); }
   // Sets the moments of the boundary cells.
   void put_moments(std::vector<Moments>& cells) const;
+  // The sum of their masses.
+  double mass() const;
   const BoundaryCells& cells() const { return cells_; }
 
  private:

@@ -1,6 +1,7 @@
 // Sums over cells: incident pairs sorted by cell and element, then summed by the one rule.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "host/passes/pair_pass.h"
@@ -16,23 +17,38 @@ class CellPass {
   // Once per domain: of each element its place in the order in which a cell's terms are summed, and how many places
   // there are.
   void set_elements(Commands& commands, const std::vector<Index>& places, std::size_t count);
-  // Brings the pairs into the order in which they are summed.
-  void sort(Commands& commands, std::size_t cells, Scan& scan, const PairStore& store);
-  // Fills in cells, mass and energy, of step_mass what the lists tell (negative where they do not), and as triangles
-  // the places of each cell's elements.
-  void sum(SeedStage& stage, const PairStore& store, CellMoments& result);
-  // Mass, first and second moment of each cell, and the median mass nearby.
+  // Records the sorting of the pairs and the sums.
+  void record(SeedStage& stage, const PairStore& store);
+  // Records the sums once more, after the moments of some pairs have changed.
+  void sum(SeedStage& stage, const PairStore& store);
+  // Runs that. Fills in cells, mass and energy, of step_mass what the lists tell (negative where they do not), and the
+  // places of each cell's elements as triangles if these are wanted. False if some cell has more pairs than was
+  // expected; then all has to be recorded again.
+  bool read(SeedStage& stage, bool with_triangles, CellMoments& result);
+
+  // Of each cell, by the caller's index: mass, first and second moment, and the mass that scales steps.
   const Buffer& cells() const { return cells_; }
+  // Pairs that are not empty, once they have been read.
+  std::size_t items() const { return item_count_; }
 
  private:
-  void read_cells(const DeviceSeeds& seeds, const std::vector<std::byte>& words, CellMoments& result) const;
+  void sort_by_radix(SeedStage& stage, const PairStore& store);
+  void sort_by_rank(SeedStage& stage, const PairStore& store);
+  std::pair<const Buffer*, const Buffer*> sum_by_blocks(SeedStage& stage, const PairStore& store);
+  void list_triangles(const DeviceSeeds& seeds, const std::vector<std::uint32_t>& begins,
+                      const std::vector<std::uint32_t>& sorted_places, Csr<Index>& triangles) const;
 
   Device& device_;
   bool double_, solid_;
   std::size_t places_ = 0;
-  Buffer place_of_, by_place_, begins_, items_[2], digit_counts_, block_begins_[2], sums_[2], sorted_places_, cells_;
-  unsigned sorted_ = 0;                         // which of items_
-  std::vector<std::uint32_t> begins_of_cells_;  // of each cell's items, and the end of the last
+  Buffer place_of_, by_place_, begins_, cursors_, items_[2], digit_counts_, block_begins_[2], sums_[2], sorted_places_,
+      cells_;
+  bool by_rank_ = true;            // how the pairs were sorted
+  std::size_t radix_up_to_ = 0;    // cells; of so few some had too many pairs for ranks
+  unsigned sorted_ = 0;            // which of items_
+  std::size_t most_items_ = 0;     // pairs that were sorted, empty ones among them
+  std::size_t item_count_ = 0;
+  std::vector<std::uint32_t> begins_of_cells_;  // of each cell's items, and the end of the last; by radix only
 };
 
 }  // namespace bisector::host

@@ -1,12 +1,15 @@
 // What the backends of surfaces and of solids on a device share.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "backend/backend.h"
+#include "core/stopwatch.h"
+#include "host/passes/cell_pass.h"
 #include "host/passes/seed_stage.h"
 
 namespace bisector::host {
@@ -16,15 +19,22 @@ namespace bisector::host {
 double mass_tolerance_of(bool is_double);
 double energy_noise_of(bool is_double);
 
-// In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs, and more of them
-// for as long as the masses do not add up to `mass`. `refine` does so with a share of the errors that are allowed and
-// returns how many pairs there were; `sum` adds the masses up anew.
-void refine_masses(double mass, const CellMoments& moments, const std::function<std::size_t(float share)>& refine,
-                   const std::function<void()>& sum);
+double total(const DeviceSeconds& seconds);
+
+// What the masses of cells that a device computes sum to, and the domain's, which tolerances are relative to.
+struct ExpectedMass {
+  double of_cells, of_domain;
+};
+
+// Sums over the cells of all pairs. In single precision pairs of cells whose masses are not certain enough are taken to
+// the next rungs, and more of them for as long as the masses do not sum to what is expected: `refine` does so with a
+// share of the errors that are allowed and returns how many pairs there were.
+void find_cells(SeedStage& stage, CellPass& cells, const PairStore& store, const ExpectedMass& mass,
+                bool with_triangles, CellMoments& moments, const std::function<std::size_t(float share)>& refine);
 
 // How a diagram came about: its certification, and the seconds on the host of the search for owners, the pairs of a
 // solid's boundary, and clipping.
-struct DeviceWork {
+struct DiagramWorkOnDevice {
   Certification certification;
   double searched = 0, paired = 0, clipped = 0;
 };
@@ -51,18 +61,23 @@ class DeviceBackend : public Base {
       report.certification.cpu = report.certification.pairs;
       return report;
     }
+    const Stopwatch watch;
     stage_.begin(seeds);
-    const DeviceWork work = compute_on_device(seeds, want, diagram);
+    const DiagramWorkOnDevice work = compute_on_device(seeds, want, diagram);
     DiagramSeconds seconds;
     (stage_.delaunay() ? seconds.delaunay : seconds.neighbours) = stage_.lists_seconds();
     seconds.neighbours += work.searched;
     seconds.pairs = work.paired;
     seconds.clip = work.clipped;
     seconds.device = stage_.commands.take_seconds();
-    return {work.certification, seconds};
+    const CommandCounts counts = stage_.commands.take_counts();
+    const double host = watch.seconds() - total(seconds.device);
+    return {work.certification,
+            seconds,
+            {counts.submits, counts.dispatches, counts.bytes_up, counts.bytes_down, std::max(host, 0.0)}};
   }
   // The seed stage has begun with the seeds.
-  virtual DeviceWork compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
+  virtual DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
 
   SeedStage stage_;
 

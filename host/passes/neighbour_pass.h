@@ -1,58 +1,57 @@
 // Lists of neighbours on the device, from either source.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
-#include "host/passes/seed_grid.h"
+#include "host/passes/seed_tree.h"
 #include "host/passes/seeds.h"
+#include "kernels/layout/counters.h"
 
 namespace bisector::host {
 
-// How long lists are, and the edges of the grids' cells that they are found with, in typical spacings.
+// How long lists are, and how many boxes of the tree are looked at for one.
 struct ListSizes {
-  std::uint32_t most, examined;  // entries of a first list, and seeds that are looked at for it
-  double cell;
-  std::uint32_t wide_most, wide_examined;
-  double wide_cell;
-  double wide_share;  // of the seeds, whose wide lists there is memory for
+  std::uint32_t most, opened;  // of a first list
+  std::uint32_t wide_most, wide_opened;
 };
 // A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and
 // takes about 80, or 20 once it is optimised.
-inline constexpr ListSizes kSurfaceLists{32, 512, 1.8, 224, 1024, 4.5, 0.25},
-    kSolidLists{96, 1024, 2.9, 256, 1536, 3.3, 1};
+inline constexpr ListSizes kSurfaceLists{32, 2048, 224, 4096}, kSolidLists{96, 4096, 256, 8192};
 
 class NeighbourPass {
  public:
   NeighbourPass(Device& device, bool is_double, const ListSizes& sizes);
 
-  // Plans grids for seeds that lie about `spacing` apart and reserves memory; not while commands are recorded. Records
-  // the first grid.
-  void begin(Commands& commands, const DeviceSeeds& seeds, double spacing, Scan& scan);
+  // Reserves memory for lists and the tree; not while commands are recorded. Records the tree.
+  void begin(Commands& commands, const DeviceSeeds& seeds);
   // Records the search for the first lists.
   void list_nearest(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters);
   // Records the upload of lists that the host has.
   void upload_lists(Commands& commands, const DeviceSeeds& seeds, const Neighbours& neighbours);
-  // Records wider lists for the cells of flagged pairs that have none yet. `targets`: how many have.
-  void widen(Commands& commands, const DeviceSeeds& seeds, Scan& scan, const Buffer& flagged, std::size_t flagged_count,
-             const Buffer& pairs, std::size_t targets, const Buffer& counters);
+  // Records the choice of cells that need a wider list, those of the pairs at work with too short a
+  // list, which lie in `flagged` from `first_flagged` on, that have none yet.
+  void choose_targets(Commands& commands, const Buffer& flagged, std::size_t first_flagged, const Buffer& pairs,
+                      const Buffer& counters);
+  // Records the search for the wider lists of the cells that are at work.
+  void widen(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters);
+  // How many cells wanted wider lists in the evaluation: there is room for as many in the next.
+  void wanted(std::size_t targets) { most_wanted_ = std::max(most_wanted_, targets); }
 
-  const SeedGrid& grid() const { return grid_; }
+  std::size_t target_capacity() const { return target_capacity_; }
+  const SeedTree& tree() const { return tree_; }
   const Buffer& info() const { return info_; }
   const Buffer& lists() const { return lists_; }
   const Buffer& wide_lists() const { return wide_lists_; }
 
  private:
-  void search(Commands& commands, const DeviceSeeds& seeds, const SeedGrid& grid, const Buffer& counters, bool targets,
-              std::size_t first_target, std::size_t items);
-
   Device& device_;
   bool double_;
   ListSizes sizes_;
-  SeedGrid grid_, wide_grid_;
+  SeedTree tree_;
   Buffer info_, lists_, wide_lists_, targets_, is_target_;
   std::uint32_t most_ = 0;  // entries of a first list
-  std::size_t target_capacity_ = 0;
-  bool wide_grid_built_ = false;
+  std::size_t target_capacity_ = 0, most_wanted_ = 0;
 };
 
 }  // namespace bisector::host

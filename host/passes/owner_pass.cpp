@@ -22,19 +22,19 @@ void OwnerPass::set_points(Commands& commands, std::vector<Vec3> points, double 
   from_scratch_ = true;
 }
 
-void OwnerPass::record(Commands& commands, const DeviceSeeds& seeds, const SeedGrid& grid, const Buffer& counters,
+void OwnerPass::record(Commands& commands, const DeviceSeeds& seeds, const SeedTree& tree, const Buffer& counters,
                        bool report) {
   const std::size_t count = points_.size();
   if (count == 0) return;
   commands.phase(&DeviceSeconds::owners);
   if (from_scratch_) commands.fill(owners_, 0, count * sizeof(Index), kNone);
   from_scratch_ = false;
-  const GridPush& at = grid.push();
-  const OwnersPush push{at.grid_lower, at.grid_inverse,          at.bucket_mask, at.seed_count, seeds.residual,
-                        kTwo,          static_cast<uint>(count), report};
+  OwnersPush push = tree.push<OwnersPush>(seeds);
+  push.point_count = static_cast<uint>(count);
+  push.report_uncertain = report;
   commands.dispatch(kernel("owners", double_),
-                    {reads(seeds.words), reads(grid.ends()), reads(grid.slots()), reads(positions_), updates(owners_),
-                     updates(counters), writes(uncertain_)},
+                    {reads(seeds.words), reads(tree.boxes()), reads(positions_), updates(owners_), updates(counters),
+                     writes(uncertain_)},
                     push, count);
 }
 

@@ -18,7 +18,7 @@ class OwnerPass {
   // Forgets the last owners, whose slots no longer mean the same seeds.
   void forget() { from_scratch_ = true; }
   // Records the search. With `report`, points without a certain owner are listed; else they are left with none.
-  void record(Commands& commands, const DeviceSeeds& seeds, const SeedGrid& grid, const Buffer& counters, bool report);
+  void record(Commands& commands, const DeviceSeeds& seeds, const SeedTree& tree, const Buffer& counters, bool report);
   // Once that has run: finds the owners of the `uncertain` points that were listed in exact arithmetic, and records
   // their upload.
   void complete(Commands& commands, std::size_t uncertain, ExactRung& exact);

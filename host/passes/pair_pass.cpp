@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "host/passes/packing.h"
 #include "kernels/layout/pairs.h"
@@ -12,29 +13,49 @@ namespace bisector::host {
 namespace {
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
-constexpr int kRoundsPerRun = 6;  // of proposals and clipping, before the host looks again
-constexpr uint kAsCounted = kNone;
+// Rounds of proposals and clipping before the host looks again: at first, at most, once the lists of what climbs a rung
+// have been worked off, and once the CPU has answered.
+constexpr int kFirstRounds = 5, kMostRounds = 12, kRoundsAfterClimb = 2;
 // Pairs that there is memory for, in those that are expected: when it is asked for, and below which it is asked for
 // anew.
 constexpr double kCapacityMargin = 1.3, kLeastMargin = 1.1;
 constexpr std::size_t kSpareCapacity = 4096;
+// Of a batch, per pair that is expected: proposals, entries of the table, and a share that climbs some rung.
+constexpr double kProposalsPerPair = 6, kTablePerPair = 1.7, kFlaggedPerPair = 0.1;
+constexpr double kBytesPerPair = 80;     // of a batch and of the pairs themselves
+constexpr double kShareOfMemory = 0.25;  // of the device's, for a batch
+// Pairs of one dispatch: until the device's speed is known, and for how many seconds once it is.
+constexpr std::size_t kFirstAtOnce = std::size_t{1} << 17;
+constexpr double kSecondsAtOnce = 0.1;
+constexpr std::size_t kGatheredAtOnce = std::size_t{1} << 16;  // pairs that the CPU is asked about
 
 uint word(std::size_t n) { return static_cast<uint>(n); }
 
 // Of the bounds of cells' errors and the marks behind them.
 std::size_t error_bytes(const PairJob& job) { return (kCellErrorWords + kMarkWords) * job.seeds.count() * kWord; }
 
-// How many proposals there are, and the range of them that is worked on.
-void clear_proposals(const PairJob& job) {
-  job.commands.fill(job.counters, kProposals * kWord, (kProposalsEnd + 1 - kProposals) * kWord, 0);
+void clear_work(const PairJob& job, uint first_counter, uint kinds) {
+  job.commands.fill(job.counters, first_counter * kWord, kinds * kWorkWords * kWord, 0);
 }
+
+// Whether some of that kind were left for a later dispatch.
+bool are_left(const Counters& counters, uint counter) { return counters[counter] > counters[counter + kEndAfter]; }
 
 }  // namespace
 
+double batch_pairs_of(const Device& device, double asked) {
+  if (asked > 0) return asked;
+  const double by_range = static_cast<double>(device.limits().storage_range) / (kProposalsPerPair * sizeof(PairName));
+  const double by_memory = kShareOfMemory * static_cast<double>(device.description().memory) / kBytesPerPair;
+  return std::max(65536.0, 0.9 * std::min(by_range, by_memory));
+}
+
 PairPass::PairPass(Device& device, bool is_double, const Capacities& capacities)
-    : device_(device), double_(is_double), buffers_(device, capacities), gathered_(device), answers_(device),
-      values_(device), first_capacity_(capacities.pairs),
-      most_at_once_(static_cast<std::size_t>(2 * capacities.batch_pairs) + 64) {}
+    : device_(device), double_(is_double), asked_(capacities), buffers_(device, capacities), gathered_(device),
+      answers_(device), values_(device), expect_for_cpu_(32), rounds_(kFirstRounds),
+      at_once_(capacities.at_once                         ? capacities.at_once
+               : device.description().kind == "software" ? std::size_t{kNone - 1}
+                                                          : kFirstAtOnce) {}
 
 // As many as one binding spans the first moments of.
 std::size_t PairPass::most_pairs() const {
@@ -45,8 +66,8 @@ void PairPass::reserve(const PairJob& job) {
   const std::size_t real = real_size(), most = most_pairs();
   const double expected = job.domain.expected_pairs();
   PairStore& store = job.store;
-  if (first_capacity_) {
-    if (store.capacity == 0) store.capacity = first_capacity_;
+  if (asked_.pairs) {
+    if (store.capacity == 0) store.capacity = asked_.pairs;
   } else if (store.capacity < static_cast<std::size_t>(kLeastMargin * expected) + 1) {
     store.capacity = static_cast<std::size_t>(kCapacityMargin * expected) + kSpareCapacity;
   }
@@ -61,11 +82,22 @@ void PairPass::reserve(const PairJob& job) {
   store.status.reserve(store.capacity * kWord);
   store.mass_second.reserve(store.capacity * kMassSecondWords * real);
   store.first.reserve(store.capacity * kFirstWords * real);
+
+  const double in_batch =
+      std::min(expected, 1.1 * batch_pairs_of(device_, asked_.batch_pairs)) + static_cast<double>(kSpareCapacity);
+  const auto room = [&](std::size_t& capacity, std::size_t asked, double per_pair) {
+    if (asked == 0) capacity = std::max(capacity, static_cast<std::size_t>(per_pair * in_batch));
+  };
+  room(buffers_.proposal_capacity, asked_.proposals, kProposalsPerPair);
+  room(buffers_.table_size, asked_.table, kTablePerPair);
+  buffers_.table_size = std::bit_ceil(buffers_.table_size);
+  room(buffers_.flagged_capacity, asked_.flagged, kFlaggedPerPair);
   buffers_.proposals.reserve(buffers_.proposal_capacity * sizeof(PairName));
   buffers_.table.reserve(buffers_.table_size * kWord);
-  buffers_.flagged.reserve(kFlaggedLists * buffers_.table_size * kWord);
+  buffers_.flagged.reserve(kFlaggedLists * buffers_.flagged_capacity * kWord);
   buffers_.no_labels.reserve(kWord);
   buffers_.cell_errors.reserve(error_bytes(job));
+  gathered_.reserve(std::min(buffers_.flagged_capacity, kGatheredAtOnce) * sizeof(GatheredPair));
 }
 
 void PairPass::run(const PairJob& job, Certification& certification) {
@@ -74,8 +106,8 @@ void PairPass::run(const PairJob& job, Certification& certification) {
     certification = {};
     job.store.ranges.clear();
     job.store.count = 0;
-    // Not those of the lists and owners, which the evaluation has found before.
-    job.commands.fill(job.counters, kProposals * kWord, (kForCpu + 1 - kProposals) * kWord, 0);
+    // Not the targets of wider lists, which the evaluation has found before.
+    clear_work(job, kProposals, kWorkTargets);
     job.commands.fill(job.counters, kUnsurePairs * kWord, (kUnsureInDouble + 1 - kUnsurePairs) * kWord, 0);
     unsure_in_double_ = 0;
     job.commands.fill(buffers_.cell_errors, 0, error_bytes(job), 0);
@@ -89,118 +121,147 @@ void PairPass::run(const PairJob& job, Certification& certification) {
   }
 }
 
+void PairPass::clipped(std::size_t pairs, double seconds) {
+  if (asked_.at_once || device_.description().kind == "software" || !(seconds > 0)) return;
+  const double at_once = static_cast<double>(pairs) * kSecondsAtOnce / seconds;
+  at_once_ = static_cast<std::size_t>(std::clamp(at_once, 65536.0, 1e9));
+}
+
+// Makes room for what was too small; all has to be done again.
+void PairPass::grow(const PairJob& job, uint overflow) {
+  job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
+  if (overflow & kOverflowProposals) buffers_.proposal_capacity *= 2;
+  if (overflow & kOverflowTable) buffers_.table_size *= 2;
+  if (overflow & kOverflowFlagged) buffers_.flagged_capacity *= 2;
+  if (!(overflow & kOverflowPairs)) return;
+  const std::size_t most = most_pairs();
+  if (job.store.capacity >= most)
+    throw DeviceError(
+        fmt::format("{}: more than {} pairs of cells and {}, which its buffers do not hold; use fewer vertices",
+                    device_.description().name, most, job.domain.elements()));
+  job.store.capacity = std::min(job.store.capacity * 2, most);
+}
+
 // False if some buffer was too small: then it is larger now, and all has to be done again.
 bool PairPass::run_batch(const PairJob& job, std::size_t batch, Certification& certification) {
   const std::size_t chunk = job.domain.chunk_of(batch);
   start(job, batch);
-  for (;;) {
-    spread(job, chunk);
-    const Counters counters = read_counters(job);
-    if (const std::uint32_t overflow = counters[kOverflow]) {
-      if (overflow & kOverflowProposals) buffers_.proposal_capacity *= 2;
-      if (overflow & kOverflowTable) buffers_.table_size *= 2;
-      if (overflow & kOverflowPairs) {
-        const std::size_t most = most_pairs();
-        if (job.store.capacity >= most)
-          throw DeviceError(
-              fmt::format("{}: more than {} pairs of cells and {}, which its buffers do not hold; use fewer vertices",
-                          device_.description().name, most, job.domain.elements()));
-        job.store.capacity = std::min(job.store.capacity * 2, most);
-      }
+  for (int rounds = std::min(rounds_ + 1, kMostRounds);;) {
+    spread(job, chunk, rounds);
+    climb(job, chunk);
+    spread(job, chunk, kRoundsAfterClimb);
+    const Counters counters = gather_and_count(job);
+    if (counters[kOverflow]) {
+      grow(job, counters[kOverflow]);
       return false;
     }
     job.store.count = counters[kPairs];
-    if (counters[kProposals] != counters[kProposalsEnd] || counters[kPairs] != counters[kPairsEnd]) continue;
-    if (const std::size_t count = counters[kShortLists]) {
-      certification.wider += count;
-      job.neighbours.widen(job.commands, job.seeds, job.scan, buffers_.flagged, count, job.store.pairs,
-                           counters[kWideTargets], job.counters);
-      clip_flagged(job, chunk, kRungWide, kFlaggedShort, count);
-      set_counter(job, kShortLists, 0);
-    } else if (!climb(job, chunk, counters, certification)) {
+    if (!for_cpu_.empty()) answer(job, counters);
+    else if (!are_left(counters, kProposals) && !are_left(counters, kPairs) && !are_left(counters, kShortLists) &&
+             !are_left(counters, kUnsure)) {
+      certification.wider += counters[kShortLists];
       certification.uncertain = counters[kUnsurePairs];
+      count_lists(counters, certification);
+      job.neighbours.wanted(counters[kWideTargets]);
+      rounds_ = static_cast<int>(counters[kRounds]);
       return true;
     }
+    rounds = are_left(counters, kProposals) || are_left(counters, kPairs) ? kMostRounds : kRoundsAfterClimb;
   }
 }
 
-// Takes uncertain pairs to the next rung. False if there are none.
-bool PairPass::climb(const PairJob& job, std::size_t chunk, const Counters& counters, Certification& certification) {
-  if (const std::size_t count = counters[kUncertain]) {
-    certification.doubled += count;
-    clip_flagged(job, chunk, kRungDouble, kFlaggedUncertain, count);
-    set_counter(job, kUncertain, 0);
-    return true;
-  }
-  if (const std::size_t count = counters[kForCpu]) {
-    certification.cpu += count;
-    certification.doubled -= counters[kUnsureInDouble] - unsure_in_double_;
-    unsure_in_double_ = counters[kUnsureInDouble];
-    clip_exactly(job, counters);
-    return true;
-  }
-  return false;
+// What climbed to the rungs of double precision and of the CPU since the lists were cleared.
+void PairPass::count_lists(const Counters& counters, Certification& certification) {
+  certification.doubled += counters[kUnsure];
+  certification.cpu += counters[kForCpu];
+  certification.doubled -= counters[kUnsureInDouble] - unsure_in_double_;
+  unsure_in_double_ = counters[kUnsureInDouble];
 }
 
 std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, float share, Certification& certification) {
   std::size_t refined = 0;
   for (const PairStore::Range& range : job.store.ranges)
     // No more at once than the lists of flagged pairs hold.
-    for (std::size_t first = range.begin; first < range.end; first += buffers_.table_size) {
-      const DoubtfulPush push{word(first), word(std::min(buffers_.table_size, range.end - first)),
-                              word(buffers_.table_size), static_cast<float>(job.domain.mean_density()), share};
+    for (std::size_t first = range.begin; first < range.end; first += buffers_.flagged_capacity) {
+      const DoubtfulPush push{word(first), word(std::min(buffers_.flagged_capacity, range.end - first)),
+                              word(buffers_.flagged_capacity), static_cast<float>(job.domain.mean_density()), share};
       job.commands.phase(&DeviceSeconds::clip);
-      clear_proposals(job);
+      clear_lists(job);
       job.commands.dispatch({"doubtful", {job.domain.double_next(), job.domain.is_solid()}},
                             {reads(job.store.pairs), reads(job.store.status), reads(buffers_.cell_errors), reads(cells),
-                             updates(job.counters), updates(buffers_.flagged)},
+                             updates(job.counters), updates(buffers_.flagged), reads(job.seeds.ids)},
                             push, push.pair_count);
-      Counters counters = read_counters(job);
-      const std::size_t found = counters[kUncertain] + counters[kForCpu];
-      refined += found;
-      certification.uncertain += found;
-      // What these pairs propose has been met before.
-      while (climb(job, range.chunk, counters, certification)) {
-        clear_proposals(job);
-        counters = read_counters(job);
+      for (;;) {
+        // What these pairs propose has been met before.
+        clear_work(job, kProposals, 1);
+        job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
+        climb_in_double(job, range.chunk);
+        const Counters counters = gather_and_count(job);
+        if (!for_cpu_.empty()) {
+          answer(job, counters);
+        } else if (!are_left(counters, kUnsure)) {
+          const std::size_t found = counters[job.domain.double_next() ? kUnsure : kForCpu];
+          refined += found;
+          certification.uncertain += found;
+          count_lists(counters, certification);
+          break;
+        }
       }
     }
   job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
   return refined;
 }
 
+void PairPass::clear_lists(const PairJob& job) { clear_work(job, kShortLists, 3); }
+
 void PairPass::start(const PairJob& job, std::size_t batch) {
   job.commands.phase(&DeviceSeconds::clip);
   job.commands.fill(buffers_.table, 0, buffers_.table_size * kWord, 0);
-  clear_proposals(job);
+  job.commands.fill(job.counters, kRounds * kWord, kWord, 0);
+  clear_work(job, kProposals, 1);
+  clear_lists(job);
   job.domain.start(job, buffers_, batch);
   // What is a pair by now is not clipped.
-  advance(job, true, kNone);
+  advance(job, kWorkPairs, job.store.capacity, kNone);
 }
 
-void PairPass::advance(const PairJob& job, bool of_pairs, std::size_t most) {
-  const AdvancePush push{of_pairs, word(of_pairs ? job.store.capacity : buffers_.proposal_capacity),
-                         device_.limits().groups, word(most)};
+void PairPass::advance(const PairJob& job, uint kind, std::size_t capacity, std::size_t most) {
+  const AdvancePush push{kind, word(capacity), device_.limits().groups, word(std::min<std::size_t>(most, kNone))};
   job.commands.dispatch({"advance", {}}, {updates(job.counters)}, push, 1);
 }
 
 // Records rounds in which proposals become pairs, and pairs are clipped and propose more.
-void PairPass::spread(const PairJob& job, std::size_t chunk) {
+void PairPass::spread(const PairJob& job, std::size_t chunk, int rounds) {
   const AdmitPush admit{word(buffers_.table_size - 1), word(job.store.capacity)};
-  for (int round = 0; round < kRoundsPerRun; ++round) {
-    advance(job, false, most_at_once_);
+  for (int round = 0; round < rounds; ++round) {
+    advance(job, kWorkProposals, buffers_.proposal_capacity, at_once_);
     job.commands.dispatch_indirect(
         {"admit", {}},
         {reads(buffers_.proposals), updates(buffers_.table), updates(job.store.pairs), updates(job.counters)}, admit,
-        job.counters, kProposalGroups * kWord);
-    advance(job, true, most_at_once_);
-    ClipPush push{};
-    push.pair_count = kAsCounted;
-    clip(job, chunk, {}, push, buffers_.no_labels,
+        job.counters, (kGroups + 3 * kWorkProposals) * kWord);
+    advance(job, kWorkPairs, job.store.capacity, at_once_);
+    clip(job, chunk, {}, {}, buffers_.no_labels,
          [&](const Kernel& k, std::initializer_list<Binding> bindings, const ClipPush& p) {
-           job.commands.dispatch_indirect(k, bindings, p, job.counters, kPairGroups * kWord);
+           job.commands.dispatch_indirect(k, bindings, p, job.counters, (kGroups + 3 * kWorkPairs) * kWord);
          });
   }
+}
+
+// Records the next rungs of the device for what is listed.
+void PairPass::climb(const PairJob& job, std::size_t chunk) {
+  advance(job, kWorkShort, buffers_.flagged_capacity, at_once_);
+  job.neighbours.choose_targets(job.commands, buffers_.flagged, kFlaggedShort * buffers_.flagged_capacity,
+                                job.store.pairs, job.counters);
+  advance(job, kWorkTargets, job.neighbours.target_capacity(), at_once_);
+  job.neighbours.widen(job.commands, job.seeds, job.counters);
+  clip_listed(job, chunk, kRungWide, kFlaggedShort);
+  climb_in_double(job, chunk);
+}
+
+void PairPass::climb_in_double(const PairJob& job, std::size_t chunk) {
+  if (!job.domain.double_next()) return;
+  advance(job, kWorkUnsure, buffers_.flagged_capacity, at_once_);
+  clip_listed(job, chunk, kRungDouble, kFlaggedUncertain);
 }
 
 void PairPass::clip(const PairJob& job, std::size_t chunk, const ClipKind& kind, ClipPush push, const Buffer& labels,
@@ -208,19 +269,18 @@ void PairPass::clip(const PairJob& job, std::size_t chunk, const ClipKind& kind,
   push.residual = job.seeds.residual;
   push.two = kTwo;
   push.proposal_capacity = word(buffers_.proposal_capacity);
-  push.flagged_capacity = word(buffers_.table_size);
+  push.flagged_capacity = word(buffers_.flagged_capacity);
   push.cell_count = word(job.seeds.count());
   job.commands.phase(&DeviceSeconds::clip);
   job.domain.clip(job, buffers_, chunk, kind, push, labels, dispatch);
 }
 
-void PairPass::clip_flagged(const PairJob& job, std::size_t chunk, uint rung, uint list, std::size_t count) {
+void PairPass::clip_listed(const PairJob& job, std::size_t chunk, uint rung, uint list) {
   ClipPush push{};
-  push.first_pair = word(list * buffers_.table_size);
-  push.pair_count = word(count);
+  push.first_pair = word(list * buffers_.flagged_capacity);
   clip(job, chunk, {rung, true, false}, push, buffers_.no_labels,
        [&](const Kernel& k, std::initializer_list<Binding> bindings, const ClipPush& p) {
-         job.commands.dispatch(k, bindings, p, count);
+         job.commands.dispatch_indirect(k, bindings, p, job.counters, (kGroups + 3 * (kWorkShort + list)) * kWord);
        });
 }
 
@@ -243,37 +303,46 @@ std::vector<Index> PairPass::marks(const PairJob& job) {
   return marks;
 }
 
-Counters PairPass::read_counters(const PairJob& job) {
+// Runs what is recorded, and names the pairs that the CPU is asked about. Some are downloaded with the counters, so
+// that a few take no further wait.
+Counters PairPass::gather_and_count(const PairJob& job) {
+  Commands& commands = job.commands;
+  const std::size_t most = std::min(buffers_.flagged_capacity, kGatheredAtOnce);
+  advance(job, kWorkForCpu, buffers_.flagged_capacity, most);
+  commands.dispatch_indirect(
+      {"gather_pairs", {}},
+      {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_), reads(job.counters)},
+      GatherPairsPush{word(kFlaggedForCpu * buffers_.flagged_capacity)}, job.counters,
+      (kGroups + 3 * kWorkForCpu) * kWord);
   Counters counters{};
-  job.commands.download(job.counters, 0, counters.data(), sizeof counters);
-  job.commands.run();
+  for_cpu_.resize(std::min(expect_for_cpu_, most));
+  commands.download(job.counters, 0, counters.data(), sizeof counters);
+  commands.download(gathered_, 0, for_cpu_.data(), for_cpu_.size() * sizeof(GatheredPair));
+  commands.run();
+  const std::size_t had = for_cpu_.size(), count = counters[kForCpu + kEndAfter] - counters[kForCpu + kBeginAfter];
+  for_cpu_.resize(count);
+  if (count > had) {
+    commands.download(gathered_, had * sizeof(GatheredPair), for_cpu_.data() + had,
+                      (count - had) * sizeof(GatheredPair));
+    commands.run();
+  }
   return counters;
 }
 
-void PairPass::set_counter(const PairJob& job, uint counter, uint value) {
-  job.commands.fill(job.counters, counter * kWord, kWord, value);
-}
-
-void PairPass::clip_exactly(const PairJob& job, const Counters& counters) {
-  const std::size_t count = counters[kForCpu];
+// Settles what was gathered in exact arithmetic, and records the answers.
+void PairPass::answer(const PairJob& job, const Counters& counters) {
+  const std::size_t count = for_cpu_.size();
+  expect_for_cpu_ = count + count / 4 + 32;
   Commands& commands = job.commands;
-  gathered_.reserve(count * sizeof(GatheredPair));
-  const GatherPairsPush gather{word(kFlaggedForCpu * buffers_.table_size), word(count)};
-  commands.dispatch({"gather_pairs", {}}, {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_)}, gather,
-                    count);
-  std::vector<GatheredPair> gathered(count);
-  commands.download(gathered_, 0, gathered.data(), count * sizeof(GatheredPair));
-  commands.run();
-
   std::vector<PairName> names;
-  for (const GatheredPair& pair : gathered) names.push_back(pair.name);
+  for (const GatheredPair& pair : for_cpu_) names.push_back(pair.name);
   const std::vector<ExactPair> pairs = job.domain.clip_exactly(job, names);
 
   std::vector<PairAnswer> answers;
   std::vector<PairName> proposals;
   RealWords values(double_);
   for (std::size_t k = 0; k < count; ++k) {
-    answers.push_back({gathered[k].pair, pairs[k].empty ? kStatusEmpty : kStatusClipped});
+    answers.push_back({for_cpu_[k].pair, pairs[k].empty ? kStatusEmpty : kStatusClipped});
     values.moments(pairs[k].moments);
     proposals.insert(proposals.end(), pairs[k].proposals.begin(), pairs[k].proposals.end());
   }
@@ -283,13 +352,12 @@ void PairPass::clip_exactly(const PairJob& job, const Counters& counters) {
                     {reads(answers_), reads(values_), updates(job.store.status), updates(job.store.mass_second),
                      updates(job.store.first)},
                     CountPush{word(count)}, count);
-  set_counter(job, kForCpu, 0);
   const std::size_t before = counters[kProposals], added = proposals.size();
   if (before + added > buffers_.proposal_capacity) {
-    set_counter(job, kOverflow, kOverflowProposals);
+    commands.fill(job.counters, kOverflow * kWord, kWord, kOverflowProposals);
   } else if (added) {
     commands.upload(buffers_.proposals, before * sizeof(PairName), proposals.data(), added * sizeof(PairName));
-    set_counter(job, kProposals, word(before + added));
+    commands.fill(job.counters, kProposals * kWord, kWord, word(before + added));
   }
 }
 

@@ -47,7 +47,6 @@ struct PairJob {
   Commands& commands;
   const DeviceSeeds& seeds;
   NeighbourPass& neighbours;
-  Scan& scan;
   const Buffer& counters;
   PairStore& store;
   PairDomain& domain;
@@ -57,14 +56,14 @@ struct PairJob {
 struct PairBuffers {
   PairBuffers(Device& device, const Capacities& capacities)
       : proposals(device), table(device), flagged(device), cell_errors(device), no_labels(device),
-        proposal_capacity(capacities.proposals), table_size(capacities.table) {}
+        proposal_capacity(capacities.proposals), table_size(capacities.table), flagged_capacity(capacities.flagged) {}
 
   Buffer proposals;    // PairName
   Buffer table;        // the set of the pairs of a batch
-  Buffer flagged;      // lists of pairs, each as long as the table
+  Buffer flagged;      // lists of pairs
   Buffer cell_errors;  // bounds of the errors of cells, then marks of cells
   Buffer no_labels;    // bound where none are asked for
-  std::size_t proposal_capacity, table_size;
+  std::size_t proposal_capacity, table_size, flagged_capacity;
 };
 
 // Which specialisation of a clip kernel.
@@ -95,12 +94,18 @@ class PairDomain {
   virtual std::vector<ExactPair> clip_exactly(const PairJob& job, const std::vector<PairName>& pairs) = 0;
 };
 
+// How many pairs a batch should have, so that its buffers fit into the device's bindings and memory; `asked` if that is
+// not 0.
+double batch_pairs_of(const Device& device, double asked);
+
 class PairPass {
  public:
   PairPass(Device& device, bool is_double, const Capacities& capacities);
 
   // Finds all pairs. Counts in `certification` what climbed which rung.
   void run(const PairJob& job, Certification& certification);
+  // How long the device took to clip so many pairs: dispatches follow that, lest a desktop's watchdog ends them.
+  void clipped(std::size_t pairs, double seconds);
   // In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs. `cells` are
   // those of CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there
   // were.
@@ -114,25 +119,31 @@ class PairPass {
   std::size_t real_size() const { return double_ ? sizeof(double) : sizeof(float); }
   std::size_t most_pairs() const;
   void reserve(const PairJob& job);
-  bool climb(const PairJob& job, std::size_t chunk, const Counters& counters, Certification& certification);
+  void grow(const PairJob& job, uint overflow);
   bool run_batch(const PairJob& job, std::size_t batch, Certification& certification);
   void start(const PairJob& job, std::size_t batch);
-  void spread(const PairJob& job, std::size_t chunk);
-  void advance(const PairJob& job, bool of_pairs, std::size_t most);
-  Counters read_counters(const PairJob& job);
-  void set_counter(const PairJob& job, uint counter, uint value);
-  void clip_flagged(const PairJob& job, std::size_t chunk, uint rung, uint list, std::size_t count);
-  void clip_exactly(const PairJob& job, const Counters& counters);
+  void spread(const PairJob& job, std::size_t chunk, int rounds);
+  void climb(const PairJob& job, std::size_t chunk);
+  void climb_in_double(const PairJob& job, std::size_t chunk);
+  void advance(const PairJob& job, uint kind, std::size_t capacity, std::size_t most);
+  void clear_lists(const PairJob& job);
+  Counters gather_and_count(const PairJob& job);
+  void clip_listed(const PairJob& job, std::size_t chunk, uint rung, uint list);
+  void answer(const PairJob& job, const Counters& counters);
+  void count_lists(const Counters& counters, Certification& certification);
   void clip(const PairJob& job, std::size_t chunk, const ClipKind& kind, ClipPush push, const Buffer& labels,
             const ClipDispatch& dispatch);
 
   Device& device_;
   bool double_;
+  Capacities asked_;
   PairBuffers buffers_;
   Buffer gathered_, answers_, values_;
-  uint unsure_in_double_ = 0;   // pairs that double precision left uncertain, as far as they are counted
-  std::size_t first_capacity_;  // of pairs; 0: by what is expected
-  std::size_t most_at_once_;    // pairs or proposals of one dispatch
+  std::vector<GatheredPair> for_cpu_;  // that were gathered last
+  std::size_t expect_for_cpu_;         // how many are downloaded before it is known how many there are
+  uint unsure_in_double_ = 0;          // pairs that double precision left uncertain, as far as they are counted
+  int rounds_;                         // that the last batch took
+  std::size_t at_once_;                // pairs or proposals of one dispatch
 };
 
 }  // namespace bisector::host

@@ -71,7 +71,7 @@ void PolygonPass::run(PairPass& pairs, const PairJob& job, FacetPairs& domain, b
   }
 
   const Surface& surface = domain.surface();
-  const SortedSeeds& seeds = job.seeds.sorted;
+  const SortedSeeds& seeds = job.seeds.on_host();
   const auto triangle = [&](const Found& f) { return surface.summaries[f.facet].triangle; };
   sort_in_parallel(found, [&](const Found& a, const Found& b) {
     return triangle(a) != triangle(b) ? triangle(a) < triangle(b) : seeds.id[a.slot] < seeds.id[b.slot];

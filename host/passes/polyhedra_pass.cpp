@@ -75,7 +75,7 @@ void PolyhedraPass::run(PairPass& pairs, const PairJob& job, TetPairs& domain, E
       }
     }
 
-  const SortedSeeds& seeds = job.seeds.sorted;
+  const SortedSeeds& seeds = job.seeds.on_host();
   sort_in_parallel(found, [&](const Found& a, const Found& b) {
     return a.tet != b.tet ? a.tet < b.tet : seeds.id[a.slot] < seeds.id[b.slot];
   });

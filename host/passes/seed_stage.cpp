@@ -1,11 +1,16 @@
 #include "host/passes/seed_stage.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "host/passes/packing.h"
+#include "kernels/layout/elements.h"
+#include "kernels/layout/push.h"
 #include "voronoi/step_mass.h"
 
 namespace bisector::host {
@@ -26,75 +31,98 @@ Precisions choose_precisions(const Device& device, Precision asked, bool double_
 SeedStage::SeedStage(std::shared_ptr<Device> opened, const Precisions& precisions, NeighbourSource source, double scale,
                      const Box& box, bool in_solid)
     : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung),
-      in_solid_(in_solid), source_(source), box_(box), commands(*device_), scan(*device_), counters(*device_),
-      seeds(*device_), neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists) {
+      source_(source), box_(box), commands(*device_), scan(*device_), counters(*device_), seeds(*device_),
+      neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists), exact(in_solid) {
   counters.reserve(kCounters * sizeof(std::uint32_t));
   seeds.scale = scale;
 }
 
-bool SeedStage::within_reach(const std::vector<Vec3>& given) const {
-  return std::all_of(given.begin(), given.end(), [&](const Vec3& p) {
-    const double most = kFarthest / seeds.scale;
-    return std::abs(p.x) < most && std::abs(p.y) < most && std::abs(p.z) < most;
+bool SeedStage::within_reach(const std::vector<Vec3>& given) {
+  constexpr std::size_t kChunk = 4096;
+  std::vector<double> largest((given.size() + kChunk - 1) / kChunk, 0);
+  parallel_chunks(given.size(), kChunk, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    double most = 0;
+    for (std::size_t i = begin; i < end; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const double coordinate = std::abs(given[i][k]);
+        // What is not a number is out of reach.
+        most = coordinate <= most ? most : coordinate;
+      }
+    largest[c] = most;
   });
-}
-
-void SeedStage::sort(const std::vector<Vec3>& given) {
-  seeds.sorted = sort_seeds(given);
-  followed_ = false;
+  double most = 0;
+  for (const Vec3& corner : {box_.lo, box_.hi})
+    for (int k = 0; k < 3; ++k) most = std::max(most, std::abs(corner[k]));
+  for (const double coordinate : largest) most = coordinate <= most ? most : coordinate;
+  seeds.largest = most * seeds.scale;
+  return seeds.largest < kFarthest;
 }
 
 void SeedStage::begin(const std::vector<Vec3>& given) {
   const Stopwatch watch;
-  SortedSeeds& sorted = seeds.sorted;
-  followed_ = !delaunay() && given.size() == sorted.x.size() && given.size() == sorted.slot.size();
-  if (followed_) {
-    parallel_each(given.size(), [&](std::size_t i) { sorted.x[sorted.slot[i]] = given[i]; });
-    sorted.extent = bounding_box(sorted.x).diagonal();
-  } else {
-    sort(given);
+  followed_ = !delaunay() && seeds.follow(given);
+  if (!followed_) {
+    seeds.sort(given);
+    order_uploaded_ = false;
   }
-  if (delaunay()) rings_.build(sorted, NeighbourSource::delaunay);
+  if (delaunay()) rings_.build(seeds.on_host(), NeighbourSource::delaunay);
   lists_seconds_ = watch.seconds();
-  spacing_ = typical_spacing(given, in_solid_);
 }
 
 void SeedStage::record() {
   upload_seeds();
-  exact.begin(seeds.sorted, delaunay() ? &rings_ : nullptr, spacing_);
+  exact.begin(seeds, delaunay() ? &rings_ : nullptr);
   commands.fill(counters, 0, kCounters * sizeof(std::uint32_t), 0);
-  neighbours.begin(commands, seeds, spacing_, scan);
+  neighbours.begin(commands, seeds);
   if (delaunay()) neighbours.upload_lists(commands, seeds, rings_);
   else neighbours.list_nearest(commands, seeds, counters);
 }
 
 bool SeedStage::keeps_slots(const std::vector<Vec3>& given, const Counters& counted) {
   if (!followed_ || !counted[kCoincident]) return true;
-  sort(given);
+  seeds.sort(given);
+  followed_ = order_uploaded_ = false;
   return false;
 }
 
+// Positions in the caller's order, so that the host reads and writes memory in order; the device puts them into slots.
 void SeedStage::upload_seeds() {
-  RealWords words(double_), wide(true);
-  words.reserve(point_words(double_) * seeds.count());
-  std::vector<SeedId> ids;
-  ids.reserve(seeds.count());
-  double largest = 0;
-  for (std::size_t slot = 0; slot < seeds.count(); ++slot) {
-    const Vec3& x = seeds.sorted.x[slot];
-    const auto low = [&](double coordinate) { return low_word(coordinate, seeds.scale, slot); };
-    ids.push_back({seeds.sorted.id[slot], {low(x.x), low(x.y), low(x.z)}});
-    words.point(seeds.scale * x);
-    if (double_rung_) wide.point(seeds.scale * x);
-    largest = std::max({largest, std::abs(x.x), std::abs(x.y), std::abs(x.z)});
-  }
-  for (const Vec3& corner : {box_.lo, box_.hi})
-    largest = std::max({largest, std::abs(corner.x), std::abs(corner.y), std::abs(corner.z)});
-  seeds.residual = double_ ? 0 : residual_of(largest * seeds.scale);
+  const std::size_t n = seeds.count(), given_count = seeds.given_count();
+  const std::vector<Vec3>& given = seeds.positions();
+  const bool as_doubles = double_ || double_rung_;
+  const std::size_t words = as_doubles ? kGivenDoubleWords : kGivenSingleWords;
+  seeds.residual = double_ ? 0 : residual_of(seeds.largest);
+  seeds.given.reserve(given_count * words * sizeof(uint));
+  seeds.order.reserve(n * sizeof(uint));
+  seeds.words.reserve(n * point_words(double_) * (double_ ? sizeof(double) : sizeof(float)));
+  seeds.doubles.reserve(double_rung_ ? n * sizeof(Vec3) : 0);
+  seeds.ids.reserve(n * sizeof(SeedId));
   commands.phase(&DeviceSeconds::transfer);
-  upload(commands, seeds.words, words);
-  if (double_rung_) upload(commands, seeds.doubles, wide);
-  upload(commands, seeds.ids, ids);
+  commands.upload_items(seeds.given, words * sizeof(uint), given_count,
+                        [&](std::byte* at, std::size_t first, std::size_t count) {
+                          for (std::size_t i = first; i < first + count; ++i, at += words * sizeof(uint)) {
+                            const Vec3 p = seeds.scale * given[i];
+                            if (as_doubles) {
+                              std::memcpy(at, &p, sizeof p);
+                              continue;
+                            }
+                            std::array<uint, kGivenSingleWords> packed;
+                            for (int k = 0; k < 3; ++k) {
+                              const float high = static_cast<float>(p[k]);
+                              const auto low = static_cast<float>(p[k] - static_cast<double>(high));
+                              packed[static_cast<std::size_t>(k)] = std::bit_cast<uint>(high);
+                              packed[static_cast<std::size_t>(3 + k)] = std::bit_cast<uint>(low);
+                              packed[static_cast<std::size_t>(6 + k)] = low_word(given[i][k], seeds.scale, i);
+                            }
+                            std::memcpy(at, packed.data(), sizeof packed);
+                          }
+                        });
+  if (!order_uploaded_) commands.upload(seeds.order, 0, seeds.all_ids().data(), n * sizeof(Index));
+  order_uploaded_ = true;
+  commands.dispatch(kernel("place_seeds", as_doubles, {double_rung_}),
+                    {reads(seeds.given), reads(seeds.order), writes(seeds.words), writes(seeds.doubles),
+                     writes(seeds.ids)},
+                    CountPush{static_cast<uint>(n)}, n);
 }
 
 Counters SeedStage::run_counted() {
@@ -109,10 +137,11 @@ BackendDescription SeedStage::description() const {
   return {device.name, device.kind, double_ ? "double" : "single", ""};
 }
 
-void SeedStage::set_step_masses(CellMoments& moments) {
-  if (delaunay()) return bisector::set_step_masses(seeds.sorted, rings_, moments);
-  complete_step_masses(
-      seeds.sorted, [&]() -> const Neighbours& { return exact.neighbours(); }, moments);
+void SeedStage::complete_step_masses(CellMoments& moments) {
+  if (std::none_of(moments.step_mass.begin(), moments.step_mass.end(), [](double mass) { return mass < 0; })) return;
+  if (delaunay()) return bisector::set_step_masses(seeds.on_host(), rings_, moments);
+  bisector::complete_step_masses(
+      seeds.on_host(), [&]() -> const Neighbours& { return exact.neighbours(); }, moments);
 }
 
 }  // namespace bisector::host

@@ -27,9 +27,9 @@ class SeedStage {
   SeedStage(std::shared_ptr<Device> device, const Precisions& precisions, NeighbourSource source, double scale,
             const Box& box, bool in_solid);
 
-  // Whether all seeds have coordinates that single precision can square.
-  bool within_reach(const std::vector<Vec3>& seeds) const;
-  // Takes new seeds; those as many as the last ones keep their slots, whose order in space is good enough.
+  // Whether all seeds have coordinates that single precision can square. To be asked before begin().
+  bool within_reach(const std::vector<Vec3>& seeds);
+  // Takes new seeds; those as many as the last ones keep their slots as long as their order in space is good enough.
   void begin(const std::vector<Vec3>& seeds);
   // Records the upload, and the search for lists if they are not from the host.
   void record();
@@ -40,7 +40,8 @@ class SeedStage {
   bool keeps_slots(const std::vector<Vec3>& seeds, const Counters& counters);
   // Runs what is recorded and reads the counters.
   Counters run_counted();
-  void set_step_masses(CellMoments& moments);
+  // Sets the step masses that are negative, for the device does not know them.
+  void complete_step_masses(CellMoments& moments);
 
   BackendDescription description() const;
   Device& device() { return *device_; }
@@ -50,15 +51,14 @@ class SeedStage {
   double lists_seconds() const { return lists_seconds_; }  // on the host
 
  private:
-  void sort(const std::vector<Vec3>& seeds);
   void upload_seeds();
 
   std::shared_ptr<Device> device_;
-  bool double_, double_rung_, in_solid_;
+  bool double_, double_rung_;
   NeighbourSource source_;
   Box box_;
-  bool followed_ = false;
-  double spacing_ = 0, lists_seconds_ = 0;
+  bool followed_ = false, order_uploaded_ = false;
+  double lists_seconds_ = 0;
   Neighbours rings_;
 
  public:

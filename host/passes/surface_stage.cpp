@@ -13,7 +13,7 @@ SurfaceStage::SurfaceStage(SeedStage& seeds, const Surface& surface, const Capac
       samples_(seeds.device(), seeds.is_double()),
       domain_(seeds.device(), seeds.is_double(), buffers_, sites_, samples_, seeds.exact),
       pairs_(seeds.device(), seeds.is_double(), capacities), store_(seeds.device()), polygon_pass_(seeds.device()),
-      batch_pairs_(capacities.batch_pairs) {
+      batch_pairs_(batch_pairs_of(seeds.device(), capacities.batch_pairs)) {
   buffers_.surface = &surface_;
   const double scale = seeds.seeds.scale;
   buffers_.facets = upload_facets(seeds.device(), seeds.commands, surface_, scale, seeds.is_double());
@@ -37,8 +37,8 @@ void SurfaceStage::record_owners() {
     sites_.forget();
     samples_.forget();
   }
-  sites_.record(seeds_.commands, seeds_.seeds, seeds_.neighbours.grid(), seeds_.counters, true);
-  samples_.record(seeds_.commands, seeds_.seeds, seeds_.neighbours.grid(), seeds_.counters, false);
+  sites_.record(seeds_.commands, seeds_.seeds, seeds_.neighbours.tree(), seeds_.counters, true);
+  samples_.record(seeds_.commands, seeds_.seeds, seeds_.neighbours.tree(), seeds_.counters, false);
 }
 
 void SurfaceStage::find_owners(const std::vector<Vec3>& given) {

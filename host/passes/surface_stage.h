@@ -26,7 +26,7 @@ class SurfaceStage {
  private:
   void record_owners();
   PairJob job() {
-    return {seeds_.commands, seeds_.seeds, seeds_.neighbours, seeds_.scan, seeds_.counters, store_, domain_};
+    return {seeds_.commands, seeds_.seeds, seeds_.neighbours, seeds_.counters, store_, domain_};
   }
 
   SeedStage& seeds_;

@@ -15,8 +15,8 @@ class VulkanBackend : public DeviceBackend<Backend, CpuBackend> {
                 const Precisions& precisions);
 
  private:
-  DeviceWork compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
-  void find_moments(CellMoments& moments, Certification& certification);
+  DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  void find_moments(bool with_triangles, CellMoments& moments, Certification& certification);
 
   SurfaceStage pairs_;
   CellPass cells_;
@@ -33,27 +33,23 @@ VulkanBackend::VulkanBackend(const Surface& surface, std::shared_ptr<Device> dev
   stage_.commands.run();
 }
 
-DeviceWork VulkanBackend::compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
-  DeviceWork work;
+DiagramWorkOnDevice VulkanBackend::compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
+  DiagramWorkOnDevice work;
   Stopwatch watch;
   pairs_.find_owners(seeds);
   work.searched = watch.lap();
-  find_moments(diagram.moments, work.certification);
-  stage_.set_step_masses(diagram.moments);
+  find_moments(includes(want, Want::triangles), diagram.moments, work.certification);
+  stage_.complete_step_masses(diagram.moments);
   work.clipped = watch.lap();
   if (includes(want, Want::labels)) pairs_.polygons(includes(want, Want::polygons), diagram.polygons);
   return work;
 }
 
-void VulkanBackend::find_moments(CellMoments& moments, Certification& certification) {
+void VulkanBackend::find_moments(bool with_triangles, CellMoments& moments, Certification& certification) {
   pairs_.find_pairs(certification);
-  cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, pairs_.store());
-  const auto sum = [&] { cells_.sum(stage_, pairs_.store(), moments); };
-  sum();
-  if (!stage_.is_double())
-    refine_masses(
-        mass(), moments, [&](float share) { return pairs_.refine(cells_.cells(), share, certification); }, sum);
-  certification.pairs = moments.triangles.values.size();
+  find_cells(stage_, cells_, pairs_.store(), {mass(), mass()}, with_triangles, moments,
+             [&](float share) { return pairs_.refine(cells_.cells(), share, certification); });
+  certification.pairs = cells_.items();
 }
 
 }  // namespace

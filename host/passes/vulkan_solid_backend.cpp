@@ -13,6 +13,7 @@
 #include "host/passes/polyhedra_pass.h"
 #include "host/passes/surface_stage.h"
 #include "voronoi/polyhedra.h"
+#include "voronoi/totals.h"
 
 namespace bisector::host {
 namespace {
@@ -29,15 +30,15 @@ class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
                      const Precisions& precisions, SolidCells how);
 
  private:
-  DeviceWork compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
   void find_owners(const std::vector<Vec3>& seeds);
   void find_pairs(Certification& certification);
   void list_triangles(Csr<Index>& triangles);
   void find_moments(CellMoments& moments, Certification& certification);
-  void sum(CellMoments& moments);
+  void add_boundary(CellMoments& moments);
   void append_boundary(ClippedPolyhedra& polyhedra);
   PairJob job() {
-    return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.scan, stage_.counters, store_, tets_};
+    return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.counters, store_, tets_};
   }
 
   const bool whole_;  // cells are not cut up
@@ -64,7 +65,8 @@ VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Devic
       device_solid_(stage_.device(), stage_.commands, solid, whole_, stage_.seeds.scale, stage_.is_double(),
                     precisions.double_rung),
       boundary_(solid, device_solid_.frames.back()), corners_(stage_.device(), stage_.is_double()),
-      tets_(stage_.is_double(), device_solid_, corners_, stage_.exact, options.capacities.batch_pairs),
+      tets_(stage_.is_double(), device_solid_, corners_, stage_.exact,
+            batch_pairs_of(stage_.device(), options.capacities.batch_pairs)),
       pairs_(stage_.device(), stage_.is_double(), options.capacities), store_(stage_.device()),
       cells_(stage_.device(), stage_.is_double(), true), polyhedra_(stage_.device()) {
   std::vector<Index> places(device_solid_.frames.size());
@@ -81,9 +83,9 @@ VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Devic
   stage_.commands.run();
 }
 
-DeviceWork VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
+DiagramWorkOnDevice VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   CellMoments& moments = diagram.moments;
-  DeviceWork work;
+  DiagramWorkOnDevice work;
   Stopwatch watch;
   find_owners(seeds);
   work.searched = watch.lap();
@@ -92,7 +94,7 @@ DeviceWork VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds,
   Csr<Index> triangles;
   if (whole_) {
     shell_.polygons(includes(want, Want::polygons), diagram.polygons);
-    boundary_.run(stage_.seeds.sorted, stage_.exact.neighbours(), diagram.polygons, includes(want, Want::polyhedra));
+    boundary_.run(stage_.seeds.on_host(), stage_.exact.neighbours(), diagram.polygons, includes(want, Want::polyhedra));
     triangles = boundary_.triangles();
   } else {
     list_triangles(triangles);
@@ -103,7 +105,7 @@ DeviceWork VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds,
 
   find_moments(moments, work.certification);
   moments.triangles = std::move(triangles);
-  stage_.set_step_masses(moments);
+  stage_.complete_step_masses(moments);
   work.clipped = watch.lap();
   if (includes(want, Want::polyhedra)) {
     polyhedra_.run(pairs_, job(), tets_, stage_.exact, diagram.polyhedra);
@@ -117,7 +119,7 @@ void VulkanSolidBackend::find_owners(const std::vector<Vec3>& seeds) {
   if (whole_) return;
   if (stage_.sorted_anew()) corners_.forget();
   stage_.commands.fill(stage_.counters, kUncertainOwners * sizeof(uint), sizeof(uint), 0);
-  corners_.record(stage_.commands, stage_.seeds, stage_.neighbours.grid(), stage_.counters, true);
+  corners_.record(stage_.commands, stage_.seeds, stage_.neighbours.tree(), stage_.counters, true);
   const Counters counters = stage_.run_counted();
   corners_.complete(stage_.commands, counters[kUncertainOwners], stage_.exact);
 }
@@ -136,29 +138,23 @@ void VulkanSolidBackend::find_pairs(Certification& certification) {
 
 void VulkanSolidBackend::list_triangles(Csr<Index>& triangles) {
   CellMoments shell;
-  shell_cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, shell_.store());
-  shell_cells_.sum(stage_, shell_.store(), shell);
+  do shell_cells_.record(stage_, shell_.store());
+  while (!shell_cells_.read(stage_, true, shell));
   triangles = std::move(shell.triangles);
 }
 
 void VulkanSolidBackend::find_moments(CellMoments& moments, Certification& certification) {
   find_pairs(certification);
-  cells_.sort(stage_.commands, stage_.seeds.count(), stage_.scan, store_);
-  sum(moments);
-  if (!stage_.is_double()) {
-    const auto refine = [&](float share) { return pairs_.refine(job(), cells_.cells(), share, certification); };
-    refine_masses(mass(), moments, refine, [&] { sum(moments); });
-  }
-  certification.pairs = moments.triangles.values.size() + (whole_ ? boundary_.count() : 0);
+  const double at_boundary = whole_ ? boundary_.mass() : 0;
+  find_cells(stage_, cells_, store_, {mass() - at_boundary, mass()}, false, moments,
+             [&](float share) { return pairs_.refine(job(), cells_.cells(), share, certification); });
+  if (whole_) add_boundary(moments);
+  certification.pairs = cells_.items() + (whole_ ? boundary_.count() : 0);
 }
 
-void VulkanSolidBackend::sum(CellMoments& moments) {
-  cells_.sum(stage_, store_, moments);
-  if (!whole_) return;
+void VulkanSolidBackend::add_boundary(CellMoments& moments) {
   boundary_.put_moments(moments.cells);
-  const std::size_t n = moments.cells.size();
-  moments.mass = fixed_sum(n, [&](std::size_t i) { return moments.cells[i].mass; });
-  moments.energy = fixed_sum(n, [&](std::size_t i) { return moments.cells[i].second; });
+  set_totals(moments);
   // The device's medians lack the masses at the boundary.
   std::fill(moments.step_mass.begin(), moments.step_mass.end(), -1);
 }

@@ -83,6 +83,14 @@ struct DeviceSeconds {
   double transfer = 0, grid = 0, neighbours = 0, owners = 0, clip = 0, sort = 0, sum = 0;
 };
 
+// What evaluations asked of a device: submissions, each with a wait, dispatches of kernels, and bytes moved to it and
+// back; and the seconds of the host in them, which are all but the device's own. All 0 where the CPU computed.
+struct DeviceWork {
+  std::size_t submits = 0, dispatches = 0;
+  std::size_t bytes_up = 0, bytes_down = 0;
+  double host_seconds = 0;
+};
+
 // Seconds of an evaluation: for the Delaunay triangulation or the nearest seeds, for who meets whom, and for clipping.
 struct DiagramSeconds {
   double delaunay = 0, neighbours = 0, pairs = 0, clip = 0;
@@ -102,6 +110,7 @@ struct Certification {
 struct EvaluationReport {
   Certification certification;
   DiagramSeconds seconds;
+  DeviceWork device_work;
 };
 
 }  // namespace bisector

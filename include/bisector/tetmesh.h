@@ -91,6 +91,7 @@ struct TetResult {
   double edge_length = 0;          // aimed at
   int iterations = 0;              // accepted steps, all phases
   int evaluations = 0;
+  DeviceWork device_work;  // of these, summed
   double energy = 0;  // CVT energy of the final seeds, before slivers were removed
   double gradient_norm = 0;
   Certification certification;  // of the final diagram

@@ -6,39 +6,53 @@
 
 LAYOUT_BEGIN
 
-// Of one batch: how many there are, and the range that is being worked on.
-LAYOUT_CONSTANT uint kProposals = 0;
-LAYOUT_CONSTANT uint kProposalsBegin = 1;
-LAYOUT_CONSTANT uint kProposalsEnd = 2;
-LAYOUT_CONSTANT uint kPairs = 3;
-LAYOUT_CONSTANT uint kPairsBegin = 4;
-LAYOUT_CONSTANT uint kPairsEnd = 5;
-LAYOUT_CONSTANT uint kOverflow = 6;  // bits kOverflow...: which buffers were too small
-// Pairs in the three lists of flagged pairs.
-LAYOUT_CONSTANT uint kShortLists = 7;  // their list was too short, or they have too many corners
-LAYOUT_CONSTANT uint kUncertain = 8;   // a decision is uncertain that double precision may make
-LAYOUT_CONSTANT uint kForCpu = 9;      // only exact arithmetic decides
-// Of one evaluation.
-LAYOUT_CONSTANT uint kWideTargets = 10;      // cells that need a wider list
-LAYOUT_CONSTANT uint kCoincident = 11;       // seeds that this precision cannot tell apart from another
-LAYOUT_CONSTANT uint kUncertainOwners = 12;  // points without a certain owner
-LAYOUT_CONSTANT uint kDuplicatePairs = 13;   // must stay 0
-LAYOUT_CONSTANT uint kUnsurePairs = 14;      // pairs with an uncertain decision
-LAYOUT_CONSTANT uint kUnsureInDouble = 15;   // and those of them that double precision left uncertain
-// Numbers of workgroups, for indirect dispatches: three words each.
-LAYOUT_CONSTANT uint kProposalGroups = 16;
-LAYOUT_CONSTANT uint kPairGroups = 20;
+// Kinds of work that kernels leave for later dispatches. Of each kind there are three counters: how many items there
+// are, and the range of them that is worked on; and the number of workgroups for that, three words.
+LAYOUT_CONSTANT uint kWorkProposals = 0;
+LAYOUT_CONSTANT uint kWorkPairs = 1;
+LAYOUT_CONSTANT uint kWorkShort = 2;    // pairs whose list was too short, or that have too many corners
+LAYOUT_CONSTANT uint kWorkUnsure = 3;   // pairs with an uncertain decision that double precision may make
+LAYOUT_CONSTANT uint kWorkForCpu = 4;   // pairs that only exact arithmetic decides
+LAYOUT_CONSTANT uint kWorkTargets = 5;  // cells that need a wider list
+LAYOUT_CONSTANT uint kWorkKinds = 6;
+LAYOUT_CONSTANT uint kWorkWords = 3;
+LAYOUT_CONSTANT uint kBeginAfter = 1;  // after the count
+LAYOUT_CONSTANT uint kEndAfter = 2;
 
-LAYOUT_CONSTANT uint kCounters = 24;  // words of the buffer
+LAYOUT_CONSTANT uint kProposals = 0;
+LAYOUT_CONSTANT uint kPairs = 3;
+LAYOUT_CONSTANT uint kShortLists = 6;
+LAYOUT_CONSTANT uint kUnsure = 9;
+LAYOUT_CONSTANT uint kForCpu = 12;
+LAYOUT_CONSTANT uint kWideTargets = 15;
+LAYOUT_CONSTANT uint kGroups = 18;  // of the first kind
+
+LAYOUT_CONSTANT uint kOverflow = 36;  // bits kOverflow...: which buffers were too small
+LAYOUT_CONSTANT uint kRounds = 37;    // of proposals that came to anything
+// Of one evaluation.
+LAYOUT_CONSTANT uint kCoincident = 38;       // seeds that this precision cannot tell apart from another
+LAYOUT_CONSTANT uint kUncertainOwners = 39;  // points without a certain owner
+LAYOUT_CONSTANT uint kDuplicatePairs = 40;   // must stay 0
+LAYOUT_CONSTANT uint kUnsurePairs = 41;      // pairs with an uncertain decision
+LAYOUT_CONSTANT uint kUnsureInDouble = 42;   // and those of them that double precision left uncertain
+LAYOUT_CONSTANT uint kItems = 43;            // pairs that are not empty
+LAYOUT_CONSTANT uint kLargeCells = 44;       // with more items than rank.comp goes through
+
+LAYOUT_CONSTANT uint kCounters = 48;  // words of the buffer
 
 LAYOUT_CONSTANT uint kOverflowProposals = 1;
 LAYOUT_CONSTANT uint kOverflowPairs = 2;
 LAYOUT_CONSTANT uint kOverflowTable = 4;
+LAYOUT_CONSTANT uint kOverflowFlagged = 8;
 
 LAYOUT_END
 
 #ifdef __cplusplus
 namespace bisector::host {
+static_assert(kPairs == kWorkWords * kWorkPairs && kShortLists == kWorkWords * kWorkShort &&
+              kUnsure == kWorkWords * kWorkUnsure && kForCpu == kWorkWords * kWorkForCpu &&
+              kWideTargets == kWorkWords * kWorkTargets && kGroups == kWorkWords * kWorkKinds &&
+              kOverflow == kGroups + 3 * kWorkKinds);
 using Counters = std::array<std::uint32_t, kCounters>;
 }
 #endif

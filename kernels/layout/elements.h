@@ -10,6 +10,11 @@ LAYOUT_BEGIN
 LAYOUT_CONSTANT uint kSinglePointWords = 6;
 LAYOUT_CONSTANT uint kDoublePointWords = 3;
 
+// Seeds as the host gives them, in words of 32 bits: three doubles; or a point in single precision and the low words of
+// its coordinates as doubles.
+LAYOUT_CONSTANT uint kGivenDoubleWords = 6;
+LAYOUT_CONSTANT uint kGivenSingleWords = 9;
+
 // A facet: three corners (points), normal (point), in single precision the outward unit normals of the edges within the
 // facet's plane (points), densities at the corners, gradient of the density (vector).
 LAYOUT_CONSTANT uint kSingleFacetNormalAt = 18;

@@ -24,7 +24,8 @@ LAYOUT_CONSTANT uint kRungFirst = 0;   // the lists of neighbours found first
 LAYOUT_CONSTANT uint kRungWide = 1;    // wider lists
 LAYOUT_CONSTANT uint kRungDouble = 2;  // double precision after single
 
-// Flagged pairs lie in three lists of equal capacity in one buffer.
+// Flagged pairs lie in three lists of equal capacity in one buffer. Their kinds of work (counters.h) are in the same
+// order.
 LAYOUT_CONSTANT uint kFlaggedShort = 0;      // for kRungWide
 LAYOUT_CONSTANT uint kFlaggedUncertain = 1;  // for kRungDouble
 LAYOUT_CONSTANT uint kFlaggedForCpu = 2;
@@ -37,9 +38,9 @@ LAYOUT_CONSTANT uint kSecondMomentAt = 4;
 // Those of pairs lie in two buffers: mass and second moment, first moment.
 LAYOUT_CONSTANT uint kMassSecondWords = 2;
 LAYOUT_CONSTANT uint kFirstWords = 3;
-// What leaves the device of each cell: moments, then the median mass nearby, or -1 if it is not known.
+// What leaves the device of each cell: moments, then the mass that scales its seed's step, or -1 if it is not known.
 LAYOUT_CONSTANT uint kCellWords = 6;
-LAYOUT_CONSTANT uint kCellMedianAt = 5;
+LAYOUT_CONSTANT uint kCellStepMassAt = 5;
 
 // Of each cell, in single precision: the bits of the largest error of mass that its pairs may have, then of energy.
 // Behind those of all cells lies one word of marks for each.

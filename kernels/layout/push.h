@@ -3,6 +3,7 @@
 #ifndef BISECTOR_KERNELS_LAYOUT_PUSH_H
 #define BISECTOR_KERNELS_LAYOUT_PUSH_H
 
+#include "sizes.h"
 #include "types.h"
 
 LAYOUT_BEGIN
@@ -17,32 +18,30 @@ PUSH_CONSTANTS(CountPush) {
 PUSH_CONSTANTS(CellsPush) { uint cell_count; };
 #endif
 
-// A grid of the seeds, by which all kernels that look for seeds find them (grid.glsl).
-#define GRID_PUSH_CONSTANTS                               \
-  vec3 grid_lower;    /* corner of the grid */            \
-  float grid_inverse; /* 1 / the edge of a grid cell */   \
-  uint bucket_mask;   /* the number of buckets, less 1 */ \
-  uint seed_count;
+// The tree of boxes over the seeds, by which all kernels that look for seeds find them (seed_tree.glsl).
+#define TREE_PUSH_CONSTANTS                                                                     \
+  uint seed_count;                                                                              \
+  uint top_level;       /* the level of one box around all seeds */                             \
+  float residual;       /* what a difference of two positions may lack in single precision */   \
+  uint two;             /* 2: see loops_complete() of common.glsl */                            \
+  uint level_begin[kTreeLevels]; /* the first node of each level, the leaves' being level 0 */
 
-#if LAYOUT_CPLUSPLUS || defined(PUSH_GRID)
-PUSH_CONSTANTS(GridPush){GRID_PUSH_CONSTANTS};
+#if LAYOUT_CPLUSPLUS || defined(PUSH_BOXES)
+PUSH_CONSTANTS(BoxesPush) {
+  uint first_child;  // seed or node
+  uint child_count;
+  uint first_node;  // of the level
+  float vague;      // by how much a coordinate may be off, in a box or rounded to single precision
+};
 #endif
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_NEIGHBOURS)
-PUSH_CONSTANTS(NeighboursPush) {
-  GRID_PUSH_CONSTANTS
-  float residual;        // what a difference of two positions may lack in single precision; 0 in double
-  uint two;              // 2: see loops_complete() of common.glsl
-  uint first_target;     // of the cells that need a wider list, the first that has none yet
-  uint target_capacity;  // wide lists that there is memory for
-};
+PUSH_CONSTANTS(NeighboursPush){TREE_PUSH_CONSTANTS};
 #endif
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_OWNERS)
 PUSH_CONSTANTS(OwnersPush) {
-  GRID_PUSH_CONSTANTS
-  float residual;
-  uint two;
+  TREE_PUSH_CONSTANTS
   uint point_count;
   uint report_uncertain;  // whether points without a certain owner are listed
 };
@@ -50,8 +49,8 @@ PUSH_CONSTANTS(OwnersPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_WIDE_TARGETS)
 PUSH_CONSTANTS(WideTargetsPush) {
-  uint flagged_count;
-  uint target_capacity;
+  uint first_flagged;    // entry of the buffer of flagged pairs
+  uint target_capacity;  // wide lists that there is memory for
 };
 #endif
 
@@ -84,8 +83,8 @@ PUSH_CONSTANTS(StartTetsPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_ADVANCE)
 PUSH_CONSTANTS(AdvancePush) {
-  uint of_pairs;     // else of proposals
-  uint capacity;     // of their buffer
+  uint kind;         // of work: kWork... of counters.h
+  uint capacity;     // of its buffer
   uint most_groups;  // in one dimension of a dispatch
   uint most_items;   // of one dispatch
 };
@@ -104,8 +103,8 @@ PUSH_CONSTANTS(ClipPush) {
   uint element_base;  // the first facet of the buffers
   float residual;     // what a difference of two positions may lack in single precision; 0 in double
   uint two;           // 2: see loops_complete() of common.glsl
-  uint first_pair;    // of the range; for listed pairs: the list's first entry
-  uint pair_count;    // none (0xffffffff): as many as the counters say
+  uint first_pair;    // whose labels are wanted; or else the first entry of the list of flagged pairs
+  uint pair_count;    // whose labels are wanted
   uint proposal_capacity;
   uint flagged_capacity;  // of one list of flagged pairs
   uint cell_count;
@@ -124,8 +123,7 @@ PUSH_CONSTANTS(DoubtfulPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_GATHER_PAIRS)
 PUSH_CONSTANTS(GatherPairsPush) {
-  uint first;  // entry of the buffer of flagged pairs
-  uint count;
+  uint first_flagged;  // entry of the buffer of flagged pairs
 };
 #endif
 
@@ -146,12 +144,11 @@ namespace bisector::host {
 // bytes and takes 12.
 static_assert(sizeof(float) == sizeof(uint) && sizeof(vec3) == 3 * sizeof(float) && alignof(vec3) == alignof(float));
 static_assert(sizeof(CountPush) == 4 && sizeof(CellsPush) == 4);
-static_assert(sizeof(GridPush) == 24 && offsetof(GridPush, grid_lower) == 0 && offsetof(GridPush, grid_inverse) == 12 &&
-              offsetof(GridPush, bucket_mask) == 16 && offsetof(GridPush, seed_count) == 20);
-static_assert(sizeof(NeighboursPush) == 40 && offsetof(NeighboursPush, grid_lower) == 0 &&
-              offsetof(NeighboursPush, residual) == 24 && offsetof(NeighboursPush, target_capacity) == 36);
-static_assert(sizeof(OwnersPush) == 40 && offsetof(OwnersPush, grid_lower) == 0 &&
-              offsetof(OwnersPush, residual) == 24 && offsetof(OwnersPush, report_uncertain) == 36);
+static_assert(sizeof(BoxesPush) == 16 && offsetof(BoxesPush, vague) == 12);
+static_assert(sizeof(NeighboursPush) == 16 + 4 * kTreeLevels && offsetof(NeighboursPush, residual) == 8 &&
+              offsetof(NeighboursPush, level_begin) == 16);
+static_assert(sizeof(OwnersPush) == 24 + 4 * kTreeLevels && offsetof(OwnersPush, level_begin) == 16 &&
+              offsetof(OwnersPush, report_uncertain) == 20 + 4 * kTreeLevels);
 static_assert(sizeof(WideTargetsPush) == 8 && offsetof(WideTargetsPush, target_capacity) == 4);
 static_assert(sizeof(StartFacetsPush) == 20 && offsetof(StartFacetsPush, pair_capacity) == 16);
 static_assert(sizeof(StartSamplesPush) == 16 && offsetof(StartSamplesPush, proposal_capacity) == 12);
@@ -161,7 +158,7 @@ static_assert(sizeof(AdmitPush) == 8 && offsetof(AdmitPush, pair_capacity) == 4)
 static_assert(sizeof(ClipPush) == 32 && offsetof(ClipPush, residual) == 4 && offsetof(ClipPush, cell_count) == 28);
 static_assert(sizeof(DoubtfulPush) == 20 && offsetof(DoubtfulPush, mean_density) == 12 &&
               offsetof(DoubtfulPush, share) == 16);
-static_assert(sizeof(GatherPairsPush) == 8 && offsetof(GatherPairsPush, count) == 4);
+static_assert(sizeof(GatherPairsPush) == 4);
 static_assert(sizeof(RadixPush) == 12 && offsetof(RadixPush, shift) == 8);
 
 }  // namespace bisector::host

@@ -11,8 +11,17 @@ LAYOUT_CONSTANT uint kGroupSize = 64;  // invocations of a workgroup, of every k
 LAYOUT_CONSTANT uint kScanLane = 16;     // values that one invocation of scan_blocks.comp sums
 LAYOUT_CONSTANT uint kScanBlock = 1024;  // and one workgroup: kGroupSize * kScanLane
 
+// Seeds of a leaf of the tree of boxes, children of its other nodes, and levels that it may have, one more than any
+// number of seeds of 32 bits needs.
+LAYOUT_CONSTANT uint kTreeArity = 8;
+LAYOUT_CONSTANT uint kTreeLevels = 12;
+LAYOUT_CONSTANT uint kBoxWords = 6;  // of a node: floats, the lower corner, then the upper one
+
 // Terms that sum.comp adds in a row, by the CPU's rule of sums (voronoi/fixed_tree_sum.h).
 LAYOUT_CONSTANT uint kSumBlock = 32;
+
+// Items of a cell that rank_items.comp sorts and sum_cells.comp adds.
+LAYOUT_CONSTANT uint kMostRanked = 4096;
 
 LAYOUT_CONSTANT uint kRadixRun = 64;     // consecutive items that one invocation sorts
 LAYOUT_CONSTANT uint kRadixBits = 4;     // of the key, in one pass

@@ -27,6 +27,15 @@ DiagramSeconds& operator+=(DiagramSeconds& a, const DiagramSeconds& b) {
   return a;
 }
 
+DeviceWork& operator+=(DeviceWork& a, const DeviceWork& b) {
+  a.submits += b.submits;
+  a.dispatches += b.dispatches;
+  a.bytes_up += b.bytes_up;
+  a.bytes_down += b.bytes_down;
+  a.host_seconds += b.host_seconds;
+  return a;
+}
+
 EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   if (seeds.empty()) throw Error("there are no seeds; give at least one");
   const Want computed =
@@ -38,7 +47,8 @@ EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Di
   if (!includes(computed, Want::polyhedra)) diagram.polyhedra = {};
   if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
   else diagram.dual = {};
-  diagram.has = want | computed;
+  const bool has_triangles = diagram.moments.triangles.rows() == seeds.size();
+  diagram.has = want | computed | (has_triangles ? Want::triangles : Want::moments);
   return report;
 }
 

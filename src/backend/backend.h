@@ -13,6 +13,7 @@ namespace bisector {
 
 DeviceSeconds& operator+=(DeviceSeconds& a, const DeviceSeconds& b);
 DiagramSeconds& operator+=(DiagramSeconds& a, const DiagramSeconds& b);
+DeviceWork& operator+=(DeviceWork& a, const DeviceWork& b);
 
 // A backend holds one domain, which must outlive it: a surface, or a solid. Every backend returns the same pairs and
 // labels for the same seeds; moments agree to rounding, and runs repeat bit for bit.

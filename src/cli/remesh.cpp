@@ -217,7 +217,7 @@ Json remesh_report(Console& console, const RemeshResult& result, const QualityRe
   report["energy"] = result.energy;
   report["gradient_norm"] = result.gradient_norm;
   report["seconds"] = nullptr;
-  add_device_seconds(report, result.device, result.seconds.diagrams.device);
+  add_device(report, result.device, result.seconds.diagrams.device, result.device_work, result.evaluations);
   report["certification"] = certification_json(result.certification);
   report["quality"] = quality_json(quality);
   console.phase("measuring the distance to the input");

@@ -68,9 +68,17 @@ Json seconds_json(const DiagramSeconds& seconds) {
           {"clip", seconds.clip}};
 }
 
-void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds) {
+void add_device(Json& report, const BackendDescription& device, const DeviceSeconds& seconds, const DeviceWork& work,
+                int evaluations) {
   Json json = device_seconds_json(device, seconds);
-  if (!json.is_null()) report["device_seconds"] = std::move(json);
+  if (json.is_null()) return;
+  report["device_seconds"] = std::move(json);
+  const double n = std::max(evaluations, 1);
+  report["device_work"] = {{"submits", static_cast<double>(work.submits) / n},
+                           {"dispatches", static_cast<double>(work.dispatches) / n},
+                           {"bytes_up", static_cast<double>(work.bytes_up) / n},
+                           {"bytes_down", static_cast<double>(work.bytes_down) / n},
+                           {"host_seconds", work.host_seconds / n}};
 }
 
 Json input_json(const TriangleMesh& mesh) {

@@ -21,7 +21,8 @@ Json device_json(const BackendDescription& device);
 // Null where no device took part.
 Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds);
 Json seconds_json(const DiagramSeconds& seconds);
-void add_device_seconds(Json& report, const BackendDescription& device, const DeviceSeconds& seconds);
+void add_device(Json& report, const BackendDescription& device, const DeviceSeconds& seconds, const DeviceWork& work,
+                int evaluations);
 Json input_json(const TriangleMesh& mesh);  // faces as in the file
 Json output_json(const TriangleMesh& mesh);
 Json size_json(const TetMesh& mesh);  // faces: marked triangles

@@ -140,7 +140,7 @@ Json rvd_report(const Computed& computed, const TriangleMesh& input, const std::
   report["mass"] = computed.diagram.moments.mass;
   report["untiled"] = 0;  // a diagram that does not tile is not reported
   report["seconds"] = seconds;
-  add_device_seconds(report, computed.device, computed.evaluation.seconds.device);
+  add_device(report, computed.device, computed.evaluation.seconds.device, computed.evaluation.device_work, 1);
   report["certification"] = certification_json(computed.evaluation.certification);
   report["cells"] = cells_json(computed.diagram.moments, seeds);
   report["rdt"] = rdt_json(computed.diagram.dual);

@@ -233,7 +233,7 @@ Json tet_report(Console& console, const TetCommand& command, const TetResult& re
   report["energy"] = result.energy;
   report["gradient_norm"] = result.gradient_norm;
   report["seconds"] = nullptr;
-  add_device_seconds(report, result.device, result.seconds.diagrams.device);
+  add_device(report, result.device, result.seconds.diagrams.device, result.device_work, result.evaluations);
   report["certification"] = certification_json(result.certification);
   report["quality"] = quality_json(measures.boundary);
   add_tets(report["quality"], measures.tets);

@@ -84,18 +84,18 @@ void parallel_each(std::size_t n, const Body& body, std::size_t grain = 1024) {
   });
 }
 
-// Sum of term(i) over [0, n): blocks in order, then the blocks' sums in order.
-template <class Term>
-double fixed_sum(std::size_t n, const Term& term) {
+// Sum of term(i) over [0, n): blocks in order, then the blocks' sums in order. T is a number or has +=.
+template <class T = double, class Term>
+T fixed_sum(std::size_t n, const Term& term) {
   constexpr std::size_t kBlock = 4096;
-  std::vector<double> partial((n + kBlock - 1) / kBlock);
+  std::vector<T> partial((n + kBlock - 1) / kBlock);
   parallel_chunks(n, kBlock, [&](std::size_t c, std::size_t begin, std::size_t end) {
-    double s = 0;
+    T s{};
     for (std::size_t i = begin; i < end; ++i) s += term(i);
     partial[c] = s;
   });
-  double sum = 0;
-  for (double s : partial) sum += s;
+  T sum{};
+  for (const T& s : partial) sum += s;
   return sum;
 }
 

@@ -145,7 +145,8 @@ void Descent::hold(const CellMoments& moments, const std::vector<Vec3>& before, 
 }
 
 void Descent::measure(Iterate& iterate) const {
-  run_.evaluate(iterate.seeds.positions(), Want::moments, iterate.known);
+  const Want want = options_.constrained ? Want::triangles : Want::moments;
+  run_.evaluate(iterate.seeds.positions(), want, iterate.known);
   const CellMoments& moments = iterate.moments();
   iterate.energy = run_.covers(iterate.known.diagram) ? moments.energy : std::numeric_limits<double>::infinity();
   iterate.gradient =
@@ -169,7 +170,7 @@ void Descent::start() {
   for (int trial = 0;; ++trial) {
     run_.context().check();
     if (options_.constrained) {
-      run_.evaluate(now_.seeds.positions(), Want::moments, now_.known);
+      run_.evaluate(now_.seeds.positions(), Want::triangles, now_.known);
       now_.normals.resize(now_.seeds.size());
       hold(now_.moments(), std::vector<Vec3>(now_.seeds.positions()), now_);
     }
@@ -283,7 +284,7 @@ void optimise(CvtRun& run, const OptimiseOptions& options) {
 }
 
 CvtGradient complete(CvtRun& run, bool constrained) {
-  const Diagram& diagram = run.diagram();
+  const Diagram& diagram = run.diagram(constrained ? Want::triangles : Want::moments);
   if (constrained) {
     std::vector<Vec3> feet = run.seeds.positions();
     run.normals_.resize(feet.size());

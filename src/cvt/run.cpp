@@ -20,6 +20,7 @@ RunTotals& operator+=(RunTotals& a, const RunTotals& b) {
   a.iterations += b.iterations;
   a.evaluations += b.evaluations;
   a.seconds += b.seconds;
+  a.device_work += b.device_work;
   a.seconds_lbfgs += b.seconds_lbfgs;
   return a;
 }
@@ -69,6 +70,7 @@ void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSe
     known.strays = 0;
     ++totals.evaluations;
     totals.seconds += known.report.seconds;
+    totals.device_work += known.report.device_work;
     if (localised_) leave_out_strays(known);
   }
   if (wants_dual && !includes(known.diagram.has, Want::dual)) add_dual(known.diagram);

@@ -16,6 +16,7 @@ struct RunTotals {
   int iterations = 0;   // accepted steps of the optimiser
   int evaluations = 0;  // diagrams computed
   DiagramSeconds seconds;
+  DeviceWork device_work;
   double seconds_lbfgs = 0;  // of the optimiser outside the diagrams
 };
 

@@ -491,6 +491,7 @@ RemeshResult Pipeline::finish() {
   if (plan_.fit) fit();
   result_.iterations = run_.totals.iterations;
   result_.evaluations = run_.totals.evaluations;
+  result_.device_work = run_.totals.device_work;
   result_.energy = run_.energy;
   result_.gradient_norm = run_.gradient_norm;
   result_.certification = run_.certification();
@@ -645,6 +646,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   RemeshResult& chosen = best->result;
   chosen.iterations = before.totals.iterations;
   chosen.evaluations = before.totals.evaluations;
+  chosen.device_work = before.totals.device_work;
   chosen.seconds = before.seconds;
   chosen.seconds.prepare = preparing;
   chosen.seconds.total = watch.seconds();

@@ -480,7 +480,7 @@ class Control {
     std::vector<char> held = held_seeds();
     for (int step = 0; step < kSmoothingSteps; ++step) {
       const PlacedSeeds before = run_.seeds;
-      const CellMoments& moments = run_.diagram().moments;
+      const CellMoments& moments = run_.diagram(options_.constrained ? Want::triangles : Want::moments).moments;
       std::vector<Vec3> next = before.positions(), normals(next.size());
       for (std::size_t i = 0; i < next.size(); ++i)
         if (const Moments& m = moments.cells[i]; m.mass > 0) next[i] += (1 / m.mass) * m.first;

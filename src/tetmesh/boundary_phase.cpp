@@ -58,7 +58,7 @@ struct Split {
 };
 
 Split split_at_boundary(CvtRun& sites) {
-  const CellMoments& moments = sites.diagram().moments;
+  const CellMoments& moments = sites.diagram(Want::triangles).moments;
   const std::vector<Vec3>& free = sites.seeds.positions();
   std::vector<Vec3> feet = free, normals;
   project_to_cells(sites.surface(), moments.triangles, {}, feet, normals);
@@ -91,7 +91,8 @@ RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<S
 // Sites inside whose cells have come to the boundary join it while that has fewer than `room`; where the solid is thin,
 // all of them. True if any did.
 bool join_boundary(CvtRun& sites, double room, bool thin) {
-  const std::vector<Index> at_boundary = inner_sites_at_boundary(sites.seeds, sites.diagram().moments.triangles);
+  const Csr<Index>& triangles = sites.diagram(Want::triangles).moments.triangles;
+  const std::vector<Index> at_boundary = inner_sites_at_boundary(sites.seeds, triangles);
   const std::span<SeedPlace> places = sites.seeds.edit_places();
   const auto held =
       std::count_if(places.begin(), places.end(), [](const SeedPlace& place) { return place.kind != Kind::interior; });

@@ -98,11 +98,11 @@ void inner_phase(TetRun& run, const RemeshResult& surface, SolidBackend* stand_i
   // Most of what has to be pushed away is found there, and only the rest at the boundary itself.
   if (stand_in)
     clear_boundary(run, run.sites.surface(), cells,
-                   [&]() -> const Csr<Index>& { return run.sites.diagram().moments.triangles; });
+                   [&]() -> const Csr<Index>& { return run.sites.diagram(Want::triangles).moments.triangles; });
   run.sites.change_backend(run.solid);
   Diagram on_boundary;
   clear_boundary(run, run.boundary.surface(), cells, [&]() -> const Csr<Index>& {
-    run.boundary.evaluate(run.sites.seeds.positions(), Want::moments, on_boundary);
+    run.boundary.evaluate(run.sites.seeds.positions(), Want::triangles, on_boundary);
     return on_boundary.moments.triangles;
   });
   complete(run.sites, false);

@@ -132,6 +132,7 @@ TetResult mesh_sized(TetRun& run, StandIns& stand_ins) {
   const RunTotals& totals = run.sites.totals;
   result.iterations = totals.iterations;
   result.evaluations = totals.evaluations;
+  result.device_work = totals.device_work;
   result.energy = run.sites.energy;
   result.gradient_norm = run.sites.gradient_norm;
   result.device = run.solid.description();

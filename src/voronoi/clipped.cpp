@@ -10,6 +10,7 @@
 #include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polyhedra.h"
 #include "voronoi/step_mass.h"
+#include "voronoi/totals.h"
 
 namespace bisector {
 namespace {
@@ -297,8 +298,7 @@ DiagramWork ClippedVoronoi::Work::evaluate(const std::vector<Vec3>& given, Neigh
   if (whole) take_cells_whole(on_boundary, result, want_polyhedra);
   else walk_inner(walk_boundary(on_boundary, result, want_polyhedra), result, want_polyhedra);
   set_step_masses(seeds(), boundary.neighbours(), result);
-  result.mass = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].mass; });
-  result.energy = fixed_sum(given.size(), [&](std::size_t i) { return result.cells[i].second; });
+  set_totals(result);
   work.counts = {};
   for (std::size_t r = 0; r < round_count; ++r)
     for (const Chunk& chunk : rounds[r]) work.counts += chunk.counts;

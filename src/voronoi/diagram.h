@@ -18,7 +18,9 @@ struct CellMoments {
   std::vector<double> step_mass;
   double mass = 0;       // sum over the cells
   double energy = 0;     // sum of the second moments: the CVT energy
-  Csr<Index> triangles;  // incident triangles of each cell, of the surface or the solid's boundary, ascending
+  // Incident triangles of each cell, of the surface or the solid's boundary, ascending; where they were not wanted there
+  // may be none.
+  Csr<Index> triangles;
 };
 
 // How many pairs of a cell and a triangle or tetrahedron there are, and how many took more than the first attempt.
@@ -49,9 +51,9 @@ struct DiagramWork {
   double clip = 0;                      // clipping and sums
 };
 
-// Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it; `labels` are the
-// polygons without their vertices.
-enum class Want : unsigned { moments = 0, labels = 1, polygons = 3, polyhedra = 4, dual = 8 };
+// Parts of a diagram, as a set: Want::polygons | Want::dual. The moments are always part of it, without the incident
+// triangles unless these are wanted; `labels` are the polygons without their vertices, and come with the triangles.
+enum class Want : unsigned { moments = 0, triangles = 1, labels = 3, polygons = 7, polyhedra = 8, dual = 16 };
 
 constexpr Want operator|(Want a, Want b) {
   return static_cast<Want>(static_cast<unsigned>(a) | static_cast<unsigned>(b));

@@ -20,6 +20,7 @@
 #include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
+#include "voronoi/totals.h"
 
 namespace bisector {
 namespace {
@@ -688,8 +689,7 @@ void Localiser::Work::sum(Diagram& diagram) {
   triangles.offsets = std::move(offsets);
   complete_step_masses(
       seeds, [&]() -> const Neighbours& { return neighbours; }, moments);
-  moments.mass = fixed_sum(moments.cells.size(), [&](std::size_t i) { return moments.cells[i].mass; });
-  moments.energy = fixed_sum(moments.cells.size(), [&](std::size_t i) { return moments.cells[i].second; });
+  set_totals(moments);
 }
 
 std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, const Diagram& diagram) {

@@ -15,6 +15,7 @@
 #include "voronoi/owner.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
+#include "voronoi/totals.h"
 
 namespace bisector {
 namespace {
@@ -397,8 +398,7 @@ void RestrictedVoronoi::Work::sum_cells(std::size_t seed_count, CellMoments& res
     }
   });
   set_step_masses(seeds, neighbours, result);
-  result.mass = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].mass; });
-  result.energy = fixed_sum(seed_count, [&](std::size_t i) { return result.cells[i].second; });
+  set_totals(result);
 }
 
 // Moves the seeds of the last diagram in place if these are as many and not far off.

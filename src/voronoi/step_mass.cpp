@@ -37,20 +37,22 @@ void set_step_masses(const SortedSeeds& seeds, const Neighbours& neighbours, Cel
 void complete_step_masses(const SortedSeeds& seeds, const std::function<const Neighbours&()>& neighbours,
                           CellMoments& result) {
   const double largest = largest_mass(result);
-  const auto needs_median = [&](std::size_t i) { return result.cells[i].mass < kShare * largest; };
+  // The median is that of cells no larger than the largest.
+  const auto needs_median = [&](std::size_t i) {
+    return result.step_mass[i] < 0 && result.cells[i].mass < kShare * largest;
+  };
   const Neighbours* near = nullptr;
   for (std::size_t s = 0; !near && s < seeds.x.size(); ++s)
-    if (result.step_mass[seeds.id[s]] < 0 && needs_median(seeds.id[s])) near = &neighbours();
-  std::vector<double> step_mass(result.cells.size());
-  parallel_each(step_mass.size(), [&](std::size_t i) { step_mass[i] = result.cells[i].mass; });
+    if (needs_median(seeds.id[s])) near = &neighbours();
   parallel_each(seeds.x.size(), [&](std::size_t s) {
     const Index i = seeds.id[s];
-    if (!needs_median(i)) return;
-    const double known = result.step_mass[i];
-    const double median = known < 0 ? median_nearby(seeds, *near, static_cast<Index>(s), result) : known;
-    step_mass[i] = std::max(step_mass[i], kShare * median);
+    if (needs_median(i))
+      result.step_mass[i] =
+          std::max(result.cells[i].mass, kShare * median_nearby(seeds, *near, static_cast<Index>(s), result));
   });
-  result.step_mass = std::move(step_mass);
+  parallel_each(result.step_mass.size(), [&](std::size_t i) {
+    if (result.step_mass[i] < 0) result.step_mass[i] = result.cells[i].mass;
+  });
 }
 
 }  // namespace bisector

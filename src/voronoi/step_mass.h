@@ -11,8 +11,7 @@ namespace bisector {
 
 // Sets result.step_mass from result.cells.
 void set_step_masses(const SortedSeeds& seeds, const Neighbours& neighbours, CellMoments& result);
-// The same where result.step_mass holds the medians already, negative where they are not known; only those need
-// neighbours.
+// The same for those of result.step_mass that are negative; the others are known already.
 void complete_step_masses(const SortedSeeds& seeds, const std::function<const Neighbours&()>& neighbours,
                           CellMoments& result);
 

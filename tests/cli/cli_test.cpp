@@ -1674,6 +1674,9 @@ TEST_F(Cli, DeviceGivesTheCpusDiagram) {
   EXPECT_TRUE(pairs[0] == pairs[1]);
   for (const char* phase : {"transfer", "grid", "neighbours", "owners", "clip", "sort", "sum"})
     EXPECT_GE(reports[1]["device_seconds"].value(phase, -1.0), 0) << phase;
+  EXPECT_FALSE(reports[0].contains("device_work"));
+  for (const char* key : {"submits", "dispatches", "bytes_up", "bytes_down", "host_seconds"})
+    EXPECT_GT(reports[1]["device_work"].value(key, -1.0), 0) << key;
 }
 
 TEST_F(Cli, ADamagedPipelineCacheDoesNoHarm) {

@@ -161,9 +161,9 @@ struct FaultProblem {
   Diagram reference_first = cpu_diagram(surface, first), reference_second = cpu_diagram(surface, second);
 
   void run(Backend& backend, Results& results) const {
-    results.cold.report = backend.evaluate(first, Want::moments, results.cold);
+    results.cold.report = backend.evaluate(first, Want::triangles, results.cold);
     ++results.evaluations;
-    results.warm.report = backend.evaluate(second, Want::moments, results.warm);
+    results.warm.report = backend.evaluate(second, Want::triangles, results.warm);
     ++results.evaluations;
     results.last.report = backend.evaluate(first, Want::polygons, results.last);
     ++results.evaluations;
@@ -197,9 +197,9 @@ class EveryCall : public Faultless, public testing::WithParamInterface<Precision
     host::log_fallible_calls(&names);
     const auto backend = make(problem);
     std::vector<std::size_t> ends{names.size()};
-    results.cold = evaluated(*backend, problem.first, Want::moments);
+    results.cold = evaluated(*backend, problem.first, Want::triangles);
     ends.push_back(names.size());
-    results.warm = evaluated(*backend, problem.second, Want::moments);
+    results.warm = evaluated(*backend, problem.second, Want::triangles);
     ends.push_back(names.size());
     results.last = evaluated(*backend, problem.first, Want::polygons);
     ends.push_back(names.size());
@@ -293,9 +293,9 @@ TEST_P(EveryCall, FallsBackOnce) {
       EXPECT_TRUE(same_bits(found, fell ? cpu_has : device_has));
     };
     Results results;
-    results.cold = evaluated(backend, problem.first, Want::moments);
+    results.cold = evaluated(backend, problem.first, Want::triangles);
     expect_one(results.cold.moments, right.cold.moments, problem.reference_first.moments);
-    results.warm = evaluated(backend, problem.second, Want::moments);
+    results.warm = evaluated(backend, problem.second, Want::triangles);
     expect_one(results.warm.moments, right.warm.moments, problem.reference_second.moments);
     results.last = evaluated(backend, problem.first, Want::polygons);
     expect_same_diagram(results.last, problem.reference_first);
@@ -415,12 +415,13 @@ TEST_P(Buffers, Grow) {
       EXPECT_EQ(found.report.certification.cpu, roomy.report.certification.cpu);
     }
   };
-  const host::Capacities plenty;
-  check("table", {plenty.batch_pairs, 64, plenty.proposals, 0});
-  check("proposals", {plenty.batch_pairs, plenty.table, 64, 0});
-  check("pairs", {plenty.batch_pairs, plenty.table, plenty.proposals, 64});
-  check("batches", {100, plenty.table, plenty.proposals, 0});
-  check("all", {100, 16, 16, 16});
+  check("table", {.table = 64});
+  check("proposals", {.proposals = 64});
+  check("flagged", {.flagged = 1});
+  check("pairs", {.pairs = 64});
+  check("batches", {.batch_pairs = 100});
+  check("dispatches", {.at_once = 64});
+  check("all", {.batch_pairs = 100, .table = 16, .proposals = 16, .flagged = 1, .pairs = 16, .at_once = 64});
 }
 
 TEST_P(Buffers, FacetsComeInChunks) {
@@ -433,7 +434,7 @@ TEST_P(Buffers, FacetsComeInChunks) {
   std::unique_ptr<Device> device = Device::open(device_request().value());
   host::limit_storage_range(*device, kRange);
   VulkanOptions options = with_precision(GetParam());
-  options.capacities = {10'000, 1 << 15, 1 << 16, 0};
+  options.capacities = {.batch_pairs = 10'000};
   const auto backend = host::make_vulkan_backend(surface, std::move(device), options);
   const Diagram reference = cpu_diagram(surface, seeds);
   for (int round = 0; round < 2; ++round) expect_parity(surface, reference, diagram_of(*backend, seeds), GetParam());
@@ -450,7 +451,7 @@ TEST_P(Buffers, EndAtWhatTheDeviceBinds) {
       std::unique_ptr<Device> device = Device::open(device_request().value());
       host::limit_storage_range(*device, range);
       VulkanOptions options = with_precision(GetParam());
-      options.capacities = {10'000, 64, 64, 64};
+      options.capacities = {.batch_pairs = 10'000, .table = 64, .proposals = 64, .pairs = 64};
       const auto backend = host::make_vulkan_backend(surface, std::move(device), options);
       evaluated(*backend, seeds, Want::moments);
     });

@@ -133,11 +133,9 @@ TEST_P(SolidFaults, LeaveAsDeviceErrorOrFallBack) {
 
 TEST_P(SolidFaults, BuffersGrow) {
   SKIP_WITHOUT_DEVICE(processor_of(GetParam()));
-  const host::Capacities plenty;
-  const std::vector<host::Capacities> each{{plenty.batch_pairs, 64, plenty.proposals, 0},
-                                           {plenty.batch_pairs, plenty.table, 64, 0},
-                                           {plenty.batch_pairs, plenty.table, plenty.proposals, 64}},
-      all{{20, 16, 16, 16}};
+  const std::vector<host::Capacities> each{
+      {.table = 64}, {.proposals = 64}, {.flagged = 1}, {.pairs = 64}, {.at_once = 64}},
+      all{{.batch_pairs = 20, .table = 16, .proposals = 16, .flagged = 1, .pairs = 16, .at_once = 64}};
   for (const SolidCells how : {SolidCells::whole, SolidCells::clipped}) {
     const Evaluated roomy = evaluated(*device_backend(solid_, with_precision(GetParam()), how), seeds_);
     for (const host::Capacities& capacities : how == SolidCells::whole ? each : all) {
@@ -163,7 +161,7 @@ TEST_P(SolidFaults, BuffersEndAtWhatTheDeviceBinds) {
       std::unique_ptr<Device> device = Device::open(device_for(processor_of(GetParam())).value());
       host::limit_storage_range(*device, range);
       VulkanOptions options = with_precision(GetParam());
-      options.capacities = {1000, 64, 64, 64};
+      options.capacities = {.batch_pairs = 1000, .table = 64, .proposals = 64, .pairs = 64};
       test::evaluated(*host::make_vulkan_solid_backend(solid_, std::move(device), options), seeds_, Want::moments);
     });
     EXPECT_FALSE(has(text, "\n")) << text;
