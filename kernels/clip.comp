@@ -76,6 +76,12 @@ void main() {
     if (item >= counters[work + kEndAfter]) return;
     pair = kListed ? flagged[first_pair + item] : item;
   }
+  const bool again = kListed && (pair & kAgainInDouble) != 0;
+  if (again && kRung == kRungWide) {
+    flag(kFlaggedUncertain, pair);
+    return;
+  }
+  if (again) pair &= ~kAgainInDouble;
   const uint facet = pairs[pair].x, slot = pairs[pair].y;
   if (kLabels && status_of[pair] == kStatusEmpty) {
     labels[index * (kMostCorners + kPolygonHeader)] = 0;
@@ -110,6 +116,8 @@ void main() {
     propose(facet);
   } else if (kRung == kRungFirst && (status == kStatusShortList || status == kStatusCrowded)) {
     flag(kFlaggedShort, pair);
+  } else if (kRung == kRungDouble && status == kStatusShortList && !list_wide && !again) {
+    flag(kFlaggedShort, pair | kAgainInDouble);
   } else if (kDoubleNext && status == kStatusUnsure) {
     flag(kFlaggedUncertain, pair);
   } else if (status != kStatusEmpty) {

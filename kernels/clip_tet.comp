@@ -106,6 +106,12 @@ void main() {
     if (item >= counters[work + kEndAfter]) return;
     pair = kListed ? flagged[first_pair + item] : item;
   }
+  const bool again = kListed && (pair & kAgainInDouble) != 0;
+  if (again && kRung == kRungWide) {
+    flag(kFlaggedUncertain, pair);
+    return;
+  }
+  if (again) pair &= ~kAgainInDouble;
   const uint tet = pairs[pair].x, slot = pairs[pair].y;
   if (kLabels && (status_of[pair] == kStatusEmpty || status_of[pair] == kStatusWhole)) {
     labels[index * (kPolyhedronHeader + kMostPlanes + kMostVertices)] = 0;
@@ -152,6 +158,8 @@ void main() {
     propose_all(tet);
   } else if (kRung == kRungFirst && (status == kStatusShortList || status == kStatusCrowded)) {
     flag(kFlaggedShort, pair);
+  } else if (kRung == kRungDouble && status == kStatusShortList && !list_wide && !again) {
+    flag(kFlaggedShort, pair | kAgainInDouble);
   } else if (kDoubleNext && status == kStatusUnsure) {
     flag(kFlaggedUncertain, pair);
   } else if (status != kStatusEmpty) {

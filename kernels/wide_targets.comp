@@ -15,7 +15,7 @@ layout(std430, binding = 4) buffer Counters { uint counters[]; };
 void main() {
   const uint item = counters[kShortLists + kBeginAfter] + invocation();
   if (item >= counters[kShortLists + kEndAfter]) return;
-  const uint slot = pairs[flagged[first_flagged + item]].y;
+  const uint slot = pairs[flagged[first_flagged + item] & ~kAgainInDouble].y;
   if (atomicExchange(wide[slot], 1u) != 0) return;
   const uint at = atomicAdd(counters[kWideTargets], 1u);
   if (at < target_capacity) targets[at] = slot;

@@ -59,7 +59,7 @@ PairPass::PairPass(Device& device, bool is_double, const Capacities& capacities)
 
 // As many as one binding spans the first moments of.
 std::size_t PairPass::most_pairs() const {
-  return std::min<std::size_t>(device_.limits().storage_range / (kFirstWords * real_size()), kNone - 1);
+  return std::min<std::size_t>(device_.limits().storage_range / (kFirstWords * real_size()), kAgainInDouble - 1);
 }
 
 void PairPass::reserve(const PairJob& job) {
@@ -195,12 +195,14 @@ std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, float shar
         // What these pairs propose has been met before.
         clear_work(job, kProposals, 1);
         job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
-        climb_in_double(job, range.chunk);
+        climb(job, range.chunk);
         const Counters counters = gather_and_count(job);
         if (!for_cpu_.empty()) {
           answer(job, counters);
-        } else if (!are_left(counters, kUnsure)) {
-          const std::size_t found = counters[job.domain.double_next() ? kUnsure : kForCpu];
+        } else if (!are_left(counters, kShortLists) && !are_left(counters, kUnsure)) {
+          // Pairs that had too short a list in double precision are listed twice.
+          const std::size_t found =
+              job.domain.double_next() ? counters[kUnsure] - counters[kShortLists] : counters[kForCpu];
           refined += found;
           certification.uncertain += found;
           count_lists(counters, certification);
@@ -247,7 +249,8 @@ void PairPass::spread(const PairJob& job, std::size_t chunk, int rounds) {
   }
 }
 
-// Records the next rungs of the device for what is listed.
+// Records the next rungs of the device for what is listed. Pairs that double precision finds their lists too short for
+// are taken there again, with a wider one, when this is recorded next.
 void PairPass::climb(const PairJob& job, std::size_t chunk) {
   advance(job, kWorkShort, buffers_.flagged_capacity, at_once_);
   job.neighbours.choose_targets(job.commands, buffers_.flagged, kFlaggedShort * buffers_.flagged_capacity,

@@ -30,6 +30,9 @@ LAYOUT_CONSTANT uint kFlaggedShort = 0;      // for kRungWide
 LAYOUT_CONSTANT uint kFlaggedUncertain = 1;  // for kRungDouble
 LAYOUT_CONSTANT uint kFlaggedForCpu = 2;
 LAYOUT_CONSTANT uint kFlaggedLists = 3;
+// Of a pair in the first list or, after that, in the second: double precision found its list too short, and clips it
+// again once its cell has a wider one.
+LAYOUT_CONSTANT uint kAgainInDouble = 0x80000000u;
 
 // Moments in words of one real: mass, first moment, second moment.
 LAYOUT_CONSTANT uint kMomentWords = 5;

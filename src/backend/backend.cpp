@@ -47,8 +47,7 @@ EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Di
   if (!includes(computed, Want::polyhedra)) diagram.polyhedra = {};
   if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
   else diagram.dual = {};
-  const bool has_triangles = diagram.moments.triangles.rows() == seeds.size();
-  diagram.has = want | computed | (has_triangles ? Want::triangles : Want::moments);
+  diagram.has = want | computed;
   return report;
 }
 
