@@ -13,9 +13,9 @@ namespace bisector::host {
 namespace {
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
-// Rounds of proposals and clipping before the host looks again: at first, at most, once the lists of what climbs a rung
-// have been worked off, and once the CPU has answered.
-constexpr int kFirstRounds = 5, kMostRounds = 12, kRoundsAfterClimb = 2;
+// Before the host looks again there are rounds of proposals and clipping, then a few climbs to the next rungs, with
+// rounds after each, for what climbs makes others known, some of which climb in turn.
+constexpr int kLeastRounds = 3, kMostRounds = 8, kClimbs = 3, kRoundsAfterClimb = 2;
 // Pairs that there is memory for, in those that are expected: when it is asked for, and below which it is asked for
 // anew.
 constexpr double kCapacityMargin = 1.3, kLeastMargin = 1.1;
@@ -52,7 +52,7 @@ double batch_pairs_of(const Device& device, double asked) {
 
 PairPass::PairPass(Device& device, bool is_double, const Capacities& capacities)
     : device_(device), double_(is_double), asked_(capacities), buffers_(device, capacities), gathered_(device),
-      answers_(device), values_(device), expect_for_cpu_(32), rounds_(kFirstRounds),
+      answers_(device), values_(device), expect_for_cpu_(32), rounds_(kMostRounds),
       at_once_(capacities.at_once                         ? capacities.at_once
                : device.description().kind == "software" ? std::size_t{kNone - 1}
                                                           : kFirstAtOnce) {}
@@ -146,10 +146,12 @@ void PairPass::grow(const PairJob& job, uint overflow) {
 bool PairPass::run_batch(const PairJob& job, std::size_t batch, Certification& certification) {
   const std::size_t chunk = job.domain.chunk_of(batch);
   start(job, batch);
-  for (int rounds = std::min(rounds_ + 1, kMostRounds);;) {
+  for (int rounds = rounds_;;) {
     spread(job, chunk, rounds);
-    climb(job, chunk);
-    spread(job, chunk, kRoundsAfterClimb);
+    for (int k = 0; k < kClimbs; ++k) {
+      climb(job, chunk);
+      spread(job, chunk, kRoundsAfterClimb);
+    }
     const Counters counters = gather_and_count(job);
     if (counters[kOverflow]) {
       grow(job, counters[kOverflow]);
@@ -163,10 +165,11 @@ bool PairPass::run_batch(const PairJob& job, std::size_t batch, Certification& c
       certification.uncertain = counters[kUnsurePairs];
       count_lists(counters, certification);
       job.neighbours.wanted(counters[kWideTargets]);
-      rounds_ = static_cast<int>(counters[kRounds]);
+      rounds_ = std::clamp(static_cast<int>(counters[kRounds]) - kClimbs * kRoundsAfterClimb + 1, kLeastRounds,
+                           kMostRounds);
       return true;
     }
-    rounds = are_left(counters, kProposals) || are_left(counters, kPairs) ? kMostRounds : kRoundsAfterClimb;
+    rounds = are_left(counters, kProposals) || are_left(counters, kPairs) ? kMostRounds : 1;
   }
 }
 
@@ -180,38 +183,46 @@ void PairPass::count_lists(const Counters& counters, Certification& certificatio
 
 std::size_t PairPass::refine(const PairJob& job, const Buffer& cells, float share, Certification& certification) {
   std::size_t refined = 0;
-  for (const PairStore::Range& range : job.store.ranges)
-    // No more at once than the lists of flagged pairs hold.
-    for (std::size_t first = range.begin; first < range.end; first += buffers_.flagged_capacity) {
-      const DoubtfulPush push{word(first), word(std::min(buffers_.flagged_capacity, range.end - first)),
-                              word(buffers_.flagged_capacity), static_cast<float>(job.domain.mean_density()), share};
-      job.commands.phase(&DeviceSeconds::clip);
-      clear_lists(job);
-      job.commands.dispatch({"doubtful", {job.domain.double_next(), job.domain.is_solid()}},
-                            {reads(job.store.pairs), reads(job.store.status), reads(buffers_.cell_errors), reads(cells),
-                             updates(job.counters), updates(buffers_.flagged), reads(job.seeds.ids)},
-                            push, push.pair_count);
-      for (;;) {
-        // What these pairs propose has been met before.
-        clear_work(job, kProposals, 1);
-        job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
-        climb(job, range.chunk);
-        const Counters counters = gather_and_count(job);
-        if (!for_cpu_.empty()) {
-          answer(job, counters);
-        } else if (!are_left(counters, kShortLists) && !are_left(counters, kUnsure)) {
-          // Pairs that had too short a list in double precision are listed twice.
-          const std::size_t found =
-              job.domain.double_next() ? counters[kUnsure] - counters[kShortLists] : counters[kForCpu];
-          refined += found;
-          certification.uncertain += found;
-          count_lists(counters, certification);
-          break;
-        }
-      }
-    }
+  for (const PairStore::Range& range : job.store.ranges) refined += refine(job, range, cells, share, certification);
   job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
   return refined;
+}
+
+std::size_t PairPass::refine(const PairJob& job, const PairStore::Range& range, const Buffer& cells, float share,
+                             Certification& certification) {
+  const uint listed = job.domain.double_next() ? kUnsure : kForCpu;
+  const auto list_doubtful = [&] {
+    const DoubtfulPush push{word(range.begin), word(range.end - range.begin), word(buffers_.flagged_capacity),
+                            static_cast<float>(job.domain.mean_density()), share};
+    job.commands.phase(&DeviceSeconds::clip);
+    clear_lists(job);
+    job.commands.dispatch({"doubtful", {job.domain.double_next(), job.domain.is_solid()}},
+                          {reads(job.store.pairs), reads(job.store.status), reads(buffers_.cell_errors), reads(cells),
+                           updates(job.counters), updates(buffers_.flagged), reads(job.seeds.ids)},
+                          push, push.pair_count);
+  };
+  list_doubtful();
+  for (bool first = true;; first = false) {
+    // What these pairs propose has been met before.
+    clear_work(job, kProposals, 1);
+    job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
+    if (!first) climb(job, range.chunk);
+    else climb_in_double(job, range.chunk);
+    const Counters counters = gather_and_count(job);
+    if (counters[listed] > buffers_.flagged_capacity) {
+      buffers_.flagged_capacity = counters[listed] + counters[listed] / 4;
+      buffers_.flagged.reserve(kFlaggedLists * buffers_.flagged_capacity * kWord);
+      list_doubtful();
+    } else if (!for_cpu_.empty()) {
+      answer(job, counters);
+    } else if (!are_left(counters, kShortLists) && !are_left(counters, kUnsure)) {
+      // Pairs that had too short a list in double precision are listed twice.
+      const std::size_t found = listed == kUnsure ? counters[kUnsure] - counters[kShortLists] : counters[kForCpu];
+      certification.uncertain += found;
+      count_lists(counters, certification);
+      return found;
+    }
+  }
 }
 
 void PairPass::clear_lists(const PairJob& job) { clear_work(job, kShortLists, 3); }

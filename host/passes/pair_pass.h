@@ -120,6 +120,8 @@ class PairPass {
   std::size_t most_pairs() const;
   void reserve(const PairJob& job);
   void grow(const PairJob& job, uint overflow);
+  std::size_t refine(const PairJob& job, const PairStore::Range& range, const Buffer& cells, float share,
+                     Certification& certification);
   bool run_batch(const PairJob& job, std::size_t batch, Certification& certification);
   void start(const PairJob& job, std::size_t batch);
   void spread(const PairJob& job, std::size_t chunk, int rounds);
@@ -142,7 +144,7 @@ class PairPass {
   std::vector<GatheredPair> for_cpu_;  // that were gathered last
   std::size_t expect_for_cpu_;         // how many are downloaded before it is known how many there are
   uint unsure_in_double_ = 0;          // pairs that double precision left uncertain, as far as they are counted
-  int rounds_;                         // that the last batch took
+  int rounds_;                         // before the first climb
   std::size_t at_once_;                // pairs or proposals of one dispatch
 };
 
