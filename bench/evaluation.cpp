@@ -221,9 +221,8 @@ void run(const Options& options) {
               {}};
   if (!is_cpu(options.device.device)) {
     fmt::print("device: {}\n\n", describe_device(options.device));
-    for (const char* name :
-         {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip", "d. sort", "d. sum",
-          "host", "submits", "dispatches", "MB up", "MB down"})
+    for (const char* name : {"doubled", "cpu", "d. transfer", "d. grid", "d. neighbours", "d. owners", "d. clip",
+                             "d. sort", "d. sum", "host", "submits", "dispatches", "MB up", "MB down"})
       table.columns.push_back(name);
   }
   for (std::size_t k = 0; k < all.size(); ++k) measure(surface, options, options.seeds[k], std::move(all[k]), table);

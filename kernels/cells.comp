@@ -22,7 +22,9 @@ layout(std430, binding = 6) readonly buffer Ids { uvec4 ids[]; };
 #include "layout/push.h"
 
 bool is_empty(uint cell) { return begins[cell] == begins[cell + 1]; }
-real sum_of(uint cell, uint k) { return is_empty(cell) ? real(0.0) : sums[kMomentWords * (kBySlot ? cell : begins[cell]) + k]; }
+real sum_of(uint cell, uint k) {
+  return is_empty(cell) ? real(0.0) : sums[kMomentWords * (kBySlot ? cell : begins[cell]) + k];
+}
 
 void main() {
   const uint cell = invocation();

@@ -1,8 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // The nearest seeds of a seed in ascending distance, and a certificate: whoever is not listed lies at `radius` or more.
-// Seeds near in the order of slots come first, so that few boxes of the tree are left to open. Distances are compared in
-// single precision, and equal ones by the caller's index; those that this may have in the wrong order are sorted anew.
+// Seeds near in the order of slots come first, so that few boxes of the tree are left to open. Distances are compared
+// in single precision, and equal ones by the caller's index; those that this may have in the wrong order are sorted
+// anew.
 #include "common.glsl"
 #include "real.glsl"
 #include "points.glsl"

@@ -19,8 +19,8 @@ class Staging {
     std::byte* mapped = nullptr;
   };
 
-  // Up to `bytes`, a multiple of `unit` as `bytes` is, and at least one unit unless all that one may have is in use: then
-  // 0. A unit is at most kLargestUnit. Throws DeviceError.
+  // Up to `bytes`, a multiple of `unit` as `bytes` is, and at least one unit unless all that one may have is in use:
+  // then 0. A unit is at most kLargestUnit. Throws DeviceError.
   static constexpr std::size_t kLargestUnit = std::size_t{1} << 16;
   Span take(std::size_t bytes, std::size_t unit = 1);
   // Nothing is in use any more; the memory is kept.

@@ -25,9 +25,9 @@ uint word(std::size_t n) { return static_cast<uint>(n); }
 
 CellPass::CellPass(Device& device, bool is_double, bool is_solid)
     : device_(device), double_(is_double), solid_(is_solid), place_of_(device), by_place_(device), begins_(device),
-      cursors_(device), items_{Buffer(device), Buffer(device)}, digit_counts_(device),
-      block_begins_{Buffer(device), Buffer(device)}, sums_{Buffer(device), Buffer(device)}, sorted_places_(device),
-      cells_(device) {}
+      cursors_(device), items_{Buffer(device), Buffer(device)},
+      digit_counts_(device), block_begins_{Buffer(device), Buffer(device)}, sums_{Buffer(device), Buffer(device)},
+      sorted_places_(device), cells_(device) {}
 
 void CellPass::set_elements(Commands& commands, const std::vector<Index>& places, std::size_t count) {
   places_ = count;
@@ -123,10 +123,10 @@ void CellPass::sum(SeedStage& stage, const PairStore& store) {
   const Buffer* term_begins = &begins_;
   const Buffer* totals = &sums_[0];
   if (by_rank_) {
-    commands.dispatch(kernel("sum_cells", double_),
-                      {reads(begins_), reads(items_[sorted_]), reads(store.mass_second), reads(store.first),
-                       writes(sums_[0])},
-                      count, seeds.count());
+    commands.dispatch(
+        kernel("sum_cells", double_),
+        {reads(begins_), reads(items_[sorted_]), reads(store.mass_second), reads(store.first), writes(sums_[0])}, count,
+        seeds.count());
   } else {
     std::tie(term_begins, totals) = sum_by_blocks(stage, store);
   }
@@ -178,22 +178,21 @@ bool CellPass::read(SeedStage& stage, bool with_triangles, CellMoments& result) 
   result.step_mass.resize(n);
   const double scale = 1 / seeds.scale;
   commands.phase(&DeviceSeconds::transfer);
-  commands.download_items(
-      cells_, kCellWords * real, n, [&](const std::byte* at, std::size_t first, std::size_t count) {
-        for (std::size_t i = first; i < first + count; ++i, at += kCellWords * real) {
-          std::array<double, kCellWords> reals;
-          if (double_) {
-            std::memcpy(reals.data(), at, sizeof reals);
-          } else {
-            std::array<float, kCellWords> narrow;
-            std::memcpy(narrow.data(), at, sizeof narrow);
-            std::copy(narrow.begin(), narrow.end(), reals.begin());
-          }
-          result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[kSecondMomentAt]}, scale, solid_);
-          const double step_mass = reals[kCellStepMassAt];
-          result.step_mass[i] = step_mass < 0 ? -1 : scaled({step_mass, {}, 0}, scale, solid_).mass;
-        }
-      });
+  commands.download_items(cells_, kCellWords * real, n, [&](const std::byte* at, std::size_t first, std::size_t count) {
+    for (std::size_t i = first; i < first + count; ++i, at += kCellWords * real) {
+      std::array<double, kCellWords> reals;
+      if (double_) {
+        std::memcpy(reals.data(), at, sizeof reals);
+      } else {
+        std::array<float, kCellWords> narrow;
+        std::memcpy(narrow.data(), at, sizeof narrow);
+        std::copy(narrow.begin(), narrow.end(), reals.begin());
+      }
+      result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[kSecondMomentAt]}, scale, solid_);
+      const double step_mass = reals[kCellStepMassAt];
+      result.step_mass[i] = step_mass < 0 ? -1 : scaled({step_mass, {}, 0}, scale, solid_).mass;
+    }
+  });
   std::vector<std::uint32_t> sorted_places(with_triangles ? most_items_ : 0), begins(with_triangles ? cells + 1 : 0);
   if (with_triangles) {
     commands.download(begins_, 0, begins.data(), begins.size() * kWord);

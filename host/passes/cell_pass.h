@@ -43,10 +43,10 @@ class CellPass {
   std::size_t places_ = 0;
   Buffer place_of_, by_place_, begins_, cursors_, items_[2], digit_counts_, block_begins_[2], sums_[2], sorted_places_,
       cells_;
-  bool by_rank_ = true;            // how the pairs were sorted
-  std::size_t radix_up_to_ = 0;    // cells; of so few some had too many pairs for ranks
-  unsigned sorted_ = 0;            // which of items_
-  std::size_t most_items_ = 0;     // pairs that were sorted, empty ones among them
+  bool by_rank_ = true;          // how the pairs were sorted
+  std::size_t radix_up_to_ = 0;  // cells; of so few some had too many pairs for ranks
+  unsigned sorted_ = 0;          // which of items_
+  std::size_t most_items_ = 0;   // pairs that were sorted, empty ones among them
   std::size_t item_count_ = 0;
   std::vector<std::uint32_t> begins_of_cells_;  // of each cell's items, and the end of the last; by radix only
 };

@@ -70,12 +70,15 @@ class DeviceBackend : public Base {
     seconds.pairs = work.paired;
     seconds.clip = work.clipped;
     seconds.device = stage_.commands.take_seconds();
+    learn_speed(work.certification.pairs, seconds.device.clip);
     const CommandCounts counts = stage_.commands.take_counts();
     const double host = watch.seconds() - total(seconds.device);
     return {work.certification,
             seconds,
             {counts.submits, counts.dispatches, counts.bytes_up, counts.bytes_down, std::max(host, 0.0)}};
   }
+  // How long the device took to clip so many pairs.
+  virtual void learn_speed(std::size_t pairs, double seconds) = 0;
   // The seed stage has begun with the seeds.
   virtual DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
 

@@ -60,10 +60,9 @@ void NeighbourPass::choose_targets(Commands& commands, const Buffer& flagged, st
                                    const Buffer& pairs, const Buffer& counters) {
   commands.phase(&DeviceSeconds::neighbours);
   const WideTargetsPush push{static_cast<uint>(first_flagged), static_cast<uint>(target_capacity_)};
-  commands.dispatch_indirect(
-      {"wide_targets", {}},
-      {reads(flagged), reads(pairs), updates(is_target_), writes(targets_), updates(counters)}, push, counters,
-      (kGroups + 3 * kWorkShort) * kWord);
+  commands.dispatch_indirect({"wide_targets", {}},
+                             {reads(flagged), reads(pairs), updates(is_target_), writes(targets_), updates(counters)},
+                             push, counters, (kGroups + 3 * kWorkShort) * kWord);
 }
 
 void NeighbourPass::widen(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters) {

@@ -53,9 +53,9 @@ double batch_pairs_of(const Device& device, double asked) {
 PairPass::PairPass(Device& device, bool is_double, const Capacities& capacities)
     : device_(device), double_(is_double), asked_(capacities), buffers_(device, capacities), gathered_(device),
       answers_(device), values_(device), expect_for_cpu_(32), rounds_(kMostRounds),
-      at_once_(capacities.at_once                         ? capacities.at_once
+      at_once_(capacities.at_once                        ? capacities.at_once
                : device.description().kind == "software" ? std::size_t{kNone - 1}
-                                                          : kFirstAtOnce) {}
+                                                         : kFirstAtOnce) {}
 
 // As many as one binding spans the first moments of.
 std::size_t PairPass::most_pairs() const {
@@ -121,7 +121,7 @@ void PairPass::run(const PairJob& job, Certification& certification) {
   }
 }
 
-void PairPass::clipped(std::size_t pairs, double seconds) {
+void PairPass::learn_speed(std::size_t pairs, double seconds) {
   if (asked_.at_once || device_.description().kind == "software" || !(seconds > 0)) return;
   const double at_once = static_cast<double>(pairs) * kSecondsAtOnce / seconds;
   at_once_ = static_cast<std::size_t>(std::clamp(at_once, 65536.0, 1e9));
@@ -165,8 +165,8 @@ bool PairPass::run_batch(const PairJob& job, std::size_t batch, Certification& c
       certification.uncertain = counters[kUnsurePairs];
       count_lists(counters, certification);
       job.neighbours.wanted(counters[kWideTargets]);
-      rounds_ = std::clamp(static_cast<int>(counters[kRounds]) - kClimbs * kRoundsAfterClimb + 1, kLeastRounds,
-                           kMostRounds);
+      rounds_ =
+          std::clamp(static_cast<int>(counters[kRounds]) - kClimbs * kRoundsAfterClimb + 1, kLeastRounds, kMostRounds);
       return true;
     }
     rounds = are_left(counters, kProposals) || are_left(counters, kPairs) ? kMostRounds : 1;
@@ -323,11 +323,10 @@ Counters PairPass::gather_and_count(const PairJob& job) {
   Commands& commands = job.commands;
   const std::size_t most = std::min(buffers_.flagged_capacity, kGatheredAtOnce);
   advance(job, kWorkForCpu, buffers_.flagged_capacity, most);
-  commands.dispatch_indirect(
-      {"gather_pairs", {}},
-      {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_), reads(job.counters)},
-      GatherPairsPush{word(kFlaggedForCpu * buffers_.flagged_capacity)}, job.counters,
-      (kGroups + 3 * kWorkForCpu) * kWord);
+  commands.dispatch_indirect({"gather_pairs", {}},
+                             {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_), reads(job.counters)},
+                             GatherPairsPush{word(kFlaggedForCpu * buffers_.flagged_capacity)}, job.counters,
+                             (kGroups + 3 * kWorkForCpu) * kWord);
   Counters counters{};
   for_cpu_.resize(std::min(expect_for_cpu_, most));
   commands.download(job.counters, 0, counters.data(), sizeof counters);

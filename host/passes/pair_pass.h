@@ -105,7 +105,7 @@ class PairPass {
   // Finds all pairs. Counts in `certification` what climbed which rung.
   void run(const PairJob& job, Certification& certification);
   // How long the device took to clip so many pairs: dispatches follow that, lest a desktop's watchdog ends them.
-  void clipped(std::size_t pairs, double seconds);
+  void learn_speed(std::size_t pairs, double seconds);
   // In single precision: takes the pairs of cells whose masses are not certain enough to the next rungs. `cells` are
   // those of CellPass, `share` the part that is allowed of the errors that usually are. Returns how many pairs there
   // were.

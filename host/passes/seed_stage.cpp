@@ -30,8 +30,8 @@ Precisions choose_precisions(const Device& device, Precision asked, bool double_
 
 SeedStage::SeedStage(std::shared_ptr<Device> opened, const Precisions& precisions, NeighbourSource source, double scale,
                      const Box& box, bool in_solid)
-    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung),
-      source_(source), box_(box), commands(*device_), scan(*device_), counters(*device_), seeds(*device_),
+    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung), source_(source),
+      box_(box), commands(*device_), scan(*device_), counters(*device_), seeds(*device_),
       neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists), exact(in_solid) {
   counters.reserve(kCounters * sizeof(std::uint32_t));
   seeds.scale = scale;
@@ -119,10 +119,10 @@ void SeedStage::upload_seeds() {
                         });
   if (!order_uploaded_) commands.upload(seeds.order, 0, seeds.all_ids().data(), n * sizeof(Index));
   order_uploaded_ = true;
-  commands.dispatch(kernel("place_seeds", as_doubles, {double_rung_}),
-                    {reads(seeds.given), reads(seeds.order), writes(seeds.words), writes(seeds.doubles),
-                     writes(seeds.ids)},
-                    CountPush{static_cast<uint>(n)}, n);
+  commands.dispatch(
+      kernel("place_seeds", as_doubles, {double_rung_}),
+      {reads(seeds.given), reads(seeds.order), writes(seeds.words), writes(seeds.doubles), writes(seeds.ids)},
+      CountPush{static_cast<uint>(n)}, n);
 }
 
 Counters SeedStage::run_counted() {

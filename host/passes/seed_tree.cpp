@@ -31,7 +31,8 @@ void SeedTree::record(Commands& commands, const DeviceSeeds& seeds, bool is_doub
     const uint first = leaves ? 0 : level_begin_[level - 1];
     const uint count = leaves ? static_cast<uint>(seeds.count()) : level_begin_[level] - first;
     commands.dispatch(kernel("boxes", is_double, {leaves}), {reads(seeds.words), updates(boxes_)},
-                      BoxesPush{first, count, level_begin_[level], vague}, level_begin_[level + 1] - level_begin_[level]);
+                      BoxesPush{first, count, level_begin_[level], vague},
+                      level_begin_[level + 1] - level_begin_[level]);
   }
 }
 

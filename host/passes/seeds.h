@@ -11,13 +11,12 @@ namespace bisector::host {
 
 class DeviceSeeds {
  public:
-  explicit DeviceSeeds(Device& device)
-      : given(device), order(device), words(device), doubles(device), ids(device) {}
+  explicit DeviceSeeds(Device& device) : given(device), order(device), words(device), doubles(device), ids(device) {}
 
   // Takes seeds into slots in a spatial order. They must stay where they are until the next call.
   void sort(const std::vector<Vec3>& seeds);
-  // Takes seeds that keep the slots of the last ones. False if they are not as many, or slots are in no spatial order any
-  // more: then they have to be sorted.
+  // Takes seeds that keep the slots of the last ones. False if they are not as many, or slots are in no spatial order
+  // any more: then they have to be sorted.
   bool follow(const std::vector<Vec3>& seeds);
 
   // How many slots there are, and how many seeds, of which some may be equal.

@@ -21,13 +21,13 @@ class SurfaceStage {
     polygon_pass_.run(pairs_, job(), domain_, with_vertices, polygons);
   }
 
+  void learn_speed(std::size_t pairs, double seconds) { pairs_.learn_speed(pairs, seconds); }
+
   const PairStore& store() const { return store_; }
 
  private:
   void record_owners();
-  PairJob job() {
-    return {seeds_.commands, seeds_.seeds, seeds_.neighbours, seeds_.counters, store_, domain_};
-  }
+  PairJob job() { return {seeds_.commands, seeds_.seeds, seeds_.neighbours, seeds_.counters, store_, domain_}; }
 
   SeedStage& seeds_;
   const Surface& surface_;

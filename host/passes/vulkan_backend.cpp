@@ -16,6 +16,7 @@ class VulkanBackend : public DeviceBackend<Backend, CpuBackend> {
 
  private:
   DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  void learn_speed(std::size_t pairs, double seconds) override { pairs_.learn_speed(pairs, seconds); }
   void find_moments(bool with_triangles, CellMoments& moments, Certification& certification);
 
   SurfaceStage pairs_;

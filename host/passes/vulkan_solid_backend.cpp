@@ -31,15 +31,17 @@ class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
 
  private:
   DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  void learn_speed(std::size_t pairs, double seconds) override {
+    shell_.learn_speed(pairs, seconds);
+    pairs_.learn_speed(pairs, seconds);
+  }
   void find_owners(const std::vector<Vec3>& seeds);
   void find_pairs(Certification& certification);
   void list_triangles(Csr<Index>& triangles);
   void find_moments(CellMoments& moments, Certification& certification);
   void add_boundary(CellMoments& moments);
   void append_boundary(ClippedPolyhedra& polyhedra);
-  PairJob job() {
-    return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.counters, store_, tets_};
-  }
+  PairJob job() { return {stage_.commands, stage_.seeds, stage_.neighbours, stage_.counters, store_, tets_}; }
 
   const bool whole_;  // cells are not cut up
   // The solid's boundary.

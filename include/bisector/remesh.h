@@ -152,7 +152,7 @@ struct RemeshResult {
   FitReport fitted;
   int iterations = 0;  // accepted steps, all levels
   int evaluations = 0;
-  DeviceWork device_work;  // of these, summed
+  DeviceWork device_work;       // of these, summed
   double energy = 0;            // CVT energy of the final seeds
   double gradient_norm = 0;     // Euclidean norm over all seeds (tangential where constrained)
   Certification certification;  // of the final diagram

@@ -92,7 +92,7 @@ struct TetResult {
   int iterations = 0;              // accepted steps, all phases
   int evaluations = 0;
   DeviceWork device_work;  // of these, summed
-  double energy = 0;  // CVT energy of the final seeds, before slivers were removed
+  double energy = 0;       // CVT energy of the final seeds, before slivers were removed
   double gradient_norm = 0;
   Certification certification;  // of the final diagram
   std::size_t untiled =

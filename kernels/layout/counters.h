@@ -54,6 +54,6 @@ static_assert(kPairs == kWorkWords * kWorkPairs && kShortLists == kWorkWords * k
               kWideTargets == kWorkWords * kWorkTargets && kGroups == kWorkWords * kWorkKinds &&
               kOverflow == kGroups + 3 * kWorkKinds);
 using Counters = std::array<std::uint32_t, kCounters>;
-}
+}  // namespace bisector::host
 #endif
 #endif

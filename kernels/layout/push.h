@@ -19,11 +19,11 @@ PUSH_CONSTANTS(CellsPush) { uint cell_count; };
 #endif
 
 // The tree of boxes over the seeds, by which all kernels that look for seeds find them (seed_tree.glsl).
-#define TREE_PUSH_CONSTANTS                                                                     \
-  uint seed_count;                                                                              \
-  uint top_level;       /* the level of one box around all seeds */                             \
-  float residual;       /* what a difference of two positions may lack in single precision */   \
-  uint two;             /* 2: see loops_complete() of common.glsl */                            \
+#define TREE_PUSH_CONSTANTS                                                                            \
+  uint seed_count;                                                                                     \
+  uint top_level;                /* the level of one box around all seeds */                           \
+  float residual;                /* what a difference of two positions may lack in single precision */ \
+  uint two;                      /* 2: see loops_complete() of common.glsl */                          \
   uint level_begin[kTreeLevels]; /* the first node of each level, the leaves' being level 0 */
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_BOXES)

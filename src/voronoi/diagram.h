@@ -16,10 +16,10 @@ struct CellMoments {
   // The mass, or a quarter of the median mass of the six nearest seeds where that is more: a scale for steps that does
   // not vanish with the cell.
   std::vector<double> step_mass;
-  double mass = 0;       // sum over the cells
-  double energy = 0;     // sum of the second moments: the CVT energy
-  // Incident triangles of each cell, of the surface or the solid's boundary, ascending; where they were not wanted there
-  // may be none.
+  double mass = 0;    // sum over the cells
+  double energy = 0;  // sum of the second moments: the CVT energy
+  // Incident triangles of each cell, of the surface or the solid's boundary, ascending; where they were not wanted
+  // there may be none.
   Csr<Index> triangles;
 };
 

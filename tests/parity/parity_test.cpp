@@ -323,6 +323,71 @@ TEST_P(Parities, DegenerateDiagramsAreTheCpus) {
   }
 }
 
+// Seeds whose spacing varies by a factor of 30 over the surface.
+std::vector<Vec3> graded_seeds(const TriangleMesh& mesh, std::size_t count) {
+  const Box box = bounding_box(mesh.vertices);
+  const Vec3 d = box.hi - box.lo;
+  SplitMix64 random(18);
+  std::vector<Vec3> seeds;
+  for (std::uint64_t round = 19; seeds.size() < count; ++round)
+    for (const Vec3& x : random_seeds(mesh, 20 * count, round)) {
+      // The number of seeds per area goes with the square of the spacing.
+      const double spacing = std::pow(30.0, dot(x - box.lo, d) / norm2(d));
+      if (seeds.size() < count && random.range(0, 1) < 1 / (spacing * spacing)) seeds.push_back(x);
+    }
+  return seeds;
+}
+
+// A patch of a hundredth of the area with seeds ten times as close together.
+std::vector<Vec3> patched_seeds(const TriangleMesh& mesh, std::size_t count) {
+  std::vector<Vec3> seeds = random_seeds(mesh, count, 20), dense = random_seeds(mesh, 100 * count, 21);
+  const Vec3 centre = mesh.vertices[mesh.triangles[0][0]];
+  std::nth_element(dense.begin(), dense.begin() + static_cast<std::ptrdiff_t>(count), dense.end(),
+                   [&](const Vec3& a, const Vec3& b) { return norm2(a - centre) < norm2(b - centre); });
+  seeds.insert(seeds.end(), dense.begin(), dense.begin() + static_cast<std::ptrdiff_t>(count));
+  return seeds;
+}
+
+// However seeds are spread, hardly any pair is left to the CPU.
+TEST_P(Parities, GradedSeedsStayOnTheDevice) {
+  if (GetParam().processor == Processor::cpu || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
+  SKIP_WITHOUT_DEVICE(GetParam().processor);
+  const TriangleMesh mesh = torus(60, 40);
+  const Surface surface(mesh);
+  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  for (const std::vector<Vec3>& seeds : {graded_seeds(mesh, 10'000), patched_seeds(mesh, 5'000)}) {
+    const Evaluated found = diagram_of(*backend, seeds);
+    expect_parity(surface, test::diagram_of(surface, seeds, NeighbourSource::nearest), found, GetParam().processor);
+    const Certification& certification = found.report.certification;
+    EXPECT_LE(certification.cpu, certification.pairs / 2000);
+  }
+}
+
+// A device waits for the host and the host for it a few times only, and however many the seeds are.
+TEST_P(Parities, AnEvaluationTakesFewSubmissions) {
+  if (GetParam().processor == Processor::cpu || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
+  SKIP_WITHOUT_DEVICE(GetParam().processor);
+  const TriangleMesh mesh = icosphere(6);
+  const Surface surface(mesh);
+  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  std::vector<std::size_t> counts{10'000, 100'000};
+  if (GetParam().processor == Processor::double_) counts.push_back(1'000'000);
+  for (const std::size_t count : counts) {
+    SCOPED_TRACE(count);
+    std::vector<Vec3> seeds = random_seeds(mesh, count, 22);
+    Diagram diagram;
+    backend->evaluate(seeds, Want::moments, diagram);
+    for (Vec3& x : seeds) x *= 1.0001;
+    const DeviceWork work = backend->evaluate(seeds, Want::moments, diagram).device_work;
+    EXPECT_GE(work.submits, 1u);
+    EXPECT_LE(work.submits, 8u);
+    EXPECT_LE(work.dispatches, 120u);
+    // Positions up, and of each cell its moments and a mass down, with what a few counters and lists take.
+    EXPECT_LE(work.bytes_up, 24 * count + 100'000);
+    EXPECT_LE(work.bytes_down, 48 * count + 100'000);
+  }
+}
+
 // Seeds that move as they do from step to step, then more and fewer of them.
 TEST_P(Parities, WhatIsKeptBetweenDiagramsDoesNotShow) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
