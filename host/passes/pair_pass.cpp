@@ -92,13 +92,20 @@ void PairPass::reserve(const PairJob& job) {
   room(buffers_.table_size, asked_.table, kTablePerPair);
   buffers_.table_size = std::bit_ceil(buffers_.table_size);
   room(buffers_.flagged_capacity, asked_.flagged, kFlaggedPerPair);
+  reserve_flagged();
   buffers_.proposals.reserve(buffers_.proposal_capacity * sizeof(PairName));
   buffers_.table.reserve(buffers_.table_size * kWord);
-  buffers_.flagged.reserve(kFlaggedLists * buffers_.flagged_capacity * kWord);
   buffers_.no_labels.reserve(kWord);
   buffers_.cell_errors.reserve(error_bytes(job));
-  gathered_.reserve(std::min(buffers_.flagged_capacity, kGatheredAtOnce) * sizeof(GatheredPair));
 }
+
+// Memory for as many flagged pairs as there is to be room for, and for those of them that are gathered for the CPU.
+void PairPass::reserve_flagged() {
+  buffers_.flagged.reserve(kFlaggedLists * buffers_.flagged_capacity * kWord);
+  gathered_.reserve(most_gathered() * sizeof(GatheredPair));
+}
+
+std::size_t PairPass::most_gathered() const { return std::min(buffers_.flagged_capacity, kGatheredAtOnce); }
 
 void PairPass::run(const PairJob& job, Certification& certification) {
   for (;;) {
@@ -211,7 +218,7 @@ std::size_t PairPass::refine(const PairJob& job, const PairStore::Range& range, 
     const Counters counters = gather_and_count(job);
     if (counters[listed] > buffers_.flagged_capacity) {
       buffers_.flagged_capacity = counters[listed] + counters[listed] / 4;
-      buffers_.flagged.reserve(kFlaggedLists * buffers_.flagged_capacity * kWord);
+      reserve_flagged();
       list_doubtful();
     } else if (!for_cpu_.empty()) {
       answer(job, counters);
@@ -321,7 +328,7 @@ std::vector<Index> PairPass::marks(const PairJob& job) {
 // that a few take no further wait.
 Counters PairPass::gather_and_count(const PairJob& job) {
   Commands& commands = job.commands;
-  const std::size_t most = std::min(buffers_.flagged_capacity, kGatheredAtOnce);
+  const std::size_t most = most_gathered();
   advance(job, kWorkForCpu, buffers_.flagged_capacity, most);
   commands.dispatch_indirect({"gather_pairs", {}},
                              {reads(buffers_.flagged), reads(job.store.pairs), writes(gathered_), reads(job.counters)},

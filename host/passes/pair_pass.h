@@ -119,6 +119,8 @@ class PairPass {
   std::size_t real_size() const { return double_ ? sizeof(double) : sizeof(float); }
   std::size_t most_pairs() const;
   void reserve(const PairJob& job);
+  void reserve_flagged();
+  std::size_t most_gathered() const;
   void grow(const PairJob& job, uint overflow);
   std::size_t refine(const PairJob& job, const PairStore::Range& range, const Buffer& cells, float share,
                      Certification& certification);
