@@ -19,6 +19,7 @@ namespace {
 using Stage = vk::PipelineStageFlagBits;
 using AccessBit = vk::AccessFlagBits;
 
+constexpr std::size_t kItemChunk = 1024;             // items that one task packs or unpacks
 constexpr std::uint64_t kTimeout = 600'000'000'000;  // nanoseconds
 
 void check_range(const Buffer& buffer, std::size_t offset, std::size_t bytes) {
@@ -43,17 +44,6 @@ struct Commands::Impl {
         fence(device.attempt("vkCreateFence", [&] { return vk::raii::Fence(device.device, vk::FenceCreateInfo()); })),
         staging(device), descriptors(device), timestamps(device) {}
 
-  struct Readback {
-    const std::byte* from;
-    void* to;
-    std::size_t bytes;
-  };
-  struct ItemReadback {
-    const std::byte* from;
-    std::size_t item_bytes, first, count;
-    ReadItems read;
-  };
-
   Device::Impl& device;
   vk::raii::CommandPool pool;
   vk::raii::CommandBuffer commands;
@@ -62,9 +52,8 @@ struct Commands::Impl {
   Descriptors descriptors;
   Timestamps timestamps;
   Hazards hazards;
-  std::vector<Readback> readbacks;
-  std::vector<ItemReadback> item_readbacks;
-  CommandCounts counts;
+  std::vector<std::function<void()>> readbacks;  // to be called once the commands have run
+  DeviceWork work;
   Phase phase = &DeviceSeconds::transfer;
   bool recording = false;
 
@@ -86,7 +75,7 @@ struct Commands::Impl {
   }
 
   // Staging memory; what was recorded is run first if there is none left.
-  Staging::Span stage(std::size_t bytes, std::size_t unit = 1) {
+  Staging::Span stage(std::size_t bytes, std::size_t unit) {
     Staging::Span span = staging.take(bytes, unit);
     if (!span.bytes) {
       submit();
@@ -95,16 +84,34 @@ struct Commands::Impl {
     return span;
   }
 
+  // Records the transfer of up to `bytes` from staging memory, which the caller fills, and the other way.
+  Staging::Span copy_up(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::size_t unit) {
+    const Staging::Span span = stage(bytes, unit);
+    use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+    prepare();
+    commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer, vk::BufferCopy(span.offset, offset, span.bytes));
+    work.bytes_up += span.bytes;
+    return span;
+  }
+  Staging::Span copy_down(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::size_t unit) {
+    const Staging::Span span = stage(bytes, unit);
+    use(buffer, Stage::eTransfer, AccessBit::eTransferRead, {});
+    prepare();
+    commands.copyBuffer(*buffer.impl().allocation.buffer, span.buffer, vk::BufferCopy(offset, span.offset, span.bytes));
+    work.bytes_down += span.bytes;
+    return span;
+  }
+
   void submit() {
     if (!recording) return;
-    if (!readbacks.empty() || !item_readbacks.empty()) {
+    if (!readbacks.empty()) {
       commands.pipelineBarrier(Stage::eTransfer, Stage::eHost, {},
                                vk::MemoryBarrier(AccessBit::eTransferWrite, AccessBit::eHostRead), {}, {});
     }
     timestamps.finish(commands);
     device.attempt("vkEndCommandBuffer", [&] { commands.end(); });
     recording = false;
-    ++counts.submits;
+    ++work.submits;
     try {
       device.attempt("vkQueueSubmit", [&] { device.queue.submit(vk::SubmitInfo({}, {}, *commands), *fence); });
       const vk::Result result =
@@ -117,14 +124,8 @@ struct Commands::Impl {
       throw;
     }
     timestamps.collect();
-    for (const Readback& readback : readbacks) std::memcpy(readback.to, readback.from, readback.bytes);
+    for (const std::function<void()>& read : readbacks) read();
     readbacks.clear();
-    for (const ItemReadback& readback : item_readbacks) {
-      parallel_chunks(readback.count, kItemChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-        readback.read(readback.from + begin * readback.item_bytes, readback.first + begin, end - begin);
-      });
-    }
-    item_readbacks.clear();
     hazards.reset();
     descriptors.reset();
     staging.reset();
@@ -170,33 +171,21 @@ void Commands::phase(Phase phase) { impl_->phase = phase; }
 void Commands::upload(const Buffer& buffer, std::size_t offset, const void* data, std::size_t bytes) {
   check_range(buffer, offset, bytes);
   const std::byte* from = static_cast<const std::byte*>(data);
-  while (bytes) {
-    const Staging::Span span = impl_->stage(bytes);
-    std::memcpy(span.mapped, from, span.bytes);
-    impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
-    impl_->prepare();
-    impl_->commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer,
-                               vk::BufferCopy(span.offset, offset, span.bytes));
-    impl_->counts.bytes_up += span.bytes;
-    from += span.bytes;
-    offset += span.bytes;
-    bytes -= span.bytes;
+  for (std::size_t done = 0; done < bytes;) {
+    const Staging::Span span = impl_->copy_up(buffer, offset + done, bytes - done, 1);
+    std::memcpy(span.mapped, from + done, span.bytes);
+    done += span.bytes;
   }
 }
 
 void Commands::upload_items(const Buffer& buffer, std::size_t item_bytes, std::size_t count, const WriteItems& write) {
   check_range(buffer, 0, item_bytes * count);
   for (std::size_t first = 0; first < count;) {
-    const Staging::Span span = impl_->stage((count - first) * item_bytes, item_bytes);
+    const Staging::Span span = impl_->copy_up(buffer, first * item_bytes, (count - first) * item_bytes, item_bytes);
     const std::size_t items = span.bytes / item_bytes;
     parallel_chunks(items, kItemChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
       write(span.mapped + begin * item_bytes, first + begin, end - begin);
     });
-    impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
-    impl_->prepare();
-    impl_->commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer,
-                               vk::BufferCopy(span.offset, first * item_bytes, span.bytes));
-    impl_->counts.bytes_up += span.bytes;
     first += items;
   }
 }
@@ -204,33 +193,23 @@ void Commands::upload_items(const Buffer& buffer, std::size_t item_bytes, std::s
 void Commands::download(const Buffer& buffer, std::size_t offset, void* to, std::size_t bytes) {
   check_range(buffer, offset, bytes);
   std::byte* target = static_cast<std::byte*>(to);
-  while (bytes) {
-    const Staging::Span span = impl_->stage(bytes);
-    impl_->use(buffer, Stage::eTransfer, AccessBit::eTransferRead, {});
-    impl_->prepare();
-    impl_->commands.copyBuffer(*buffer.impl().allocation.buffer, span.buffer,
-                               vk::BufferCopy(offset, span.offset, span.bytes));
-    impl_->readbacks.push_back({span.mapped, target, span.bytes});
-    impl_->counts.bytes_down += span.bytes;
-    target += span.bytes;
-    offset += span.bytes;
-    bytes -= span.bytes;
+  for (std::size_t done = 0; done < bytes;) {
+    const Staging::Span span = impl_->copy_down(buffer, offset + done, bytes - done, 1);
+    impl_->readbacks.push_back([=] { std::memcpy(target + done, span.mapped, span.bytes); });
+    done += span.bytes;
   }
 }
 
 void Commands::download_items(const Buffer& buffer, std::size_t item_bytes, std::size_t count, ReadItems read) {
   check_range(buffer, 0, item_bytes * count);
   for (std::size_t first = 0; first < count;) {
-    // Whole chunks, but for the last.
-    const std::size_t bytes = (count - first) * item_bytes, chunk = std::min(bytes, kItemChunk * item_bytes);
-    Staging::Span span = impl_->stage(bytes, chunk);
+    const Staging::Span span = impl_->copy_down(buffer, first * item_bytes, (count - first) * item_bytes, item_bytes);
     const std::size_t items = span.bytes / item_bytes;
-    impl_->use(buffer, Stage::eTransfer, AccessBit::eTransferRead, {});
-    impl_->prepare();
-    impl_->commands.copyBuffer(*buffer.impl().allocation.buffer, span.buffer,
-                               vk::BufferCopy(first * item_bytes, span.offset, span.bytes));
-    impl_->item_readbacks.push_back({span.mapped, item_bytes, first, items, read});
-    impl_->counts.bytes_down += span.bytes;
+    impl_->readbacks.push_back([=] {
+      parallel_chunks(items, kItemChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+        read(span.mapped + begin * item_bytes, first + begin, end - begin);
+      });
+    });
     first += items;
   }
 }
@@ -266,7 +245,7 @@ void Commands::dispatch(const Kernel& kernel, std::initializer_list<Binding> bin
   if (y > most) throw std::logic_error("kernel " + kernel.name + " has too many items");
   impl_->bind(kernel, bindings, push, push_bytes);
   impl_->commands.dispatch(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), 1);
-  ++impl_->counts.dispatches;
+  ++impl_->work.dispatches;
 }
 
 void Commands::dispatch_indirect(const Kernel& kernel, std::initializer_list<Binding> bindings, const void* push,
@@ -275,13 +254,13 @@ void Commands::dispatch_indirect(const Kernel& kernel, std::initializer_list<Bin
   impl_->use(arguments, Stage::eDrawIndirect, AccessBit::eIndirectCommandRead, {});
   impl_->bind(kernel, bindings, push, push_bytes);
   impl_->commands.dispatchIndirect(*arguments.impl().allocation.buffer, offset);
-  ++impl_->counts.dispatches;
+  ++impl_->work.dispatches;
 }
 
 void Commands::run() { impl_->submit(); }
 
 DeviceSeconds Commands::take_seconds() { return impl_->timestamps.take(); }
 
-CommandCounts Commands::take_counts() { return std::exchange(impl_->counts, {}); }
+DeviceWork Commands::take_work() { return std::exchange(impl_->work, {}); }
 
 }  // namespace bisector::host

@@ -37,12 +37,6 @@ inline Binding updates(const Buffer& buffer) { return {&buffer, Access::update};
 // What device time is counted for: one of the fields of DeviceSeconds.
 using Phase = double DeviceSeconds::*;
 
-// What recorded commands came to.
-struct CommandCounts {
-  std::size_t submits = 0, dispatches = 0;
-  std::size_t bytes_up = 0, bytes_down = 0;
-};
-
 // Sets, or reads, the bytes of items [first, first + count), which lie at `at`. Called for several ranges at once, from
 // any thread.
 using WriteItems = std::function<void(std::byte* at, std::size_t first, std::size_t count)>;
@@ -64,8 +58,7 @@ class Commands {
   // The bytes are at `to` when run() has returned.
   void download(const Buffer& buffer, std::size_t offset, void* to, std::size_t bytes);
   // The same for the first `count` items, which `read` takes from where the device puts them; it is called in run(), or
-  // before, and ranges of items that begin at a multiple of kItemChunk stay whole up to the next.
-  static constexpr std::size_t kItemChunk = 1024;
+  // before.
   void download_items(const Buffer& buffer, std::size_t item_bytes, std::size_t count, ReadItems read);
   void copy(const Buffer& from, std::size_t from_offset, const Buffer& to, std::size_t to_offset, std::size_t bytes);
   // offset and bytes are multiples of 4.
@@ -92,8 +85,8 @@ class Commands {
 
   // Seconds on the device by phase, over all runs since the last call, which it clears. All 0 without timestamps.
   DeviceSeconds take_seconds();
-  // What all runs since the last call came to, which it clears.
-  CommandCounts take_counts();
+  // What all runs since the last call came to, which it clears, but for the host's seconds.
+  DeviceWork take_work();
 
  private:
   void dispatch(const Kernel&, std::initializer_list<Binding>, const void* push, std::size_t push_bytes,

@@ -71,11 +71,9 @@ class DeviceBackend : public Base {
     seconds.clip = work.clipped;
     seconds.device = stage_.commands.take_seconds();
     learn_speed(work.certification.pairs, seconds.device.clip);
-    const CommandCounts counts = stage_.commands.take_counts();
-    const double host = watch.seconds() - total(seconds.device);
-    return {work.certification,
-            seconds,
-            {counts.submits, counts.dispatches, counts.bytes_up, counts.bytes_down, std::max(host, 0.0)}};
+    DeviceWork device_work = stage_.commands.take_work();
+    device_work.host_seconds = std::max(watch.seconds() - total(seconds.device), 0.0);
+    return {work.certification, seconds, device_work};
   }
   // How long the device took to clip so many pairs.
   virtual void learn_speed(std::size_t pairs, double seconds) = 0;

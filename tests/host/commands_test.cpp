@@ -1,5 +1,7 @@
 // Buffers, transfers, dispatches and their order.
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <numeric>
 #include <stdexcept>
 
@@ -80,6 +82,38 @@ TEST_F(CommandsTest, LargeTransfersRoundTrip) {
     commands.run();
     EXPECT_TRUE(result == values);
     std::ranges::fill(result, 0);
+  }
+}
+
+// Items of 12 bytes, which do not fill the chunks of staging memory evenly, packed and unpacked where they lie.
+TEST_F(CommandsTest, ItemsRoundTrip) {
+  constexpr std::size_t kItem = 12;
+  for (const std::size_t count : {std::size_t{1}, std::size_t{1025}, std::size_t{100'003}, std::size_t{9'000'001}}) {
+    SCOPED_TRACE(count);
+    Commands commands(*device);
+    Buffer buffer(*device);
+    buffer.reserve(count * kItem);
+    commands.upload_items(buffer, kItem, count, [](std::byte* at, std::size_t first, std::size_t items) {
+      for (std::size_t i = first; i < first + items; ++i, at += kItem) {
+        const std::array<std::uint32_t, 3> words{static_cast<std::uint32_t>(i), 1, static_cast<std::uint32_t>(~i)};
+        std::memcpy(at, words.data(), kItem);
+      }
+    });
+    std::vector<char> right(count, 0);
+    commands.download_items(buffer, kItem, count, [&](const std::byte* at, std::size_t first, std::size_t items) {
+      for (std::size_t i = first; i < first + items; ++i, at += kItem) {
+        std::array<std::uint32_t, 3> words{};
+        std::memcpy(words.data(), at, kItem);
+        right[i] = words[0] == i && words[1] == 1 && words[2] == static_cast<std::uint32_t>(~i);
+      }
+    });
+    commands.run();
+    EXPECT_EQ(std::count(right.begin(), right.end(), 1), static_cast<std::ptrdiff_t>(count));
+    const DeviceWork work = commands.take_work();
+    EXPECT_GE(work.submits, 1u);
+    EXPECT_EQ(work.bytes_up, count * kItem);
+    EXPECT_EQ(work.bytes_down, count * kItem);
+    EXPECT_EQ(commands.take_work().submits, 0u);
   }
 }
 
