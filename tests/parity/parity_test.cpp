@@ -352,6 +352,23 @@ TEST_P(Parities, GradedSeedsStayOnTheDevice) {
   EXPECT_LE(certification.cpu, certification.pairs / 2000);
 }
 
+// One cell of thousands of triangles among many of few: its pairs are too many to be ranked, and all are sorted by
+// radix then, at once the next time.
+TEST_P(Parities, ACellMayOwnThousandsOfTriangles) {
+  SKIP_WITHOUT_DEVICE(GetParam().processor);
+  const TriangleMesh mesh = icosphere(5);
+  const Surface surface(mesh);
+  std::vector<Vec3> seeds = random_seeds(mesh, 20'000, 23);
+  std::erase_if(seeds, [](const Vec3& x) { return x.z < 0.7; });
+  seeds.push_back({0, 0, -1});
+  const Diagram reference = test::diagram_of(surface, seeds, NeighbourSource::nearest);
+  ASSERT_GT(reference.moments.triangles.size(seeds.size() - 1), 4096u);
+  ASSERT_LT(reference.moments.triangles.values.size(), 64 * seeds.size());
+  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  for (int round = 0; round < 2; ++round)
+    expect_parity(surface, reference, diagram_of(*backend, seeds), GetParam().processor);
+}
+
 // A device waits for the host and the host for it a few times only, and however many the seeds are.
 TEST_P(Parities, AnEvaluationTakesFewSubmissions) {
   if (GetParam().processor == Processor::cpu || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
