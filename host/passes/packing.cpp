@@ -21,7 +21,7 @@ void RealWords::vector(const Vec3& v) {
 void RealWords::point(const Vec3& p) {
   vector(p);
   if (double_) return;
-  for (int k = 0; k < 3; ++k) number(p[k] - static_cast<double>(static_cast<float>(p[k])));
+  for (int k = 0; k < 3; ++k) number(static_cast<double>(split(p[k])[1]));
 }
 
 void RealWords::moments(const Moments& m) {

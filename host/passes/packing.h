@@ -1,6 +1,7 @@
 // How positions and moments lie in device buffers: twins of kernels/real.glsl, points.glsl and layout/elements.h.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -38,6 +39,12 @@ class RealWords {
   bool double_;
   std::vector<std::byte> bytes_;
 };
+
+// A number as a high and a low float, which hold 48 bits of it or more.
+inline std::array<float, 2> split(double x) {
+  const float high = static_cast<float>(x);
+  return {high, static_cast<float>(x - static_cast<double>(high))};
+}
 
 // With it, equal pairs of floats mean equal doubles: the low half of the bits of x, a coordinate of the seed in `slot`,
 // which scaling by a power of two leaves as it is. A number that a float cannot hold counts as equal to no other.

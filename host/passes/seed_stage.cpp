@@ -108,8 +108,7 @@ void SeedStage::upload_seeds() {
                             }
                             std::array<uint, kGivenSingleWords> packed;
                             for (int k = 0; k < 3; ++k) {
-                              const float high = static_cast<float>(p[k]);
-                              const auto low = static_cast<float>(p[k] - static_cast<double>(high));
+                              const auto [high, low] = split(p[k]);
                               packed[static_cast<std::size_t>(k)] = std::bit_cast<uint>(high);
                               packed[static_cast<std::size_t>(3 + k)] = std::bit_cast<uint>(low);
                               packed[static_cast<std::size_t>(6 + k)] = low_word(given[i][k], seeds.scale, i);

@@ -1,10 +1,10 @@
 // The tree of boxes over the seeds, on the device (kernels/seed_tree.glsl).
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <cstdint>
-#include <vector>
 
+#include "host/passes/packing.h"
 #include "host/passes/seeds.h"
 #include "kernels/layout/sizes.h"
 
@@ -26,7 +26,7 @@ class SeedTree {
     push.seed_count = static_cast<uint>(seeds.count());
     push.top_level = top_level_;
     push.residual = seeds.residual;
-    push.two = 2;
+    push.two = kTwo;
     std::copy(level_begin_.begin(), level_begin_.end(), push.level_begin);
     return push;
   }

@@ -37,7 +37,7 @@ void set_step_masses(const SortedSeeds& seeds, const Neighbours& neighbours, Cel
 void complete_step_masses(const SortedSeeds& seeds, const std::function<const Neighbours&()>& neighbours,
                           CellMoments& result) {
   const double largest = largest_mass(result);
-  // The median is that of cells no larger than the largest.
+  // A median is at most the largest mass, so a cell of a quarter of that needs none.
   const auto needs_median = [&](std::size_t i) {
     return result.step_mass[i] < 0 && result.cells[i].mass < kShare * largest;
   };
