@@ -170,48 +170,59 @@ std::pair<const Buffer*, const Buffer*> CellPass::sum_by_blocks(SeedStage& stage
   return {term_begins, &sums_[(level + 1) % 2]};
 }
 
+void download_cells(SeedStage& stage, const Buffer& cells, std::size_t n, bool is_solid, CellMoments& result) {
+  const bool is_double = stage.is_double();
+  const std::size_t real = is_double ? sizeof(double) : sizeof(float);
+  const double scale = 1 / stage.seeds.scale;
+  result.cells.resize(n);
+  result.step_mass.resize(n);
+  stage.commands.phase(&DeviceSeconds::transfer);
+  stage.commands.download_items(
+      cells, kCellWords * real, n,
+      [&result, is_double, is_solid, real, scale](const std::byte* at, std::size_t first, std::size_t count) {
+        for (std::size_t i = first; i < first + count; ++i, at += kCellWords * real) {
+          std::array<double, kCellWords> reals;
+          if (is_double) {
+            std::memcpy(reals.data(), at, sizeof reals);
+          } else {
+            std::array<float, kCellWords> narrow;
+            std::memcpy(narrow.data(), at, sizeof narrow);
+            std::copy(narrow.begin(), narrow.end(), reals.begin());
+          }
+          result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[kSecondMomentAt]}, scale, is_solid);
+          const double step_mass = reals[kCellStepMassAt];
+          result.step_mass[i] = step_mass < 0 ? -1 : scaled({step_mass, {}, 0}, scale, is_solid).mass;
+        }
+      });
+}
+
 bool CellPass::read(SeedStage& stage, bool with_triangles, CellMoments& result) {
   Commands& commands = stage.commands;
   const DeviceSeeds& seeds = stage.seeds;
-  const std::size_t cells = seeds.count(), n = seeds.given_count(), real = double_ ? sizeof(double) : sizeof(float);
-  result.cells.resize(n);
-  result.step_mass.resize(n);
-  const double scale = 1 / seeds.scale;
-  commands.phase(&DeviceSeconds::transfer);
-  commands.download_items(cells_, kCellWords * real, n, [&](const std::byte* at, std::size_t first, std::size_t count) {
-    for (std::size_t i = first; i < first + count; ++i, at += kCellWords * real) {
-      std::array<double, kCellWords> reals;
-      if (double_) {
-        std::memcpy(reals.data(), at, sizeof reals);
-      } else {
-        std::array<float, kCellWords> narrow;
-        std::memcpy(narrow.data(), at, sizeof narrow);
-        std::copy(narrow.begin(), narrow.end(), reals.begin());
-      }
-      result.cells[i] = scaled({reals[0], {reals[1], reals[2], reals[3]}, reals[kSecondMomentAt]}, scale, solid_);
-      const double step_mass = reals[kCellStepMassAt];
-      result.step_mass[i] = step_mass < 0 ? -1 : scaled({step_mass, {}, 0}, scale, solid_).mass;
-    }
-  });
+  const std::size_t cells = seeds.count();
+  download_cells(stage, cells_, seeds.given_count(), solid_, result);
   std::vector<std::uint32_t> sorted_places(with_triangles ? most_items_ : 0), begins(with_triangles ? cells + 1 : 0);
   if (with_triangles) {
     commands.download(begins_, 0, begins.data(), begins.size() * kWord);
     commands.download(sorted_places_, 0, sorted_places.data(), sorted_places.size() * kWord);
   }
-  const Counters counted = stage.run_counted();
-  if (counted[kDuplicatePairs])
-    throw DeviceError(device_.description().name +
-                      ": pairs were met twice, so its atomic operations are not to be trusted");
-  if (by_rank_) {
-    if (counted[kLargeCells]) {
-      radix_up_to_ = cells;
-      return false;
-    }
-    item_count_ = counted[kItems];
-  }
+  if (!check(stage, stage.run_counted())) return false;
   set_totals(result);
   if (with_triangles) list_triangles(seeds, begins, sorted_places, result.triangles);
   else result.triangles = {};
+  return true;
+}
+
+bool CellPass::check(SeedStage& stage, const Counters& counted) {
+  if (counted[kDuplicatePairs])
+    throw DeviceError(device_.description().name +
+                      ": pairs were met twice, so its atomic operations are not to be trusted");
+  if (!by_rank_) return true;
+  if (counted[kLargeCells]) {
+    radix_up_to_ = stage.seeds.count();
+    return false;
+  }
+  item_count_ = counted[kItems];
   return true;
 }
 

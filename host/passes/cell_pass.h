@@ -9,6 +9,10 @@
 
 namespace bisector::host {
 
+// Records the download of cells as CellPass leaves them, of `n` seeds, in the caller's lengths: moments, and step
+// masses (negative where they are not known).
+void download_cells(SeedStage& stage, const Buffer& cells, std::size_t n, bool is_solid, CellMoments& result);
+
 class CellPass {
  public:
   // `is_solid`: masses are volumes.
@@ -25,9 +29,17 @@ class CellPass {
   // places of each cell's elements as triangles if these are wanted. False if some cell has more pairs than was
   // expected; then all has to be recorded again.
   bool read(SeedStage& stage, bool with_triangles, CellMoments& result);
+  // The same for those who read what they need themselves, once that has run.
+  bool check(SeedStage& stage, const Counters& counters);
 
   // Of each cell, by the caller's index: mass, first and second moment, and the mass that scales steps.
   const Buffer& cells() const { return cells_; }
+  // The places of each slot's elements, and where they begin.
+  const Buffer& places() const { return sorted_places_; }
+  const Buffer& begins() const { return begins_; }
+  // To keep what was computed, in exchange for buffers that are used again.
+  void exchange(Buffer& cells) { std::swap(cells_, cells); }
+  void exchange_places(Buffer& places) { std::swap(sorted_places_, places); }
   // Pairs that are not empty, once they have been read.
   std::size_t items() const { return item_count_; }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -26,11 +27,13 @@ struct ExpectedMass {
   double of_cells, of_domain;
 };
 
-// Sums over the cells of all pairs. In single precision pairs of cells whose masses are not certain enough are taken to
-// the next rungs, and more of them for as long as the masses do not sum to what is expected: `refine` does so with a
-// share of the errors that are allowed and returns how many pairs there were.
+// Sums over the cells of all pairs. `read` runs that and returns the sum of the masses; nothing if all has to be
+// recorded again. In single precision pairs of cells whose masses are not certain enough are taken to the next rungs,
+// and more of them for as long as the masses do not sum to what is expected: `refine` does so with a share of the
+// errors that are allowed and returns how many pairs there were.
 void find_cells(SeedStage& stage, CellPass& cells, const PairStore& store, const ExpectedMass& mass,
-                bool with_triangles, CellMoments& moments, const std::function<std::size_t(float share)>& refine);
+                const std::function<std::optional<double>()>& read,
+                const std::function<std::size_t(float share)>& refine);
 
 // How a diagram came about: its certification, and the seconds on the host of the search for owners, the pairs of a
 // solid's boundary, and clipping.
@@ -61,9 +64,13 @@ class DeviceBackend : public Base {
       report.certification.cpu = report.certification.pairs;
       return report;
     }
+    return run([&] { stage_.begin(seeds); }, [&] { return compute_on_device(want, diagram); });
+  }
+  // An evaluation of the seeds that `begin` gives to the seed stage.
+  EvaluationReport run(const std::function<void()>& begin, const std::function<DiagramWorkOnDevice()>& compute) {
     const Stopwatch watch;
-    stage_.begin(seeds);
-    const DiagramWorkOnDevice work = compute_on_device(seeds, want, diagram);
+    begin();
+    const DiagramWorkOnDevice work = compute();
     DiagramSeconds seconds;
     (stage_.delaunay() ? seconds.delaunay : seconds.neighbours) = stage_.lists_seconds();
     seconds.neighbours += work.searched;
@@ -78,7 +85,7 @@ class DeviceBackend : public Base {
   // How long the device took to clip so many pairs.
   virtual void learn_speed(std::size_t pairs, double seconds) = 0;
   // The seed stage has begun with the seeds.
-  virtual DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
+  virtual DiagramWorkOnDevice compute_on_device(Want want, Diagram& diagram) = 0;
 
   SeedStage stage_;
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -60,17 +61,38 @@ bool SeedStage::within_reach(const std::vector<Vec3>& given) {
 
 void SeedStage::begin(const std::vector<Vec3>& given) {
   const Stopwatch watch;
-  followed_ = !delaunay() && seeds.follow(given);
-  if (!followed_) {
+  const bool follows = !delaunay() && seeds.follow(given);
+  followed_ = follows && !renewed_;
+  if (!follows) {
     seeds.sort(given);
     order_uploaded_ = false;
   }
+  distinct_ = !follows;
+  renewed_ = false;
   if (delaunay()) rings_.build(seeds.on_host(), NeighbourSource::delaunay);
   lists_seconds_ = watch.seconds();
 }
 
+void SeedStage::begin_resident(const std::function<std::vector<Vec3>()>& fetch) {
+  if (seeds.count() < seeds.given_count()) {
+    brought_back_ = fetch();
+    return begin(brought_back_);
+  }
+  followed_ = !std::exchange(renewed_, false);
+  distinct_ = false;
+  seeds.take_resident(fetch);
+  lists_seconds_ = 0;
+}
+
+void SeedStage::renew_slots(const std::vector<Vec3>& given) {
+  if (!seeds.are_stretched(given)) return;
+  seeds.sort(given);
+  order_uploaded_ = false;
+  renewed_ = true;
+}
+
 void SeedStage::record() {
-  upload_seeds();
+  place_seeds();
   exact.begin(seeds, delaunay() ? &rings_ : nullptr);
   commands.fill(counters, 0, kCounters * sizeof(std::uint32_t), 0);
   neighbours.begin(commands, seeds);
@@ -78,50 +100,60 @@ void SeedStage::record() {
   else neighbours.list_nearest(commands, seeds, counters);
 }
 
-bool SeedStage::keeps_slots(const std::vector<Vec3>& given, const Counters& counted) {
-  if (!followed_ || !counted[kCoincident]) return true;
-  seeds.sort(given);
+bool SeedStage::keeps_slots(const Counters& counted) {
+  if (distinct_ || !counted[kCoincident]) return true;
+  seeds.sort(seeds.positions());
   followed_ = order_uploaded_ = false;
+  distinct_ = true;
   return false;
 }
 
-// Positions in the caller's order, so that the host reads and writes memory in order; the device puts them into slots.
-void SeedStage::upload_seeds() {
+// Positions are in the caller's order, so that the host reads and writes memory in order; the device puts them into
+// slots.
+void SeedStage::place_seeds() {
   const std::size_t n = seeds.count(), given_count = seeds.given_count();
-  const std::vector<Vec3>& given = seeds.positions();
-  const bool as_doubles = double_ || double_rung_;
-  const std::size_t words = as_doubles ? kGivenDoubleWords : kGivenSingleWords;
+  const bool as_doubles = given_as_doubles();
   seeds.residual = double_ ? 0 : residual_of(seeds.largest);
-  seeds.given.reserve(given_count * words * sizeof(uint));
+  seeds.given.reserve(given_bytes(given_count));
   seeds.order.reserve(n * sizeof(uint));
   seeds.words.reserve(n * point_words(double_) * (double_ ? sizeof(double) : sizeof(float)));
   seeds.doubles.reserve(double_rung_ ? n * sizeof(Vec3) : 0);
   seeds.ids.reserve(n * sizeof(SeedId));
   commands.phase(&DeviceSeconds::transfer);
-  commands.upload_items(seeds.given, words * sizeof(uint), given_count,
-                        [&](std::byte* at, std::size_t first, std::size_t count) {
-                          for (std::size_t i = first; i < first + count; ++i, at += words * sizeof(uint)) {
-                            const Vec3 p = seeds.scale * given[i];
-                            if (as_doubles) {
-                              std::memcpy(at, &p, sizeof p);
-                              continue;
-                            }
-                            std::array<uint, kGivenSingleWords> packed;
-                            for (int k = 0; k < 3; ++k) {
-                              const auto [high, low] = split(p[k]);
-                              packed[static_cast<std::size_t>(k)] = std::bit_cast<uint>(high);
-                              packed[static_cast<std::size_t>(3 + k)] = std::bit_cast<uint>(low);
-                              packed[static_cast<std::size_t>(6 + k)] = low_word(given[i][k], seeds.scale, i);
-                            }
-                            std::memcpy(at, packed.data(), sizeof packed);
-                          }
-                        });
+  if (!seeds.are_resident()) upload_seeds();
   if (!order_uploaded_) commands.upload(seeds.order, 0, seeds.all_ids().data(), n * sizeof(Index));
   order_uploaded_ = true;
   commands.dispatch(
       kernel("place_seeds", as_doubles, {double_rung_}),
       {reads(seeds.given), reads(seeds.order), writes(seeds.words), writes(seeds.doubles), writes(seeds.ids)},
       CountPush{static_cast<uint>(n)}, n);
+}
+
+std::size_t SeedStage::given_bytes(std::size_t count) const {
+  return count * (given_as_doubles() ? kGivenDoubleWords : kGivenSingleWords) * sizeof(uint);
+}
+
+void SeedStage::upload_seeds() {
+  const std::vector<Vec3>& given = seeds.positions();
+  const bool as_doubles = given_as_doubles();
+  const std::size_t bytes = given_bytes(1);
+  commands.upload_items(seeds.given, bytes, given.size(), [&](std::byte* at, std::size_t first, std::size_t count) {
+    for (std::size_t i = first; i < first + count; ++i, at += bytes) {
+      const Vec3 p = seeds.scale * given[i];
+      if (as_doubles) {
+        std::memcpy(at, &p, sizeof p);
+        continue;
+      }
+      std::array<uint, kGivenSingleWords> packed;
+      for (int k = 0; k < 3; ++k) {
+        const auto [high, low] = split(p[k]);
+        packed[static_cast<std::size_t>(k)] = std::bit_cast<uint>(high);
+        packed[static_cast<std::size_t>(3 + k)] = std::bit_cast<uint>(low);
+        packed[static_cast<std::size_t>(6 + k)] = low_word(given[i][k], seeds.scale, i);
+      }
+      std::memcpy(at, packed.data(), sizeof packed);
+    }
+  });
 }
 
 Counters SeedStage::run_counted() {

@@ -2,6 +2,7 @@
 // lists of their neighbours.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "backend/backend.h"
@@ -31,13 +32,19 @@ class SeedStage {
   bool within_reach(const std::vector<Vec3>& seeds);
   // Takes new seeds; those as many as the last ones keep their slots as long as their order in space is good enough.
   void begin(const std::vector<Vec3>& seeds);
+  // The same for seeds that are in `seeds.given` already, as many as the last ones; `fetch` brings them if they are
+  // needed on the host. No coordinate may be larger than `seeds.largest`.
+  void begin_resident(const std::function<std::vector<Vec3>()>& fetch);
+  // Lets the next evaluation of resident seeds take them into slots anew if they are in no spatial order any more at
+  // these positions.
+  void renew_slots(const std::vector<Vec3>& seeds);
   // Records the upload, and the search for lists if they are not from the host.
   void record();
   // Whether slots mean other seeds than in the last evaluation.
   bool sorted_anew() const { return !followed_; }
   // To be called once what was recorded has run. If seeds that kept their slots have come to coincide, sorts all anew
   // and returns false: then all has to be recorded again.
-  bool keeps_slots(const std::vector<Vec3>& seeds, const Counters& counters);
+  bool keeps_slots(const Counters& counters);
   // Runs what is recorded and reads the counters.
   Counters run_counted();
   // Sets the step masses that are negative, for the device does not know them.
@@ -51,6 +58,9 @@ class SeedStage {
   double lists_seconds() const { return lists_seconds_; }  // on the host
 
  private:
+  bool given_as_doubles() const { return double_ || double_rung_; }
+  std::size_t given_bytes(std::size_t count) const;
+  void place_seeds();
   void upload_seeds();
 
   std::shared_ptr<Device> device_;
@@ -58,6 +68,9 @@ class SeedStage {
   NeighbourSource source_;
   Box box_;
   bool followed_ = false, order_uploaded_ = false;
+  bool distinct_ = false;           // no two slots are of equal seeds
+  bool renewed_ = false;            // slots, since the last evaluation
+  std::vector<Vec3> brought_back_;  // resident seeds that had to be sorted
   double lists_seconds_ = 0;
   Neighbours rings_;
 

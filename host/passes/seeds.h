@@ -1,6 +1,7 @@
 // The seeds of one evaluation on the device.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "host/device/buffer.h"
@@ -18,11 +19,17 @@ class DeviceSeeds {
   // Takes seeds that keep the slots of the last ones. False if they are not as many, or slots are in no spatial order
   // any more: then they have to be sorted.
   bool follow(const std::vector<Vec3>& seeds);
+  // Takes seeds that are in `given` already, as many as the last ones, and keep their slots. `fetch` brings their
+  // positions if the host needs them.
+  void take_resident(std::function<std::vector<Vec3>()> fetch);
+  // Whether slots are in no spatial order any more for seeds at these positions.
+  bool are_stretched(const std::vector<Vec3>& seeds) const;
 
   // How many slots there are, and how many seeds, of which some may be equal.
   std::size_t count() const { return sorted_.id.size(); }
   std::size_t given_count() const { return sorted_.slot.size(); }
-  const std::vector<Vec3>& positions() const { return *seeds_; }  // in the caller's order
+  bool are_resident() const { return static_cast<bool>(fetch_); }
+  const std::vector<Vec3>& positions() const;  // in the caller's order
   Index id(std::size_t slot) const { return sorted_.id[slot]; }
   Index slot(std::size_t id) const { return sorted_.slot[id]; }
   const std::vector<Index>& all_ids() const { return sorted_.id; }
@@ -39,9 +46,11 @@ class DeviceSeeds {
   Buffer ids;          // by slot: the caller's index, and the low words of the coordinates as doubles
 
  private:
-  double step_between_slots() const;
+  double step_between_slots(const std::vector<Vec3>& seeds) const;
 
-  const std::vector<Vec3>* seeds_ = nullptr;
+  mutable const std::vector<Vec3>* seeds_ = nullptr;  // null: resident and not fetched yet
+  std::function<std::vector<Vec3>()> fetch_;          // of resident seeds
+  mutable std::vector<Vec3> fetched_;
   mutable SortedSeeds sorted_;  // `x` and `extent` are set when they are needed
   mutable bool on_host_ = false;
   double sorted_step_ = 0;  // between slots when they were sorted

@@ -41,12 +41,12 @@ void SurfaceStage::record_owners() {
   samples_.record(seeds_.commands, seeds_.seeds, seeds_.neighbours.tree(), seeds_.counters, false);
 }
 
-void SurfaceStage::find_owners(const std::vector<Vec3>& given) {
+void SurfaceStage::find_owners() {
   for (;;) {
     seeds_.record();
     record_owners();
     const Counters counters = seeds_.run_counted();
-    if (!seeds_.keeps_slots(given, counters)) continue;
+    if (!seeds_.keeps_slots(counters)) continue;
     sites_.complete(seeds_.commands, counters[kUncertainOwners], seeds_.exact);
     return;
   }

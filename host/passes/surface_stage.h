@@ -12,7 +12,7 @@ class SurfaceStage {
   SurfaceStage(SeedStage& seeds, const Surface& surface, const Capacities& capacities);
 
   // Uploads the seeds that the seed stage has begun with, and finds their lists and the owners of sites and samples.
-  void find_owners(const std::vector<Vec3>& seeds);
+  void find_owners();
   void find_pairs(Certification& certification) { pairs_.run(job(), certification); }
   std::size_t refine(const Buffer& cells, float share, Certification& certification) {
     return pairs_.refine(job(), cells, share, certification);
@@ -24,6 +24,10 @@ class SurfaceStage {
   void learn_speed(std::size_t pairs, double seconds) { pairs_.learn_speed(pairs, seconds); }
 
   const PairStore& store() const { return store_; }
+  // The facets in double precision, where some kernels compute in it.
+  const std::vector<FacetChunk>& double_facets() const {
+    return seeds_.is_double() ? buffers_.facets : buffers_.double_facets;
+  }
 
  private:
   void record_owners();

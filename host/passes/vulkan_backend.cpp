@@ -1,9 +1,13 @@
 #include "host/passes/vulkan_backend.h"
 
+#include <functional>
+#include <optional>
+
 #include "backend/cpu_backend.h"
 #include "core/stopwatch.h"
 #include "host/passes/cell_pass.h"
 #include "host/passes/device_backend.h"
+#include "host/passes/device_descent.h"
 #include "host/passes/surface_stage.h"
 
 namespace bisector::host {
@@ -15,9 +19,11 @@ class VulkanBackend : public DeviceBackend<Backend, CpuBackend> {
                 const Precisions& precisions);
 
  private:
-  DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  DiagramWorkOnDevice compute_on_device(Want want, Diagram& diagram) override;
   void learn_speed(std::size_t pairs, double seconds) override { pairs_.learn_speed(pairs, seconds); }
-  void find_moments(bool with_triangles, CellMoments& moments, Certification& certification);
+  std::unique_ptr<ResidentDescent> descend(const DescentStart& start) override;
+  using ReadMass = std::function<std::optional<double>()>;
+  DiagramWorkOnDevice find_cells(const ReadMass& read);
 
   SurfaceStage pairs_;
   CellPass cells_;
@@ -34,23 +40,38 @@ VulkanBackend::VulkanBackend(const Surface& surface, std::shared_ptr<Device> dev
   stage_.commands.run();
 }
 
-DiagramWorkOnDevice VulkanBackend::compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
-  DiagramWorkOnDevice work;
-  Stopwatch watch;
-  pairs_.find_owners(seeds);
-  work.searched = watch.lap();
-  find_moments(includes(want, Want::triangles), diagram.moments, work.certification);
-  stage_.complete_step_masses(diagram.moments);
-  work.clipped = watch.lap();
+DiagramWorkOnDevice VulkanBackend::compute_on_device(Want want, Diagram& diagram) {
+  CellMoments& moments = diagram.moments;
+  DiagramWorkOnDevice work = find_cells([&]() -> std::optional<double> {
+    if (!cells_.read(stage_, includes(want, Want::triangles), moments)) return {};
+    return moments.mass;
+  });
+  const Stopwatch watch;
+  stage_.complete_step_masses(moments);
+  work.clipped += watch.seconds();
   if (includes(want, Want::labels)) pairs_.polygons(includes(want, Want::polygons), diagram.polygons);
   return work;
 }
 
-void VulkanBackend::find_moments(bool with_triangles, CellMoments& moments, Certification& certification) {
-  pairs_.find_pairs(certification);
-  find_cells(stage_, cells_, pairs_.store(), {mass(), mass()}, with_triangles, moments,
-             [&](float share) { return pairs_.refine(cells_.cells(), share, certification); });
-  certification.pairs = cells_.items();
+DiagramWorkOnDevice VulkanBackend::find_cells(const ReadMass& read) {
+  DiagramWorkOnDevice work;
+  Stopwatch watch;
+  pairs_.find_owners();
+  work.searched = watch.lap();
+  pairs_.find_pairs(work.certification);
+  host::find_cells(stage_, cells_, pairs_.store(), {mass(), mass()}, read,
+                   [&](float share) { return pairs_.refine(cells_.cells(), share, work.certification); });
+  work.certification.pairs = cells_.items();
+  work.clipped = watch.lap();
+  return work;
+}
+
+std::unique_ptr<ResidentDescent> VulkanBackend::descend(const DescentStart& start) {
+  if (!DeviceDescent::is_possible(stage_, pairs_, start)) return nullptr;
+  const auto evaluate = [this](const std::function<void()>& begin, const ReadMass& read) {
+    return run(begin, [&] { return find_cells(read); });
+  };
+  return std::make_unique<DeviceDescent>(stage_, pairs_, cells_, surface(), mass(), start, evaluate);
 }
 
 }  // namespace

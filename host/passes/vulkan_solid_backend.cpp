@@ -30,12 +30,12 @@ class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
                      const Precisions& precisions, SolidCells how);
 
  private:
-  DiagramWorkOnDevice compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
+  DiagramWorkOnDevice compute_on_device(Want want, Diagram& diagram) override;
   void learn_speed(std::size_t pairs, double seconds) override {
     shell_.learn_speed(pairs, seconds);
     pairs_.learn_speed(pairs, seconds);
   }
-  void find_owners(const std::vector<Vec3>& seeds);
+  void find_owners();
   void find_pairs(Certification& certification);
   void list_triangles(Csr<Index>& triangles);
   void find_moments(CellMoments& moments, Certification& certification);
@@ -85,11 +85,11 @@ VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Devic
   stage_.commands.run();
 }
 
-DiagramWorkOnDevice VulkanSolidBackend::compute_on_device(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
+DiagramWorkOnDevice VulkanSolidBackend::compute_on_device(Want want, Diagram& diagram) {
   CellMoments& moments = diagram.moments;
   DiagramWorkOnDevice work;
   Stopwatch watch;
-  find_owners(seeds);
+  find_owners();
   work.searched = watch.lap();
 
   shell_.find_pairs(work.certification);
@@ -116,8 +116,8 @@ DiagramWorkOnDevice VulkanSolidBackend::compute_on_device(const std::vector<Vec3
   return work;
 }
 
-void VulkanSolidBackend::find_owners(const std::vector<Vec3>& seeds) {
-  shell_.find_owners(seeds);
+void VulkanSolidBackend::find_owners() {
+  shell_.find_owners();
   if (whole_) return;
   if (stage_.sorted_anew()) corners_.forget();
   stage_.commands.fill(stage_.counters, kUncertainOwners * sizeof(uint), sizeof(uint), 0);
@@ -148,8 +148,13 @@ void VulkanSolidBackend::list_triangles(Csr<Index>& triangles) {
 void VulkanSolidBackend::find_moments(CellMoments& moments, Certification& certification) {
   find_pairs(certification);
   const double at_boundary = whole_ ? boundary_.mass() : 0;
-  find_cells(stage_, cells_, store_, {mass() - at_boundary, mass()}, false, moments,
-             [&](float share) { return pairs_.refine(job(), cells_.cells(), share, certification); });
+  find_cells(
+      stage_, cells_, store_, {mass() - at_boundary, mass()},
+      [&]() -> std::optional<double> {
+        if (!cells_.read(stage_, false, moments)) return {};
+        return moments.mass;
+      },
+      [&](float share) { return pairs_.refine(job(), cells_.cells(), share, certification); });
   if (whole_) add_boundary(moments);
   certification.pairs = cells_.items() + (whole_ ? boundary_.count() : 0);
 }

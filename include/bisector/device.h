@@ -78,9 +78,9 @@ struct BackendDescription {
   std::string fallback;   // why a device was given up for this one; empty if none was
 };
 
-// Seconds on a device, from its own clock; all 0 where the CPU computed.
+// Seconds on a device, from its own clock; all 0 where the CPU computed. `descent` are the vectors of the optimiser.
 struct DeviceSeconds {
-  double transfer = 0, grid = 0, neighbours = 0, owners = 0, clip = 0, sort = 0, sum = 0;
+  double transfer = 0, grid = 0, neighbours = 0, owners = 0, clip = 0, sort = 0, sum = 0, descent = 0;
 };
 
 // What evaluations asked of a device: submissions, each with a wait, dispatches of kernels, and bytes moved to it and

@@ -135,6 +135,49 @@ PUSH_CONSTANTS(RadixPush) {
 };
 #endif
 
+// Of descents.
+#if LAYOUT_CPLUSPLUS || defined(PUSH_MOVE)
+PUSH_CONSTANTS(MovePush) {
+  double step_length;
+  double farthest;      // coordinate that is within reach
+  double two_and_more;  // 2 (1 + 1e-9), the margin of nearest_on_triangles()
+  uint count;           // of seeds
+  uint two;             // 2: see loops_complete() of common.glsl
+};
+#endif
+
+#if LAYOUT_CPLUSPLUS || defined(PUSH_MEASURE)
+PUSH_CONSTANTS(MeasurePush) {
+  double mean_mass;
+  uint count;        // of seeds
+  uint block_count;  // of sums
+};
+#endif
+
+#if LAYOUT_CPLUSPLUS || defined(PUSH_DIRECT)
+PUSH_CONSTANTS(DirectPush) {
+  uint count;        // of seeds
+  uint coefficient;  // the number that is meant
+};
+#endif
+
+#if LAYOUT_CPLUSPLUS || defined(PUSH_SUMS)
+PUSH_CONSTANTS(SumsPush) {
+  uint count;  // of terms of one kind
+  uint kinds;
+};
+#endif
+
+#if LAYOUT_CPLUSPLUS || defined(PUSH_FINISH)
+PUSH_CONSTANTS(FinishPush) {
+  double multiplier;
+  uint count;  // of terms of one kind
+  uint kinds;
+  uint place;  // of the first number that is set
+  uint onto;   // whether what the number was is part of it
+};
+#endif
+
 LAYOUT_END
 
 #ifdef __cplusplus
@@ -159,6 +202,10 @@ static_assert(sizeof(ClipPush) == 32 && offsetof(ClipPush, residual) == 4 && off
 static_assert(sizeof(DoubtfulPush) == 20 && offsetof(DoubtfulPush, mean_density) == 12 &&
               offsetof(DoubtfulPush, share) == 16);
 static_assert(sizeof(GatherPairsPush) == 4);
+static_assert(sizeof(MovePush) == 32 && offsetof(MovePush, count) == 24 && offsetof(MovePush, two) == 28);
+static_assert(sizeof(MeasurePush) == 16 && offsetof(MeasurePush, count) == 8);
+static_assert(sizeof(DirectPush) == 8 && sizeof(SumsPush) == 8);
+static_assert(sizeof(FinishPush) == 24 && offsetof(FinishPush, count) == 8 && offsetof(FinishPush, onto) == 20);
 static_assert(sizeof(RadixPush) == 12 && offsetof(RadixPush, shift) == 8);
 
 }  // namespace bisector::host

@@ -15,6 +15,7 @@ DeviceSeconds& operator+=(DeviceSeconds& a, const DeviceSeconds& b) {
   a.clip += b.clip;
   a.sort += b.sort;
   a.sum += b.sum;
+  a.descent += b.descent;
   return a;
 }
 

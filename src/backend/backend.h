@@ -1,9 +1,12 @@
 // The contract between the pipelines and whatever computes Voronoi diagrams.
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "backend/seed_descent.h"
 #include "bisector/device.h"
+#include "bisector/error.h"
 #include "core/geometry.h"
 #include "voronoi/diagram.h"
 #include "voronoi/solid.h"
@@ -37,6 +40,11 @@ class Backend {
   // is used again. Wanting the dual includes the polygons. Only a backend of a solid has polyhedra. Throws Error if
   // there are no seeds; after a DeviceError neither diagram nor backend are good for anything.
   EvaluationReport evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram);
+  // A descent whose seeds stay where the backend computes; null if they are to be on the host. The backend and the
+  // curves must outlive it, and it may not be used any more once the backend has evaluated other seeds.
+  virtual std::unique_ptr<ResidentDescent> descend(const DescentStart&) { return nullptr; }
+  // Goes on without the device after an error of it outside evaluate(); throws the error if there is no way to.
+  virtual void give_up(const DeviceError& error) { throw error; }
 
  protected:
   explicit Backend(const Surface& surface) : Backend(surface, surface.mass, Want::polygons) {}

@@ -12,8 +12,8 @@
 namespace bisector {
 
 // The first DeviceError of the device drops it, with one warning, and the same seeds are evaluated on the CPU: an
-// evaluation depends on its seeds alone, so none is lost and the run goes on from where it was. Base is Backend or
-// SolidBackend.
+// evaluation depends on its seeds alone, so none is lost and the run goes on from where it was; a descent on the device
+// goes on from the seeds that it kept last. Base is Backend or SolidBackend.
 template <class Base>
 class FallbackOf : public Base {
  public:
@@ -21,6 +21,8 @@ class FallbackOf : public Base {
   double mass_tolerance() const override { return backend_->mass_tolerance(); }
   // The device's even after it was dropped: its last energies are still compared with.
   double energy_noise() const override { return energy_noise_; }
+  std::unique_ptr<ResidentDescent> descend(const DescentStart& start) override;
+  void give_up(const DeviceError& error) override;
 
  protected:
   // `on_cpu` makes the backend for the CPU, given the reason.

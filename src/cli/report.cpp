@@ -52,13 +52,9 @@ Json device_json(const BackendDescription& device) {
 
 Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds) {
   if (device.kind == "cpu" && device.fallback.empty()) return nullptr;
-  return {{"transfer", seconds.transfer},
-          {"grid", seconds.grid},
-          {"neighbours", seconds.neighbours},
-          {"owners", seconds.owners},
-          {"clip", seconds.clip},
-          {"sort", seconds.sort},
-          {"sum", seconds.sum}};
+  return {{"transfer", seconds.transfer}, {"grid", seconds.grid},      {"neighbours", seconds.neighbours},
+          {"owners", seconds.owners},     {"clip", seconds.clip},      {"sort", seconds.sort},
+          {"sum", seconds.sum},           {"descent", seconds.descent}};
 }
 
 Json seconds_json(const DiagramSeconds& seconds) {

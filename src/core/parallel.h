@@ -84,19 +84,31 @@ void parallel_each(std::size_t n, const Body& body, std::size_t grain = 1024) {
   });
 }
 
-// Sum of term(i) over [0, n): blocks in order, then the blocks' sums in order. T is a number or has +=.
+// Sum of term(i) over [0, n) by the one rule of sums: blocks of 32 terms in order, the blocks' sums likewise, until one
+// is left. T is a number or has +=. It is the value T{} if there are no terms.
 template <class T = double, class Term>
 T fixed_sum(std::size_t n, const Term& term) {
-  constexpr std::size_t kBlock = 4096;
-  std::vector<T> partial((n + kBlock - 1) / kBlock);
-  parallel_chunks(n, kBlock, [&](std::size_t c, std::size_t begin, std::size_t end) {
-    T s{};
-    for (std::size_t i = begin; i < end; ++i) s += term(i);
-    partial[c] = s;
+  constexpr std::size_t kBlock = 32;
+  const auto block_sum = [](std::size_t begin, std::size_t end, const auto& at) {
+    T sum = at(begin);
+    for (std::size_t i = begin + 1; i < end; ++i) sum += at(i);
+    return sum;
+  };
+  std::vector<T> sums((n + kBlock * kBlock - 1) / (kBlock * kBlock));
+  parallel_chunks(n, kBlock * kBlock, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    const auto block = [&](std::size_t k) {
+      const std::size_t first = begin + k * kBlock;
+      return block_sum(first, std::min(end, first + kBlock), term);
+    };
+    sums[c] = block_sum(0, (end - begin + kBlock - 1) / kBlock, block);
   });
-  T sum{};
-  for (const T& s : partial) sum += s;
-  return sum;
+  while (sums.size() > 1) {
+    const std::size_t blocks = (sums.size() + kBlock - 1) / kBlock;
+    for (std::size_t k = 0; k < blocks; ++k)
+      sums[k] = block_sum(k * kBlock, std::min(sums.size(), (k + 1) * kBlock), [&](std::size_t i) { return sums[i]; });
+    sums.resize(blocks);
+  }
+  return sums.empty() ? T{} : sums[0];
 }
 
 // Sorts by a strict total order.

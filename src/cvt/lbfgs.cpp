@@ -1,47 +1,29 @@
 #include "cvt/lbfgs.h"
 
-#include "core/parallel.h"
+#include <cmath>
+#include <iterator>
 
 namespace bisector {
-namespace {
 
-void add_scaled(std::vector<Vec3>& a, double t, const std::vector<Vec3>& b) {
-  parallel_each(
-      a.size(), [&](std::size_t i) { a[i] += t * b[i]; }, 4096);
-}
-
-}  // namespace
-
-double inner(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  return fixed_sum(a.size(), [&](std::size_t i) { return dot(a[i], b[i]); });
-}
-
-void Lbfgs::push(std::vector<Vec3> s, std::vector<Vec3> y) {
-  const double sy = inner(s, y);
-  if (!(sy > 1e-10 * std::sqrt(inner(s, s) * inner(y, y)))) return;
+void Lbfgs::push(double sy, double ss, double yy) {
+  if (!(sy > 1e-10 * std::sqrt(ss * yy))) return;
   if (pairs_.size() == memory_) pairs_.pop_front();
-  pairs_.push_back({std::move(s), std::move(y), sy});
+  pairs_.push_back({next_, sy, 1 / sy});
+  next_ = (next_ + 1) % (memory_ + 1);
 }
 
-std::vector<Vec3> Lbfgs::direction(const std::vector<Vec3>& g, const std::vector<double>& d) const {
-  std::vector<Vec3> q = g;
-  std::vector<double> alpha(pairs_.size());
-  for (std::size_t k = pairs_.size(); k-- > 0;) {
-    alpha[k] = inner(pairs_[k].s, q) / pairs_[k].sy;
-    add_scaled(q, -alpha[k], pairs_[k].y);
+void Lbfgs::set_direction(DescentVectors& vectors) const {
+  vectors.start_direction();
+  for (auto pair = pairs_.rbegin(); pair != pairs_.rend(); ++pair) {
+    vectors.project(pair->number, PairPart::step, pair->rho, false);
+    vectors.add(pair->number, PairPart::change);
   }
-  double gamma = 1;
-  if (!pairs_.empty()) {
-    const Pair& last = pairs_.back();
-    gamma = last.sy / fixed_sum(d.size(), [&](std::size_t i) { return norm2(last.y[i]) / d[i]; });
+  if (pairs_.empty()) vectors.weigh({}, 0);
+  else vectors.weigh(pairs_.back().number, pairs_.back().sy);
+  for (const Pair& pair : pairs_) {
+    vectors.project(pair.number, PairPart::change, pair.rho, true);
+    vectors.add(pair.number, PairPart::step);
   }
-  parallel_each(
-      q.size(), [&](std::size_t i) { q[i] *= gamma / d[i]; }, 4096);
-  for (std::size_t k = 0; k < pairs_.size(); ++k)
-    add_scaled(q, alpha[k] - inner(pairs_[k].y, q) / pairs_[k].sy, pairs_[k].s);
-  parallel_each(
-      q.size(), [&](std::size_t i) { q[i] = -q[i]; }, 4096);
-  return q;
 }
 
 }  // namespace bisector

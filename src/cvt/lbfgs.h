@@ -3,34 +3,35 @@
 #pragma once
 
 #include <deque>
-#include <vector>
 
-#include "core/geometry.h"
+#include "backend/seed_descent.h"
 
 namespace bisector {
 
 class Lbfgs {
  public:
-  // Keeps the last `memory` pairs.
+  // Keeps the last `memory` pairs, fewer than DescentVectors::kMostPairs.
   explicit Lbfgs(std::size_t memory = 7) : memory_(memory) {}
 
   void clear() { pairs_.clear(); }
-  // Adds the step s = x_new - x_old and the change of gradient y. Pairs without positive curvature are dropped.
-  void push(std::vector<Vec3> s, std::vector<Vec3> y);
-  // -H g, with the initial inverse Hessian gamma diag(1 / d_i), gamma = s'y / (y' diag(1 / d_i) y) of the last pair,
-  // or 1.
-  std::vector<Vec3> direction(const std::vector<Vec3>& g, const std::vector<double>& d) const;
+  // How many pairs take part, the free one among them.
+  std::size_t pairs() const { return memory_ + 1; }
+  // The pair that is free for the next step.
+  std::size_t free_pair() const { return next_; }
+  // Keeps the free pair, whose products these are. It is dropped if it has no positive curvature.
+  void push(double sy, double ss, double yy);
+  // direction := -H gradient, with the initial inverse Hessian gamma diag(w), gamma = s'y / (y' diag(w) y) of the last
+  // pair, or 1.
+  void set_direction(DescentVectors& vectors) const;
 
  private:
   struct Pair {
-    std::vector<Vec3> s, y;
-    double sy;
+    std::size_t number;
+    double sy, rho;  // rho = 1 / s'y
   };
   std::size_t memory_;
+  std::size_t next_ = 0;
   std::deque<Pair> pairs_;
 };
-
-// Sum of a_i . b_i by the fixed tree of parallel.h.
-double inner(const std::vector<Vec3>& a, const std::vector<Vec3>& b);
 
 }  // namespace bisector

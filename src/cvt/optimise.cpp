@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
+#include <memory>
 #include <utility>
 
-#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "cvt/constrain.h"
+#include "cvt/host_descent.h"
 #include "cvt/lbfgs.h"
-#include "cvt/multilevel.h"
 
 namespace bisector {
 namespace {
@@ -20,200 +19,103 @@ constexpr double kFlatGradient = 1e-8;      // relative to the first; what is le
 constexpr int kLineSearchTrials = 8;        // evaluations per step at most
 constexpr std::size_t kDecreaseWindow = 5;  // steps over which the energy's fall is judged
 constexpr std::size_t kMemory = 8;          // energies that a step is measured against if diagrams are localised
-constexpr int kReseedTrials = 10;           // rounds of giving empty cells another place
-
-using Kind = SeedPlace::Kind;
-
-// Seeds with all that is known about them.
-struct Iterate {
-  PlacedSeeds seeds;
-  DiagramOfSeeds known;
-  std::vector<Vec3> gradient;
-  std::vector<Vec3> normals;  // of the surface at each seed, if constrained
-  double energy = 0;
-  double gradient_norm = 0;
-
-  const CellMoments& moments() const { return known.diagram.moments; }
-};
-
-// The part of a seed's gradient along what it is held on (thesis 4.4.2 and 4.4.3, equations 4.7 and 4.8).
-Vec3 held(const Vec3& g, const SeedPlace& place, const FeatureCurves& curves, const Vec3* normal) {
-  switch (place.kind) {
-    case Kind::fixed: return {};
-    case Kind::curve: {
-      const Vec3 tangent = curves.tangent(place.curve, place.position);
-      return dot(g, tangent) * tangent;
-    }
-    case Kind::interior: return g;
-    case Kind::surface: break;
-  }
-  return normal ? g - dot(g, *normal) * *normal : g;
-}
-
-std::vector<Vec3> gradient_of(const std::vector<Moments>& cells, const PlacedSeeds& seeds, const FeatureCurves& curves,
-                              const std::vector<Vec3>* normals) {
-  std::vector<Vec3> gradient(seeds.size());
-  parallel_each(seeds.size(), [&](std::size_t i) {
-    gradient[i] = held(-2.0 * cells[i].first, seeds.place(i), curves, normals ? &(*normals)[i] : nullptr);
-  });
-  return gradient;
-}
-
-double length_of(const std::vector<Vec3>& gradient) { return std::sqrt(inner(gradient, gradient)); }
-
-bool is_lost(const Iterate& now, std::size_t i) {
-  const Kind kind = now.seeds.kind(i);
-  return now.moments().cells[i].mass <= 0 && (kind == Kind::surface || kind == Kind::interior);
-}
-
-bool has_empty_cell(const Iterate& now) {
-  for (std::size_t i = 0; i < now.seeds.size(); ++i)
-    if (is_lost(now, i)) return true;
-  return false;
-}
-
-// Puts seeds inside a solid that own nothing into the cells of highest energy, half the root mean square distance of
-// their points from the seed.
-void reseed_interior(const std::vector<Moments>& cells, const std::vector<Index>& empty, std::span<Vec3> positions) {
-  std::vector<Index> order;
-  for (Index i = 0; i < cells.size(); ++i)
-    if (cells[i].mass > 0) order.push_back(i);
-  const std::size_t count = std::min(empty.size(), order.size());
-  std::partial_sort(
-      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
-      [&](Index a, Index b) { return cells[a].second != cells[b].second ? cells[a].second > cells[b].second : a < b; });
-  for (std::size_t k = 0; k < count; ++k) {
-    const Moments& cell = cells[order[k]];
-    const Vec3 towards = (1 / cell.mass) * cell.first;
-    const double length = norm(towards), spread = 0.5 * std::sqrt(cell.second / cell.mass);
-    const Vec3 step = length > 0.1 * spread ? (spread / length) * towards : Vec3{spread, 0, 0};
-    positions[empty[k]] = positions[order[k]] + step;
-  }
-}
-
-std::vector<double> preconditioner(const CellMoments& moments) {
-  const double mean = moments.mass / static_cast<double>(moments.cells.size());
-  std::vector<double> d(moments.step_mass.size());
-  for (std::size_t i = 0; i < d.size(); ++i) d[i] = 2 * (moments.step_mass[i] > 0 ? moments.step_mass[i] : mean);
-  return d;
-}
 
 }  // namespace
 
 // The iterates of one optimisation, with the run's seeds, diagram and normals while it lasts.
 class Descent {
  public:
-  Descent(CvtRun& run, const OptimiseOptions& options) : run_(run), options_(options) {
-    now_.seeds = std::move(run.seeds);
-    now_.known = std::move(run.diagram_);
-    now_.normals = std::move(run.normals_);
+  Descent(CvtRun& run, const OptimiseOptions& options)
+      : run_(run), options_(options), on_host_(run, options.constrained) {
+    on_host_.now.seeds = std::move(run.seeds);
+    on_host_.now.known = std::move(run.diagram_);
+    on_host_.now.normals = std::move(run.normals_);
   }
 
   void minimise();
 
  private:
-  void hold(const CellMoments& moments, const std::vector<Vec3>& before, Iterate& next) const;
-  void measure(Iterate& iterate) const;
-  void reseed();
+  SeedDescent& space() { return on_device_ ? static_cast<SeedDescent&>(*on_device_) : on_host_; }
   void start();
-  bool is_descent(const std::vector<Vec3>& direction, double slope, double step) const;
-  bool line_search(const std::vector<Vec3>& direction);
+  void enter_device();
+  void leave_device();
+  bool advance();
+  bool is_descent(double length) const;
+  bool line_search();
   void accept();
+  bool is_done() const;
+  void go_on_without_device(const DeviceError& error);
   void hand_back();
 
   CvtRun& run_;
   const OptimiseOptions& options_;
+  HostDescent on_host_;
+  std::unique_ptr<ResidentDescent> on_device_;  // none: the iterate is on the host
+  std::size_t entered_at_ = 0;                  // how many energies there were when it went to the device
   Lbfgs history_;
-  Iterate now_, next_;
+  StepResult next_;               // what the last step led to
   std::vector<double> energies_;  // of all iterates
+  double energy_ = 0, gradient_norm_ = 0, first_norm_ = 0;
+  int iteration_ = 0;
+  bool restarted_ = false;
 };
 
-// Puts the seeds back to where they are held. `moments` are those of the cells before the seeds moved, `before` where
-// they were then.
-void Descent::hold(const CellMoments& moments, const std::vector<Vec3>& before, Iterate& next) const {
-  const std::span<Vec3> positions = next.seeds.edit_positions();
-  const std::span<SeedPlace> places = next.seeds.edit_places();
-  if (options_.constrained) project_to_cells(run_.surface(), moments.triangles, places, positions, next.normals);
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    SeedPlace& place = places[i];
-    if (place.kind == Kind::fixed) positions[i] = before[i];
-    if (place.kind != Kind::curve) continue;
-    const double reach = 2 * norm(positions[i] - before[i]);
-    place.position = run_.curves().nearest(place.curve, positions[i], place.position, reach);
-    positions[i] = run_.curves().point(place.curve, place.position);
-  }
-}
-
-void Descent::measure(Iterate& iterate) const {
-  const Want want = options_.constrained ? Want::triangles : Want::moments;
-  run_.evaluate(iterate.seeds.positions(), want, iterate.known);
-  const CellMoments& moments = iterate.moments();
-  iterate.energy = run_.covers(iterate.known.diagram) ? moments.energy : std::numeric_limits<double>::infinity();
-  iterate.gradient =
-      gradient_of(moments.cells, iterate.seeds, run_.curves(), options_.constrained ? &iterate.normals : nullptr);
-  iterate.gradient_norm = length_of(iterate.gradient);
-}
-
-// Puts the seeds of empty cells at far corners of the cells of highest energy.
-void Descent::reseed() {
-  run_.evaluate(now_.seeds.positions(), Want::polygons, now_.known);
-  std::vector<Index> empty, inside;
-  for (Index i = 0; i < now_.seeds.size(); ++i)
-    if (is_lost(now_, i)) (now_.seeds.kind(i) == Kind::interior ? inside : empty).push_back(i);
-  const std::span<Vec3> positions = now_.seeds.edit_positions();
-  reseed_interior(now_.moments().cells, inside, positions);
-  const std::vector<Vec3> points = insertion_points(now_.known.diagram, now_.seeds, empty.size());
-  for (std::size_t k = 0; k < points.size(); ++k) positions[empty[k]] = points[k];
-}
-
 void Descent::start() {
-  for (int trial = 0;; ++trial) {
-    run_.context().check();
-    if (options_.constrained) {
-      run_.evaluate(now_.seeds.positions(), Want::triangles, now_.known);
-      now_.normals.resize(now_.seeds.size());
-      hold(now_.moments(), std::vector<Vec3>(now_.seeds.positions()), now_);
-    }
-    measure(now_);
-    if (trial == kReseedTrials || !has_empty_cell(now_)) break;
-    reseed();
+  on_host_.start();
+  energy_ = on_host_.now.energy;
+  gradient_norm_ = std::sqrt(on_host_.now.gradient_square);
+  history_.clear();
+}
+
+// Stray parts are left out on the host, from labels.
+void Descent::enter_device() {
+  if (run_.localises()) return;
+  const Iterate& now = on_host_.now;
+  on_device_ = run_.backend().descend({now.seeds, run_.curves(), now.moments(), now.gradient,
+                                       options_.constrained ? &now.normals : nullptr, history_.pairs()});
+  entered_at_ = energies_.size();
+}
+
+void Descent::leave_device() {
+  if (!on_device_) return;
+  if (energies_.size() > entered_at_) {
+    Iterate& now = on_host_.now;
+    on_device_->bring_back(now.seeds, now.known.diagram.moments, now.gradient, now.normals);
+    now.known.diagram.has = options_.constrained ? Want::triangles : Want::moments;
+    now.known.positions = now.seeds.positions();
+    now.known.report = next_.report;
+    now.known.strays = 0;
   }
-  if (!std::isfinite(now_.energy))
-    throw Error("the diagram does not cover the domain; its coordinates may span too many magnitudes");
+  on_device_.reset();
 }
 
 // Whether a step lowers the energy enough, of localised cells below the largest of the last (Grippo, Lampariello and
 // Lucidi 1986); where rounding hides that, whether the slope says so: the approximate Wolfe
 // condition (Hager and Zhang 2005, section 2).
-bool Descent::is_descent(const std::vector<Vec3>& direction, double slope, double step) const {
+bool Descent::is_descent(double length) const {
   // Where a stray part meets its cell or comes off, the energy of localised cells jumps.
-  double before = now_.energy;
+  double before = energy_;
   if (run_.localises())
     before = *std::max_element(energies_.end() - static_cast<std::ptrdiff_t>(std::min(energies_.size(), kMemory)),
                                energies_.end());
-  if (next_.energy <= before + kArmijo * step * slope) return true;
-  const double noise = run_.backend().energy_noise() * now_.energy;
-  return noise > 0 && next_.energy <= now_.energy + noise &&
-         inner(next_.gradient, direction) <= (2 * kArmijo - 1) * slope;
+  if (next_.energy <= before + kArmijo * length * next_.slope) return true;
+  const double noise = run_.backend().energy_noise() * energy_;
+  return noise > 0 && next_.energy <= energy_ + noise && next_.next_slope <= (2 * kArmijo - 1) * next_.slope;
 }
 
-// Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found; then
-// `next_` is not to be used.
-bool Descent::line_search(const std::vector<Vec3>& direction) {
-  const double slope = inner(now_.gradient, direction);
-  if (!(slope < 0)) return false;
-  double step = 1;
+// Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found.
+bool Descent::line_search() {
+  double length = 1;
   for (int trial = 0; trial < kLineSearchTrials; ++trial) {
-    next_.seeds = now_.seeds;
-    const std::span<Vec3> positions = next_.seeds.edit_positions();
-    parallel_each(positions.size(), [&](std::size_t i) { positions[i] += step * direction[i]; });
-    next_.normals = now_.normals;
-    hold(now_.moments(), now_.seeds.positions(), next_);
-    measure(next_);
-    if (is_descent(direction, slope, step)) return true;
-    const double excess = next_.energy - now_.energy - step * slope;
-    const double vertex = std::isfinite(excess) ? -0.5 * slope * step * step / excess : 0;
-    step = std::clamp(vertex, 0.1 * step, 0.5 * step);
+    next_ = space().step(length, history_.free_pair());
+    if (on_device_) run_.count(next_.report);
+    if (next_.out_of_reach) return false;
+    if (!run_.covers(next_.mass)) next_.energy = std::numeric_limits<double>::infinity();
+    if (!(next_.slope < 0)) return false;
+    if (is_descent(length)) return true;
+    const double excess = next_.energy - energy_ - length * next_.slope;
+    const double vertex = std::isfinite(excess) ? -0.5 * next_.slope * length * length / excess : 0;
+    length = std::clamp(vertex, 0.1 * length, 0.5 * length);
   }
   return false;
 }
@@ -222,55 +124,91 @@ bool Descent::line_search(const std::vector<Vec3>& direction) {
 // history says nothing about that.
 void Descent::accept() {
   ++run_.totals.iterations;
-  if (has_empty_cell(next_)) {
-    std::swap(now_, next_);
+  space().accept();
+  history_.push(next_.sy, next_.ss, next_.yy);
+  energy_ = next_.energy;
+  gradient_norm_ = std::sqrt(next_.gradient_square);
+  energies_.push_back(energy_);
+  if (next_.empty > 0) {
+    leave_device();
     start();
-    history_.clear();
-    return;
+    energies_.back() = energy_;
+    enter_device();
   }
-  std::vector<Vec3> s = next_.seeds.positions(), y = next_.gradient;
-  parallel_each(s.size(), [&](std::size_t i) {
-    s[i] -= now_.seeds.position(i);
-    y[i] -= now_.gradient[i];
-  });
-  history_.push(std::move(s), std::move(y));
-  std::swap(now_, next_);
+  run_.context().report({options_.phase, iteration_ + 1, options_.iterations, energy_, gradient_norm_,
+                         options_.done + options_.share * (iteration_ + 1) / options_.iterations});
+}
+
+// One step; false if there is none that helps.
+bool Descent::advance() {
+  history_.set_direction(space().vectors());
+  if (line_search()) {
+    restarted_ = false;
+    accept();
+    return true;
+  }
+  if (next_.out_of_reach) {
+    leave_device();
+    start();
+    return true;
+  }
+  // Once from scratch along the gradient; if that finds nothing either, this is the minimum to rounding.
+  if (restarted_) return false;
+  restarted_ = true;
+  history_.clear();
+  return true;
+}
+
+bool Descent::is_done() const {
+  if (gradient_norm_ <= kFlatGradient * first_norm_) return true;
+  const std::size_t n = energies_.size();
+  return n > kDecreaseWindow && energies_[n - 1 - kDecreaseWindow] - energies_[n - 1] <
+                                    kDecreaseWindow * options_.tolerance * energies_[n - 1];
+}
+
+// From the seeds that the host knows, which are those of a few steps ago. Throws the error if the backend has nothing
+// to go on with.
+void Descent::go_on_without_device(const DeviceError& error) {
+  if (on_device_) {
+    const ResidentDescent::Kept& kept = on_device_->kept();
+    on_host_.now.seeds = kept.seeds;
+    const std::size_t left = entered_at_ + static_cast<std::size_t>(kept.accepted);
+    const int lost = static_cast<int>(energies_.size() - left);
+    energies_.resize(left);
+    iteration_ -= lost;
+    run_.totals.iterations -= lost;
+    on_device_.reset();
+  }
+  run_.backend().give_up(error);
+  on_host_.now.known = {};
+  start();
+  energies_.back() = energy_;
 }
 
 void Descent::hand_back() {
-  run_.adopt(std::move(now_.seeds), std::move(now_.known));
-  run_.normals_ = std::move(now_.normals);
-  run_.energy = now_.energy;
-  run_.gradient_norm = now_.gradient_norm;
+  leave_device();
+  run_.adopt(std::move(on_host_.now.seeds), std::move(on_host_.now.known));
+  run_.normals_ = std::move(on_host_.now.normals);
+  run_.energy = energy_;
+  run_.gradient_norm = gradient_norm_;
 }
 
 void Descent::minimise() {
   start();
-  energies_.assign(1, now_.energy);
-  const double first_norm = now_.gradient_norm;
-  bool restarted = false;
-  for (int iteration = 0; iteration < options_.iterations; ++iteration) {
-    run_.context().check();
-    if (now_.gradient_norm <= kFlatGradient * first_norm) break;
-    const std::vector<Vec3> direction = history_.direction(now_.gradient, preconditioner(now_.moments()));
-    if (!line_search(direction)) {
-      // Once from scratch along the gradient; if that finds nothing either, this is the minimum to rounding.
-      if (restarted) break;
-      restarted = true;
-      history_.clear();
-      continue;
+  energies_.assign(1, energy_);
+  first_norm_ = gradient_norm_;
+  enter_device();
+  for (;;) {
+    try {
+      for (; iteration_ < options_.iterations; ++iteration_) {
+        run_.context().check();
+        if (is_done() || !advance()) break;
+      }
+      return hand_back();
+    } catch (const DeviceError& error) {
+      go_on_without_device(error);
     }
-    restarted = false;
-    accept();
-    energies_.push_back(now_.energy);
-    run_.context().report({options_.phase, iteration + 1, options_.iterations, now_.energy, now_.gradient_norm,
-                           options_.done + options_.share * (iteration + 1) / options_.iterations});
-    const std::size_t n = energies_.size();
-    if (n > kDecreaseWindow &&
-        energies_[n - 1 - kDecreaseWindow] - energies_[n - 1] < kDecreaseWindow * options_.tolerance * energies_[n - 1])
-      break;
   }
-  hand_back();
 }
 
 void optimise(CvtRun& run, const OptimiseOptions& options) {
@@ -293,8 +231,8 @@ CvtGradient complete(CvtRun& run, bool constrained) {
   CvtGradient gradient;
   gradient.vectors = gradient_of(diagram.moments.cells, run.seeds, run.curves(), constrained ? &run.normals_ : nullptr);
   if (constrained) gradient.normals = run.normals_;
-  run.energy = run.covers(diagram) ? diagram.moments.energy : std::numeric_limits<double>::infinity();
-  run.gradient_norm = length_of(gradient.vectors);
+  run.energy = run.covers(diagram.moments.mass) ? diagram.moments.energy : std::numeric_limits<double>::infinity();
+  run.gradient_norm = std::sqrt(square_of(gradient.vectors));
   return gradient;
 }
 

@@ -58,6 +58,12 @@ std::size_t CvtRun::strays() {
   return localised_ ? diagram_.strays : localiser().count_strays(diagram_.positions, now);
 }
 
+void CvtRun::count(const EvaluationReport& report) {
+  ++totals.evaluations;
+  totals.seconds += report.seconds;
+  totals.device_work += report.device_work;
+}
+
 void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& known) {
   // The dual is read off here, when stray parts are gone, and not by the backend.
   const bool wants_dual = includes(want, Want::dual);
@@ -68,9 +74,7 @@ void CvtRun::evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSe
     known.report = backend_->evaluate(positions, computed, known.diagram);
     known.positions = positions;
     known.strays = 0;
-    ++totals.evaluations;
-    totals.seconds += known.report.seconds;
-    totals.device_work += known.report.device_work;
+    count(known.report);
     if (localised_) leave_out_strays(known);
   }
   if (wants_dual && !includes(known.diagram.has, Want::dual)) add_dual(known.diagram);
@@ -93,9 +97,9 @@ void CvtRun::adopt(PlacedSeeds placed, DiagramOfSeeds known) {
   if (!localised_ && diagram_.strays > 0) diagram_ = {};
 }
 
-bool CvtRun::covers(const Diagram& diagram) const {
+bool CvtRun::covers(double mass) const {
   const double total = backend_->mass();
-  return std::abs(diagram.moments.mass - total) <= backend_->mass_tolerance() * total;
+  return std::abs(mass - total) <= backend_->mass_tolerance() * total;
 }
 
 void CvtRun::change_backend(Backend& backend) {

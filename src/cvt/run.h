@@ -69,15 +69,18 @@ class CvtRun {
   void adopt(PlacedSeeds placed, DiagramOfSeeds diagram);
   // Brings a diagram kept elsewhere up to date, and counts the evaluation if that takes one.
   void evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& diagram);
-  // Whether a diagram covers the domain: the masses of its cells sum to the domain's. One that does not is never used.
-  bool covers(const Diagram& diagram) const;
+  // Whether a diagram covers the domain: the masses of its cells sum, to `mass`, to the domain's. One that does not is
+  // never used.
+  bool covers(double mass) const;
   // Goes on with another backend, whose domain may be another. All but the first need to live only while they are used.
   void change_backend(Backend& backend);
 
  private:
   friend class Descent;
+  friend class HostDescent;
   friend struct CvtGradient complete(CvtRun& run, bool constrained);
 
+  void count(const EvaluationReport& report);
   Localiser& localiser();
   void leave_out_strays(DiagramOfSeeds& known);
 

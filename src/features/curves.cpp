@@ -26,10 +26,15 @@ FeatureCurves::FeatureCurves(const FeatureGraph& graph, const std::vector<Vec3>&
     std::vector<Vec3> points;
     for (Index v : curve.vertices) points.push_back(vertices[v]);
     if (curve.closed) points.push_back(points.front());
-    std::vector<double> starts{0};
-    for (std::size_t k = 1; k < points.size(); ++k) starts.push_back(starts.back() + norm(points[k] - points[k - 1]));
-    points_.push_back(std::move(points));
-    starts_.push_back(std::move(starts));
+    double start = 0;
+    for (std::size_t k = 1; k < points.size(); ++k) {
+      const Vec3 along = points[k] - points[k - 1];
+      const double end = start + norm(along);
+      segments_.push_back(
+          {points[k - 1], points[k], along, unit(along), start, end, 1 / (end - start), 1 / norm2(along)});
+      start = end;
+    }
+    first_.push_back(static_cast<Index>(segments_.size()));
     const auto corner = [&](Index v) {
       const auto found = std::lower_bound(graph_.corners.begin(), graph_.corners.end(), v);
       return static_cast<Index>(found - graph_.corners.begin());
@@ -48,44 +53,42 @@ double FeatureCurves::wrap(Index curve, double position) const {
 }
 
 std::size_t FeatureCurves::segment_at(Index curve, double position) const {
-  const std::vector<double>& starts = starts_[curve];
-  const auto above = std::upper_bound(starts.begin() + 1, starts.end() - 1, position);
-  return static_cast<std::size_t>(above - starts.begin()) - 1;
+  const CurveSegment *const begin = segments_.data() + first_[curve], *const end = segments_.data() + first_[curve + 1];
+  const auto above = std::upper_bound(begin + 1, end, position,
+                                      [](double at, const CurveSegment& segment) { return at < segment.start; });
+  return static_cast<std::size_t>(above - begin) - 1;
 }
 
 Vec3 FeatureCurves::point(Index curve, double position) const {
-  const std::size_t k = segment_at(curve, position);
-  const double whole = starts_[curve][k + 1] - starts_[curve][k], t = position - starts_[curve][k];
-  const Vec3 &a = points_[curve][k], &b = points_[curve][k + 1];
-  if (!(t > 0)) return a;
-  return t >= whole ? b : a + (t / whole) * (b - a);
+  const CurveSegment& segment = segments_[first_[curve] + segment_at(curve, position)];
+  const double t = position - segment.start;
+  if (!(t > 0)) return segment.from;
+  return t >= segment.end - segment.start ? segment.to : segment.from + (t * segment.per_length) * segment.along;
 }
 
 Vec3 FeatureCurves::tangent(Index curve, double position) const {
-  const std::size_t k = segment_at(curve, position);
-  return unit(points_[curve][k + 1] - points_[curve][k]);
+  return segments_[first_[curve] + segment_at(curve, position)].tangent;
 }
 
 double FeatureCurves::nearest(Index curve, const Vec3& p, double from, double reach) const {
-  const std::vector<double>& starts = starts_[curve];
-  const std::vector<Vec3>& points = points_[curve];
+  const CurveSegment* const all = segments_.data() + first_[curve];
   const double whole = length(curve);
   const std::size_t count = segments(curve), first = segment_at(curve, from);
   double best = norm2(point(curve, from) - p), position = from;
   // Looks for a nearer point on the part of segment k that is at most `reach` away from `from`; `shift` is the length
   // of the curve, or its negative, where the way there leads across the start of a closed curve.
   const auto try_segment = [&](std::size_t k, double shift) {
-    const double length_k = starts[k + 1] - starts[k];
+    const CurveSegment& segment = all[k];
+    const double length_k = segment.end - segment.start;
     if (!(length_k > 0)) return;
-    const Vec3 along = points[k + 1] - points[k];
-    const double lo = std::max(0.0, from - reach - starts[k] - shift) / length_k;
-    const double hi = std::min(length_k, from + reach - starts[k] - shift) / length_k;
+    const double lo = std::max(0.0, from - reach - segment.start - shift) * segment.per_length;
+    const double hi = std::min(length_k, from + reach - segment.start - shift) * segment.per_length;
     if (lo > hi) return;
-    const double t = std::clamp(dot(p - points[k], along) / norm2(along), lo, hi);
-    const double squared = norm2(points[k] + t * along - p);
+    const double t = std::clamp(dot(p - segment.from, segment.along) * segment.per_square, lo, hi);
+    const double squared = norm2(segment.from + t * segment.along - p);
     if (squared < best) {
       best = squared;
-      position = starts[k] + t * length_k;
+      position = segment.start + t * length_k;
     }
   };
   const bool loop = closed(curve);
@@ -94,14 +97,14 @@ double FeatureCurves::nearest(Index curve, const Vec3& p, double from, double re
     if (!loop && first + step >= count) break;
     const std::size_t k = (first + step) % count;
     const double shift = first + step >= count ? whole : 0;
-    if (starts[k] + shift > from + reach) break;
+    if (all[k].start + shift > from + reach) break;
     try_segment(k, shift);
   }
   for (std::size_t step = 1; step < count; ++step) {
     if (!loop && step > first) break;
     const std::size_t k = step > first ? first + count - step : first - step;
     const double shift = step > first ? -whole : 0;
-    if (starts[k + 1] + shift < from - reach) break;
+    if (all[k].end + shift < from - reach) break;
     try_segment(k, shift);
   }
   return position;

@@ -245,7 +245,7 @@ void Improver::measure(Snapshot& s) {
   run_.context().check();
   if (s.known.diagram.polygons.pairs.empty()) s.known.diagram.polygons = std::move(polygons_);
   run_.evaluate(s.seeds.positions(), parts(), s.known);
-  s.covers = run_.covers(s.known.diagram);
+  s.covers = run_.covers(s.known.diagram.moments.mass);
   const Dual& dual = s.dual();
   const std::vector<Vec3>& seeds = s.seeds.positions();
   const std::size_t n = seeds.size();

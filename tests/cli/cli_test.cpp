@@ -1672,7 +1672,7 @@ TEST_F(Cli, DeviceGivesTheCpusDiagram) {
   EXPECT_NE(reports[1]["device"]["kind"], "cpu");
   EXPECT_EQ(reports[0]["rdt"], reports[1]["rdt"]);
   EXPECT_TRUE(pairs[0] == pairs[1]);
-  for (const char* phase : {"transfer", "grid", "neighbours", "owners", "clip", "sort", "sum"})
+  for (const char* phase : {"transfer", "grid", "neighbours", "owners", "clip", "sort", "sum", "descent"})
     EXPECT_GE(reports[1]["device_seconds"].value(phase, -1.0), 0) << phase;
   EXPECT_FALSE(reports[0].contains("device_work"));
   for (const char* key : {"submits", "dispatches", "bytes_up", "bytes_down", "host_seconds"})

@@ -394,6 +394,33 @@ TEST_P(Parities, AnEvaluationTakesFewSubmissions) {
   }
 }
 
+// The vectors of a descent stay on the device: per step there come down a few numbers, and the seeds every tenth.
+TEST_P(Parities, ADescentStaysOnTheDevice) {
+  if (GetParam().processor == Processor::cpu || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
+  SKIP_WITHOUT_DEVICE(Processor::double_);
+  const TriangleMesh mesh = torus(40, 24);
+  const Surface surface(mesh);
+  const std::vector<Vec3> seeds = random_seeds(mesh, 3000, 23);
+  for (const bool constrained : {false, true}) {
+    SCOPED_TRACE(constrained);
+    OptimiseOptions options;
+    options.tolerance = 0;
+    options.constrained = constrained;
+    const auto bytes_of = [&](int iterations) {
+      const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+      FreeRun free(*backend, seeds);
+      options.iterations = iterations;
+      optimise(free.run, options);
+      const DeviceWork& work = free.run.totals.device_work;
+      return std::pair(static_cast<double>(work.bytes_up + work.bytes_down), free.run.totals.evaluations);
+    };
+    // Nothing is kept yet after ten steps, and what the start and the end take is the same.
+    const auto [few, few_evaluations] = bytes_of(2);
+    const auto [more, more_evaluations] = bytes_of(10);
+    EXPECT_LE(more - few, 1024.0 * (more_evaluations - few_evaluations));
+  }
+}
+
 // Seeds that move as they do from step to step, then more and fewer of them.
 TEST_P(Parities, WhatIsKeptBetweenDiagramsDoesNotShow) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
