@@ -209,7 +209,7 @@ void DeviceDescent::start_direction() { update({kNegateUpdate, &now_.gradient, 0
 void DeviceDescent::project(std::size_t pair, PairPart which, double rho, bool onto) {
   direct(kDotProduct, part(pair, which));
   FinishPush push{};
-  push.multiplier = to_caller(rho, -4);
+  push.multiplier = to_caller(rho, 4);
   push.place = word(pair);
   push.onto = onto;
   sum_up(kCoefficientSum, 1, push);
