@@ -28,6 +28,7 @@ constexpr double kShareOfMemory = 0.25;  // of the device's, for a batch
 constexpr std::size_t kFirstAtOnce = std::size_t{1} << 17;
 constexpr double kSecondsAtOnce = 0.1;
 constexpr std::size_t kGatheredAtOnce = std::size_t{1} << 16;  // pairs that the CPU is asked about
+constexpr std::size_t kLeastExpected = 16;                     // of them, which come down with the counters
 
 uint word(std::size_t n) { return static_cast<uint>(n); }
 
@@ -52,7 +53,7 @@ double batch_pairs_of(const Device& device, double asked) {
 
 PairPass::PairPass(Device& device, bool is_double, const Capacities& capacities)
     : device_(device), double_(is_double), asked_(capacities), buffers_(device, capacities), gathered_(device),
-      answers_(device), values_(device), expect_for_cpu_(32), rounds_(kMostRounds),
+      answers_(device), values_(device), expect_for_cpu_(kLeastExpected), rounds_(kMostRounds),
       at_once_(capacities.at_once                        ? capacities.at_once
                : device.description().kind == "software" ? std::size_t{kNone - 1}
                                                          : kFirstAtOnce) {}
@@ -352,7 +353,7 @@ Counters PairPass::gather_and_count(const PairJob& job) {
 // Settles what was gathered in exact arithmetic, and records the answers.
 void PairPass::answer(const PairJob& job, const Counters& counters) {
   const std::size_t count = for_cpu_.size();
-  expect_for_cpu_ = count + count / 4 + 32;
+  expect_for_cpu_ = count + count / 4 + kLeastExpected;
   Commands& commands = job.commands;
   std::vector<PairName> names;
   for (const GatheredPair& pair : for_cpu_) names.push_back(pair.name);

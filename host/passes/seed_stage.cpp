@@ -158,7 +158,8 @@ void SeedStage::upload_seeds() {
 
 Counters SeedStage::run_counted() {
   Counters counted{};
-  commands.download(counters, 0, counted.data(), sizeof counted);
+  commands.download(counters, kOverflow * sizeof(uint), counted.data() + kOverflow,
+                    (kCounters - kOverflow) * sizeof(uint));
   commands.run();
   return counted;
 }

@@ -45,7 +45,7 @@ class SeedStage {
   // To be called once what was recorded has run. If seeds that kept their slots have come to coincide, sorts all anew
   // and returns false: then all has to be recorded again.
   bool keeps_slots(const Counters& counters);
-  // Runs what is recorded and reads the counters.
+  // Runs what is recorded and reads the counters behind those of work.
   Counters run_counted();
   // Sets the step masses that are negative, for the device does not know them.
   void complete_step_masses(CellMoments& moments);
