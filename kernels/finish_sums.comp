@@ -19,7 +19,8 @@ void main() {
   [[dont_unroll]] for (uint task = gl_LocalInvocationID.x; task < kinds * blocks; task += kGroupSize) {
     const uint kind = task / blocks, first = task % blocks * kSumBlock;
     precise double sum = terms[kind * count + first];
-    [[dont_unroll]] for (uint k = 1; k < min(kSumBlock, count - first); ++k) sum = sum + terms[kind * count + first + k];
+    [[dont_unroll]] for (uint k = 1; k < min(kSumBlock, count - first); ++k)
+      sum = sum + terms[kind * count + first + k];
     sums[task] = sum;
   }
   barrier();

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// A step of all seeds along the direction, and back to where they are held: the nearest point of their cell's triangles,
-// or of their curve near where they were (twin of HostDescent::step and hold in src/cvt/host_descent.cpp).
+// A step of all seeds along the direction, and back to where they are held: the nearest point of their cell's
+// triangles, or of their curve near where they were (twin of HostDescent::step and hold in src/cvt/host_descent.cpp).
 #include "common.glsl"
 #include "double.glsl"
 
@@ -92,7 +92,6 @@ uint nearest_triangle(uvec2 range, dvec3 p, out dvec3 at) {
     const uint t = triangles[k];
     const dvec3 a = corner(t, 0);
     const double side = max(squared_distance(corner(t, 1), a), squared_distance(corner(t, 2), a));
-    // 2 (1 + 1e-9), as the compiler of the host has it
     precise double reach = two_and_more * (limit + side);
     if (squared_distance(a, p) > reach) continue;
     const dvec3 q = nearest_on_triangle(p, t);
