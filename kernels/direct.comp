@@ -4,6 +4,7 @@
 // blocks of kSumBlock seeds (twin of HostVectors in src/cvt/host_descent.cpp).
 #include "common.glsl"
 #include "double.glsl"
+#include "block_sum.glsl"
 #include "layout/descent.h"
 
 layout(constant_id = 0) const uint kUpdate = kNoUpdate;
@@ -19,6 +20,7 @@ layout(std430, binding = 5) writeonly buffer Sums { double sums[]; };     // of 
 #include "layout/push.h"
 
 shared double terms[kGroupSize];
+BLOCK_SUM(sum_of_terms, terms)
 
 void main() {
   const uint i = invocation(), lane = gl_LocalInvocationID.x, at = 3 * i;
@@ -42,7 +44,5 @@ void main() {
   if (lane >= kGroupSize / kSumBlock) return;
   const uint first = i - lane + lane * kSumBlock;
   if (first >= count) return;
-  precise double sum = terms[lane * kSumBlock];
-  [[dont_unroll]] for (uint k = 1; k < min(kSumBlock, count - first); ++k) sum = sum + terms[lane * kSumBlock + k];
-  sums[first / kSumBlock] = sum;
+  sums[first / kSumBlock] = sum_of_terms(lane * kSumBlock, min(kSumBlock, count - first));
 }

@@ -3,6 +3,7 @@
 // Sums of up to kMostToFinish terms of several kinds, by one workgroup, and the numbers that are made of them.
 #include "common.glsl"
 #include "double.glsl"
+#include "block_sum.glsl"
 #include "layout/descent.h"
 
 layout(constant_id = 0) const uint kUse = kStoreSums;
@@ -13,21 +14,19 @@ layout(std430, binding = 1) buffer Numbers { double numbers[]; };
 #include "layout/push.h"
 
 shared double sums[kStepSums * kSumBlock];
+BLOCK_SUM(sum_of_terms, terms)
+BLOCK_SUM(sum_of_sums, sums)
 
 void main() {
   const uint blocks = (count + kSumBlock - 1) / kSumBlock;
   [[dont_unroll]] for (uint task = gl_LocalInvocationID.x; task < kinds * blocks; task += kGroupSize) {
     const uint kind = task / blocks, first = task % blocks * kSumBlock;
-    precise double sum = terms[kind * count + first];
-    [[dont_unroll]] for (uint k = 1; k < min(kSumBlock, count - first); ++k)
-      sum = sum + terms[kind * count + first + k];
-    sums[task] = sum;
+    sums[task] = sum_of_terms(kind * count + first, min(kSumBlock, count - first));
   }
   barrier();
   const uint kind = gl_LocalInvocationID.x;
-  if (gl_WorkGroupID.x > 0 || kind >= kinds) return;
-  precise double sum = sums[kind * blocks];
-  [[dont_unroll]] for (uint k = 1; k < blocks; ++k) sum = sum + sums[kind * blocks + k];
+  if (kind >= kinds) return;
+  const double sum = sum_of_sums(kind * blocks, blocks);
   if (kUse == kStoreSums) {
     numbers[place + kind] = sum;
   } else if (kUse == kCoefficientSum) {

@@ -4,6 +4,7 @@
 // (twin of HostDescent::step and gradient_of in src/cvt/host_descent.cpp).
 #include "common.glsl"
 #include "double.glsl"
+#include "block_sum.glsl"
 
 layout(constant_id = 0) const bool kOnTriangles = false;  // seeds are held on the surface
 layout(constant_id = 1) const bool kSingleCells = false;  // cells are in single precision
@@ -28,6 +29,7 @@ layout(std430, binding = 14) writeonly buffer Sums { double sums[]; };  // of ea
 #include "curves.glsl"
 
 shared double terms[kStepSums * kGroupSize];
+BLOCK_SUM(sum_of_terms, terms)
 
 double cell_number(uint i, uint k) {
   const uint at = kCellWords * i + k;
@@ -83,8 +85,6 @@ void main() {
   const uint kind = lane / kBlocks, block = lane % kBlocks;
   const uint first = i - lane + block * kSumBlock;
   if (first >= count) return;
-  precise double sum = terms[kind * kGroupSize + block * kSumBlock];
-  [[dont_unroll]] for (uint k = 1; k < min(kSumBlock, count - first); ++k)
-    sum = sum + terms[kind * kGroupSize + block * kSumBlock + k];
-  sums[kind * block_count + first / kSumBlock] = sum;
+  sums[kind * block_count + first / kSumBlock] =
+      sum_of_terms(kind * kGroupSize + block * kSumBlock, min(kSumBlock, count - first));
 }

@@ -92,7 +92,7 @@ uint nearest_triangle(uvec2 range, dvec3 p, out dvec3 at) {
     const uint t = triangles[k];
     const dvec3 a = corner(t, 0);
     const double side = max(squared_distance(corner(t, 1), a), squared_distance(corner(t, 2), a));
-    precise double reach = two_and_more * (limit + side);
+    precise double reach = 2.0LF * (1.0LF + 1e-9LF) * (limit + side);
     if (squared_distance(a, p) > reach) continue;
     const dvec3 q = nearest_on_triangle(p, t);
     const double squared = squared_distance(q, p);

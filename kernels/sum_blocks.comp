@@ -3,18 +3,18 @@
 // The next level of sums: of blocks of kSumBlock of them, of several kinds.
 #include "common.glsl"
 #include "double.glsl"
+#include "block_sum.glsl"
 
 layout(std430, binding = 0) readonly buffer Terms { double terms[]; };  // of a kind one after the other
 layout(std430, binding = 1) writeonly buffer Sums { double sums[]; };
 #define PUSH_SUMS
 #include "layout/push.h"
+BLOCK_SUM(sum_of_terms, terms)
 
 void main() {
   const uint blocks = (count + kSumBlock - 1) / kSumBlock;
   const uint kind = invocation() / blocks, block = invocation() % blocks;
   if (kind >= kinds) return;
   const uint first = block * kSumBlock;
-  precise double sum = terms[kind * count + first];
-  [[dont_unroll]] for (uint k = 1; k < min(kSumBlock, count - first); ++k) sum = sum + terms[kind * count + first + k];
-  sums[kind * blocks + block] = sum;
+  sums[kind * blocks + block] = sum_of_terms(kind * count + first, min(kSumBlock, count - first));
 }

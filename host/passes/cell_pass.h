@@ -34,10 +34,9 @@ class CellPass {
 
   // Of each cell, by the caller's index: mass, first and second moment, and the mass that scales steps.
   const Buffer& cells() const { return cells_; }
-  // The places of each slot's elements, and where they begin.
-  const Buffer& places() const { return sorted_places_; }
+  // Where the places of each slot's elements begin.
   const Buffer& begins() const { return begins_; }
-  // To keep what was computed, in exchange for buffers that are used again.
+  // To keep the cells, or those places, in exchange for buffers that are used again.
   void exchange(Buffer& cells) { std::swap(cells_, cells); }
   void exchange_places(Buffer& places) { std::swap(sorted_places_, places); }
   // Pairs that are not empty, once they have been read.

@@ -27,8 +27,6 @@ constexpr double kShareOfMemory = 0.5;  // of the device's, for the vectors
 constexpr int kMostExponent = 120;
 // Seeds below which some lists do not have the neighbours that step masses are computed from.
 constexpr std::size_t kLeastSeeds = 64;
-// Of the host's loop, see nearest_on_triangles() of cvt/constrain.cpp.
-constexpr double kTwoAndMore = 2 * (1 + 1e-9);
 
 uint word(std::size_t n) { return static_cast<uint>(n); }
 
@@ -63,23 +61,15 @@ bool DeviceDescent::is_possible(SeedStage& stage, SurfaceStage& surface, const D
   return stage.within_reach(start.seeds.positions());
 }
 
-DeviceDescent::DeviceDescent(SeedStage& stage, SurfaceStage& surface, CellPass& cells, const Surface& domain,
-                             double mass, const DescentStart& start, EvaluateResident evaluate)
+DeviceDescent::DeviceDescent(SeedStage& stage, SurfaceStage& surface, CellPass& cells, const DescentStart& start,
+                             EvaluateResident evaluate)
     : stage_(stage), surface_(surface), cells_(cells), evaluate_(std::move(evaluate)), commands_(stage.commands),
       n_(start.seeds.size()), on_triangles_(start.normals != nullptr),
-      mean_mass_(mass * stage.seeds.scale * stage.seeds.scale / static_cast<double>(n_)), places_(start.seeds.places()),
+      mean_mass_(surface.surface().mass * stage.seeds.scale * stage.seeds.scale / static_cast<double>(n_)),
       seeds_(stage.device()), place_words_(stage.device()), curves_(stage.device()), segments_(stage.device()),
       facet_of_(stage.device()), direction_(stage.device()), numbers_(stage.device()),
       beyond_(stage.device()), block_sums_{Buffer(stage.device()), Buffer(stage.device())}, now_(stage.device()),
       next_(stage.device()), kept_{start.seeds, 0} {
-  stage_.seeds.largest *= kRoom;
-  reserve(start);
-  upload_start(start, domain);
-  upload_curves(start.curves);
-  commands_.run();
-}
-
-void DeviceDescent::reserve(const DescentStart& start) {
   Device& device = stage_.device();
   for (std::size_t k = 0; k < start.pairs; ++k) {
     steps_.emplace_back(device).reserve(n_ * kVector);
@@ -90,6 +80,9 @@ void DeviceDescent::reserve(const DescentStart& start) {
   place_words_.reserve(n_ * kWord);
   numbers_.reserve(kNumbers * sizeof(double));
   beyond_.reserve(kWord);
+  segments_.reserve(start.curves.all_segments().size() * kSegmentWords * sizeof(double));
+  curves_.reserve(start.curves.size() * kCurveWords * kWord);
+  facet_of_.reserve(on_triangles_ ? surface.surface().facet_of.size() * kWord : kWord);
   const std::size_t blocks = (n_ + kSumBlock - 1) / kSumBlock;
   block_sums_[0].reserve(kStepSums * blocks * sizeof(double));
   block_sums_[1].reserve(kStepSums * ((blocks + kSumBlock - 1) / kSumBlock) * sizeof(double));
@@ -97,14 +90,22 @@ void DeviceDescent::reserve(const DescentStart& start) {
     point->gradient.reserve(n_ * kVector);
     point->weights.reserve(n_ * sizeof(double));
     point->positions.reserve(n_ * sizeof(double));
-    point->cells.reserve(n_ * kCellWords * sizeof(double));
+    point->cells.reserve(n_ * kCellWords * (stage.is_double() ? sizeof(double) : sizeof(float)));
     point->normals.reserve(on_triangles_ ? n_ * kVector : kVector);
     point->ranges.reserve(on_triangles_ ? n_ * 2 * kWord : kWord);
     point->triangles.reserve(on_triangles_ ? start.moments.triangles.values.size() * kWord : kWord);
   }
 }
 
-void DeviceDescent::upload_start(const DescentStart& start, const Surface& domain) {
+void DeviceDescent::begin(const DescentStart& start) {
+  stage_.seeds.largest *= kRoom;
+  stage_.renew_slots(kept_.seeds.positions());
+  upload_start(start);
+  upload_curves(start.curves);
+  commands_.run();
+}
+
+void DeviceDescent::upload_start(const DescentStart& start) {
   const double scale = stage_.seeds.scale;
   const auto upload_vectors = [&](const Buffer& to, const std::vector<Vec3>& vectors, double factor) {
     commands_.upload_items(to, kVector, n_, [&](std::byte* at, std::size_t first, std::size_t count) {
@@ -129,10 +130,9 @@ void DeviceDescent::upload_start(const DescentStart& start, const Surface& domai
   upload(commands_, now_.positions, positions);
   commands_.copy(now_.positions, 0, next_.positions, 0, n_ * sizeof(double));
   upload(commands_, place_words_, words);
-  facet_of_.reserve(kWord);
   if (!on_triangles_) return;
   upload_vectors(now_.normals, *start.normals, 1);
-  upload(commands_, facet_of_, domain.facet_of);
+  upload(commands_, facet_of_, surface_.surface().facet_of);
   std::vector<std::array<uint, 2>> ranges(n_);
   const Csr<Index>& triangles = start.moments.triangles;
   for (std::size_t i = 0; i < n_; ++i) ranges[i] = {word(triangles.offsets[i]), word(triangles.offsets[i + 1])};
@@ -159,8 +159,6 @@ void DeviceDescent::upload_curves(const FeatureCurves& curves) {
   for (Index c = 0; c < curves.size(); ++c)
     of_curves.insert(of_curves.end(),
                      {curves.first_segments()[c], curves.first_segments()[c + 1], uint{curves.closed(c)}});
-  segments_.reserve(sizeof(double));
-  curves_.reserve(kWord);
   upload(commands_, segments_, words);
   upload(commands_, curves_, of_curves);
 }
@@ -235,7 +233,8 @@ StepResult DeviceDescent::step(double length, std::size_t pair) {
   uint beyond = 0;
   std::vector<Vec3> at;
   std::vector<double> positions;
-  if (keeps_) {
+  const bool keeps = accepted_ - kept_.accepted >= kKeepEvery;
+  if (keeps) {
     download(seeds_, at, 1 / stage_.seeds.scale);
     download_positions(positions);
   }
@@ -260,17 +259,13 @@ StepResult DeviceDescent::step(double length, std::size_t pair) {
   result.report = evaluate_(begin, read);
   result.mass = to_caller(sums[kMassSum], 2);
   result.energy = to_caller(sums[kEnergySum], 4);
-  result.slope = to_caller(sums[kSlopeSum], 4);
-  result.next_slope = to_caller(sums[kNextSlopeSum], 4);
-  result.gradient_square = to_caller(sums[kGradientSum], 6);
-  result.sy = to_caller(sums[kSySum], 4);
-  result.ss = to_caller(sums[kSsSum], 2);
-  result.yy = to_caller(sums[kYySum], 6);
+  result.products = {to_caller(sums[kSlopeSum], 4), to_caller(sums[kNextSlopeSum], 4), to_caller(sums[kGradientSum], 6),
+                     to_caller(sums[kSySum], 4),    to_caller(sums[kSsSum], 2),        to_caller(sums[kYySum], 6)};
   result.empty = static_cast<std::size_t>(sums[kEmptySum]);
   result.out_of_reach = beyond != 0;
-  if (std::exchange(keeps_, false)) {
-    stage_.renew_slots(at);
+  if (keeps) {
     kept_ = {placed(std::move(at), positions), accepted_};
+    stage_.renew_slots(kept_.seeds.positions());
   }
   return result;
 }
@@ -281,7 +276,7 @@ void DeviceDescent::move(double length) {
   const FacetChunk& facets = surface_.double_facets().front();
   commands_.phase(&DeviceSeconds::descent);
   commands_.fill(beyond_, 0, kWord, 0);
-  const MovePush push{length, stage_.seeds.largest, kTwoAndMore, word(n_), kTwo};
+  const MovePush push{length, stage_.seeds.largest, word(n_), kTwo};
   commands_.dispatch(
       {"move_seeds", {on_triangles_}},
       {reads(seeds_), reads(direction_), writes(moved), reads(place_words_), reads(now_.positions),
@@ -316,7 +311,6 @@ void DeviceDescent::accept() {
   if (on_triangles_) cells_.exchange_places(next_.triangles);
   std::swap(now_, next_);
   ++accepted_;
-  keeps_ = accepted_ % kKeepEvery == 0;
 }
 
 // --- To the host ---
@@ -340,7 +334,7 @@ void DeviceDescent::download_positions(std::vector<double>& to) {
 }
 
 PlacedSeeds DeviceDescent::placed(std::vector<Vec3> seeds, const std::vector<double>& positions) const {
-  std::vector<SeedPlace> places = places_;
+  std::vector<SeedPlace> places = kept_.seeds.places();
   for (std::size_t i = 0; i < n_; ++i)
     if (places[i].kind == SeedPlace::Kind::curve) places[i].position = positions[i] * (1 / stage_.seeds.scale);
   return {std::move(seeds), std::move(places)};

@@ -24,9 +24,11 @@ class DeviceDescent : public ResidentDescent, private DescentVectors {
   // binding where seeds are held on them, and lengths that leave room for products.
   static bool is_possible(SeedStage& stage, SurfaceStage& surface, const DescentStart& start);
 
-  // All but the start must outlive the descent. `mass` is the surface's. Throws DeviceError.
-  DeviceDescent(SeedStage& stage, SurfaceStage& surface, CellPass& cells, const Surface& domain, double mass,
-                const DescentStart& start, EvaluateResident evaluate);
+  // Asks for all memory, and for no more later. All but the start must outlive the descent. Throws DeviceError.
+  DeviceDescent(SeedStage& stage, SurfaceStage& surface, CellPass& cells, const DescentStart& start,
+                EvaluateResident evaluate);
+  // Takes the start to the device; before all else.
+  void begin(const DescentStart& start);
 
   DescentVectors& vectors() override { return *this; }
   StepResult step(double length, std::size_t pair) override;
@@ -59,8 +61,7 @@ class DeviceDescent : public ResidentDescent, private DescentVectors {
     Buffer ranges, triangles;  // of each seed
   };
 
-  void reserve(const DescentStart& start);
-  void upload_start(const DescentStart& start, const Surface& domain);
+  void upload_start(const DescentStart& start);
   void upload_curves(const FeatureCurves& curves);
   void update(const Update& next);
   void direct(uint product, const Buffer& factor);
@@ -83,14 +84,12 @@ class DeviceDescent : public ResidentDescent, private DescentVectors {
   Commands& commands_;
   std::size_t n_;
   bool on_triangles_;
-  double mean_mass_;               // of a cell, on the device
-  std::vector<SeedPlace> places_;  // of the start
+  double mean_mass_;  // of a cell, on the device
   Buffer seeds_, place_words_, curves_, segments_, facet_of_, direction_, numbers_, beyond_, block_sums_[2];
   std::vector<Buffer> steps_, changes_;
   Point now_, next_;
   std::optional<Update> update_;
   int accepted_ = 0;
-  bool keeps_ = false;  // with the next evaluation
   Kept kept_;
 };
 

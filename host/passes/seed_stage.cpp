@@ -85,7 +85,7 @@ void SeedStage::begin_resident(const std::function<std::vector<Vec3>()>& fetch) 
 }
 
 void SeedStage::renew_slots(const std::vector<Vec3>& given) {
-  if (!seeds.are_stretched(given)) return;
+  if (seeds.follow(given)) return;
   seeds.sort(given);
   order_uploaded_ = false;
   renewed_ = true;

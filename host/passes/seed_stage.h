@@ -35,8 +35,8 @@ class SeedStage {
   // The same for seeds that are in `seeds.given` already, as many as the last ones; `fetch` brings them if they are
   // needed on the host. No coordinate may be larger than `seeds.largest`.
   void begin_resident(const std::function<std::vector<Vec3>()>& fetch);
-  // Lets the next evaluation of resident seeds take them into slots anew if they are in no spatial order any more at
-  // these positions.
+  // Sees to it that the next evaluation of resident seeds finds slots for so many, in a spatial order for these
+  // positions.
   void renew_slots(const std::vector<Vec3>& seeds);
   // Records the upload, and the search for lists if they are not from the host.
   void record();
@@ -69,7 +69,7 @@ class SeedStage {
   Box box_;
   bool followed_ = false, order_uploaded_ = false;
   bool distinct_ = false;           // no two slots are of equal seeds
-  bool renewed_ = false;            // slots, since the last evaluation
+  bool renewed_ = false;            // slots mean other seeds than in the last evaluation
   std::vector<Vec3> brought_back_;  // resident seeds that had to be sorted
   double lists_seconds_ = 0;
   Neighbours rings_;

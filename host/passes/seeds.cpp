@@ -28,10 +28,6 @@ double DeviceSeeds::step_between_slots(const std::vector<Vec3>& seeds) const {
   return *middle;
 }
 
-bool DeviceSeeds::are_stretched(const std::vector<Vec3>& seeds) const {
-  return step_between_slots(seeds) > kMostGrowth * kMostGrowth * sorted_step_;
-}
-
 void DeviceSeeds::sort(const std::vector<Vec3>& seeds) {
   seeds_ = &seeds;
   fetch_ = nullptr;
@@ -45,7 +41,7 @@ bool DeviceSeeds::follow(const std::vector<Vec3>& seeds) {
   seeds_ = &seeds;
   fetch_ = nullptr;
   on_host_ = false;
-  return !are_stretched(seeds);
+  return step_between_slots(seeds) <= kMostGrowth * kMostGrowth * sorted_step_;
 }
 
 void DeviceSeeds::take_resident(std::function<std::vector<Vec3>()> fetch) {

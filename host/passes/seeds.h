@@ -22,8 +22,6 @@ class DeviceSeeds {
   // Takes seeds that are in `given` already, as many as the last ones, and keep their slots. `fetch` brings their
   // positions if the host needs them.
   void take_resident(std::function<std::vector<Vec3>()> fetch);
-  // Whether slots are in no spatial order any more for seeds at these positions.
-  bool are_stretched(const std::vector<Vec3>& seeds) const;
 
   // How many slots there are, and how many seeds, of which some may be equal.
   std::size_t count() const { return sorted_.id.size(); }

@@ -23,6 +23,7 @@ class SurfaceStage {
 
   void learn_speed(std::size_t pairs, double seconds) { pairs_.learn_speed(pairs, seconds); }
 
+  const Surface& surface() const { return surface_; }
   const PairStore& store() const { return store_; }
   // The facets in double precision, where some kernels compute in it.
   const std::vector<FacetChunk>& double_facets() const {

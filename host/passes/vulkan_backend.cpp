@@ -71,7 +71,15 @@ std::unique_ptr<ResidentDescent> VulkanBackend::descend(const DescentStart& star
   const auto evaluate = [this](const std::function<void()>& begin, const ReadMass& read) {
     return run(begin, [&] { return find_cells(read); });
   };
-  return std::make_unique<DeviceDescent>(stage_, pairs_, cells_, surface(), mass(), start, evaluate);
+  std::unique_ptr<DeviceDescent> descent;
+  try {
+    descent = std::make_unique<DeviceDescent>(stage_, pairs_, cells_, start, evaluate);
+  } catch (const DeviceError&) {
+    // There is no memory for the vectors; the host has some.
+    return nullptr;
+  }
+  descent->begin(start);
+  return descent;
 }
 
 }  // namespace

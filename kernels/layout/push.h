@@ -139,10 +139,9 @@ PUSH_CONSTANTS(RadixPush) {
 #if LAYOUT_CPLUSPLUS || defined(PUSH_MOVE)
 PUSH_CONSTANTS(MovePush) {
   double step_length;
-  double farthest;      // coordinate that is within reach
-  double two_and_more;  // 2 (1 + 1e-9), the margin of nearest_on_triangles()
-  uint count;           // of seeds
-  uint two;             // 2: see loops_complete() of common.glsl
+  double farthest;  // coordinate that is within reach
+  uint count;       // of seeds
+  uint two;         // 2: see loops_complete() of common.glsl
 };
 #endif
 
@@ -202,7 +201,7 @@ static_assert(sizeof(ClipPush) == 32 && offsetof(ClipPush, residual) == 4 && off
 static_assert(sizeof(DoubtfulPush) == 20 && offsetof(DoubtfulPush, mean_density) == 12 &&
               offsetof(DoubtfulPush, share) == 16);
 static_assert(sizeof(GatherPairsPush) == 4);
-static_assert(sizeof(MovePush) == 32 && offsetof(MovePush, count) == 24 && offsetof(MovePush, two) == 28);
+static_assert(sizeof(MovePush) == 24 && offsetof(MovePush, count) == 16 && offsetof(MovePush, two) == 20);
 static_assert(sizeof(MeasurePush) == 16 && offsetof(MeasurePush, count) == 8);
 static_assert(sizeof(DirectPush) == 8 && sizeof(SumsPush) == 8);
 static_assert(sizeof(FinishPush) == 24 && offsetof(FinishPush, count) == 8 && offsetof(FinishPush, onto) == 20);

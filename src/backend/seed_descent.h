@@ -37,15 +37,30 @@ class DescentVectors {
   virtual void weigh(std::optional<std::size_t> pair, double sy) = 0;
 };
 
-// What a step has led to. Sums over seeds are by the one rule of sums (core/parallel.h).
-struct StepResult {
-  double mass = 0, energy = 0;    // of all cells
+// Products of vectors, summed over seeds by the one rule of sums (core/parallel.h).
+struct StepProducts {
   double slope = 0;               // of the iterate's gradient along the direction
-  double next_slope = 0;          // of the gradient there along it
-  double gradient_square = 0;     // of the gradient there
+  double next_slope = 0;          // of the gradient after the step along it
+  double gradient_square = 0;     // of the gradient after the step
   double sy = 0, ss = 0, yy = 0;  // of the pair
-  std::size_t empty = 0;          // cells without points of seeds on the surface or inside a solid
-  bool out_of_reach = false;      // of a device: nothing else counts then, and the iterate has to be brought back
+
+  StepProducts& operator+=(const StepProducts& b) {
+    slope += b.slope;
+    next_slope += b.next_slope;
+    gradient_square += b.gradient_square;
+    sy += b.sy;
+    ss += b.ss;
+    yy += b.yy;
+    return *this;
+  }
+};
+
+// What a step has led to.
+struct StepResult {
+  double mass = 0, energy = 0;  // of all cells
+  StepProducts products;
+  std::size_t empty = 0;      // cells without points of seeds on the surface or inside a solid
+  bool out_of_reach = false;  // of a device: nothing else counts then, and the iterate has to be brought back
   EvaluationReport report;
 };
 
@@ -67,8 +82,8 @@ struct DescentStart {
   const FeatureCurves& curves;
   const CellMoments& moments;
   const std::vector<Vec3>& gradient;
-  const std::vector<Vec3>*
-      normals;        // of the surface at each seed, if seeds are held on it; then moments have triangles
+  // Of the surface at each seed, if seeds are held on it; then `moments` have triangles.
+  const std::vector<Vec3>* normals;
   std::size_t pairs;  // of L-BFGS, by number from 0
 };
 

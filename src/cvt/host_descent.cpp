@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <utility>
 
@@ -126,11 +125,8 @@ void HostDescent::hold(const CellMoments& moments, const std::vector<Vec3>& befo
 void HostDescent::measure(Iterate& iterate) const {
   const Want want = constrained_ ? Want::triangles : Want::moments;
   run_.evaluate(iterate.seeds.positions(), want, iterate.known);
-  const CellMoments& moments = iterate.moments();
-  iterate.energy = run_.covers(moments.mass) ? moments.energy : std::numeric_limits<double>::infinity();
   iterate.gradient =
-      gradient_of(moments.cells, iterate.seeds, run_.curves(), constrained_ ? &iterate.normals : nullptr);
-  iterate.gradient_square = square_of(iterate.gradient);
+      gradient_of(iterate.moments().cells, iterate.seeds, run_.curves(), constrained_ ? &iterate.normals : nullptr);
 }
 
 // Puts the seeds of empty cells at far corners of the cells of highest energy.
@@ -157,7 +153,7 @@ void HostDescent::start() {
     if (trial == kReseedTrials || count_lost(now) == 0) break;
     reseed();
   }
-  if (!std::isfinite(now.energy))
+  if (!run_.covers(now.moments().mass))
     throw Error("the diagram does not cover the domain; its coordinates may span too many magnitudes");
   set_weights();
 }
@@ -180,36 +176,19 @@ StepResult HostDescent::step(double length, std::size_t number) {
   hold(now.moments(), now.seeds.positions(), next_);
   measure(next_);
 
-  struct Products {
-    double slope = 0, next_slope = 0, sy = 0, ss = 0, yy = 0;
-    Products& operator+=(const Products& b) {
-      slope += b.slope;
-      next_slope += b.next_slope;
-      sy += b.sy;
-      ss += b.ss;
-      yy += b.yy;
-      return *this;
-    }
-  };
   HostVectors::Pair& pair = vectors_.pairs[number];
   pair.step.resize(positions.size());
   pair.change.resize(positions.size());
-  const Products sums = fixed_sum<Products>(positions.size(), [&](std::size_t i) {
-    const Vec3 s = next_.seeds.position(i) - now.seeds.position(i), y = next_.gradient[i] - now.gradient[i];
+  StepResult result;
+  result.products = fixed_sum<StepProducts>(positions.size(), [&](std::size_t i) {
+    const Vec3 &g = now.gradient[i], &next = next_.gradient[i];
+    const Vec3 s = next_.seeds.position(i) - now.seeds.position(i), y = next - g;
     pair.step[i] = s;
     pair.change[i] = y;
-    return Products{dot(now.gradient[i], direction[i]), dot(next_.gradient[i], direction[i]), dot(s, y), norm2(s),
-                    norm2(y)};
+    return StepProducts{dot(g, direction[i]), dot(next, direction[i]), norm2(next), dot(s, y), norm2(s), norm2(y)};
   });
-  StepResult result;
   result.mass = next_.moments().mass;
   result.energy = next_.moments().energy;
-  result.slope = sums.slope;
-  result.next_slope = sums.next_slope;
-  result.gradient_square = next_.gradient_square;
-  result.sy = sums.sy;
-  result.ss = sums.ss;
-  result.yy = sums.yy;
   result.empty = count_lost(next_);
   result.report = next_.known.report;
   return result;

@@ -40,9 +40,7 @@ struct Iterate {
   PlacedSeeds seeds;
   DiagramOfSeeds known;
   std::vector<Vec3> gradient;
-  std::vector<Vec3> normals;   // of the surface at each seed, if constrained
-  double energy = 0;           // infinite if the diagram does not cover the domain
-  double gradient_square = 0;  // sum |g_i|^2
+  std::vector<Vec3> normals;  // of the surface at each seed, if constrained
 
   const CellMoments& moments() const { return known.diagram.moments; }
 };

@@ -62,8 +62,8 @@ class Descent {
 
 void Descent::start() {
   on_host_.start();
-  energy_ = on_host_.now.energy;
-  gradient_norm_ = std::sqrt(on_host_.now.gradient_square);
+  energy_ = on_host_.now.moments().energy;
+  gradient_norm_ = std::sqrt(square_of(on_host_.now.gradient));
   history_.clear();
 }
 
@@ -83,7 +83,6 @@ void Descent::leave_device() {
     on_device_->bring_back(now.seeds, now.known.diagram.moments, now.gradient, now.normals);
     now.known.diagram.has = options_.constrained ? Want::triangles : Want::moments;
     now.known.positions = now.seeds.positions();
-    now.known.report = next_.report;
     now.known.strays = 0;
   }
   on_device_.reset();
@@ -98,9 +97,10 @@ bool Descent::is_descent(double length) const {
   if (run_.localises())
     before = *std::max_element(energies_.end() - static_cast<std::ptrdiff_t>(std::min(energies_.size(), kMemory)),
                                energies_.end());
-  if (next_.energy <= before + kArmijo * length * next_.slope) return true;
+  if (next_.energy <= before + kArmijo * length * next_.products.slope) return true;
   const double noise = run_.backend().energy_noise() * energy_;
-  return noise > 0 && next_.energy <= energy_ + noise && next_.next_slope <= (2 * kArmijo - 1) * next_.slope;
+  return noise > 0 && next_.energy <= energy_ + noise &&
+         next_.products.next_slope <= (2 * kArmijo - 1) * next_.products.slope;
 }
 
 // Backtracks along the direction until the energy falls enough, by interpolation. False if no step was found.
@@ -111,10 +111,10 @@ bool Descent::line_search() {
     if (on_device_) run_.count(next_.report);
     if (next_.out_of_reach) return false;
     if (!run_.covers(next_.mass)) next_.energy = std::numeric_limits<double>::infinity();
-    if (!(next_.slope < 0)) return false;
+    if (!(next_.products.slope < 0)) return false;
     if (is_descent(length)) return true;
-    const double excess = next_.energy - energy_ - length * next_.slope;
-    const double vertex = std::isfinite(excess) ? -0.5 * next_.slope * length * length / excess : 0;
+    const double excess = next_.energy - energy_ - length * next_.products.slope;
+    const double vertex = std::isfinite(excess) ? -0.5 * next_.products.slope * length * length / excess : 0;
     length = std::clamp(vertex, 0.1 * length, 0.5 * length);
   }
   return false;
@@ -125,9 +125,10 @@ bool Descent::line_search() {
 void Descent::accept() {
   ++run_.totals.iterations;
   space().accept();
-  history_.push(next_.sy, next_.ss, next_.yy);
+  if (on_device_) on_host_.now.known.report = next_.report;
+  history_.push(next_.products.sy, next_.products.ss, next_.products.yy);
   energy_ = next_.energy;
-  gradient_norm_ = std::sqrt(next_.gradient_square);
+  gradient_norm_ = std::sqrt(next_.products.gradient_square);
   energies_.push_back(energy_);
   if (next_.empty > 0) {
     leave_device();

@@ -77,7 +77,6 @@ class CvtRun {
 
  private:
   friend class Descent;
-  friend class HostDescent;
   friend struct CvtGradient complete(CvtRun& run, bool constrained);
 
   void count(const EvaluationReport& report);

@@ -24,6 +24,7 @@
 #include "remesh/remesh.h"
 #include "support/diagram.h"
 #include "support/models.h"
+#include "support/run.h"
 
 namespace bisector::test {
 namespace {
@@ -350,6 +351,62 @@ TEST_F(LostInARun, GivesTheCpusMesh) {
     EXPECT_TRUE(same_bits(found.energy, expected.energy));
   }
   EXPECT_TRUE(same_bits(whole.mesh.vertices, expected.mesh.vertices));
+}
+
+// Energies of a descent fall from step to step, and after the loss it goes on from one of its own iterates.
+TEST_F(LostInARun, GoesOnFromTheSeedsThatWereKept) {
+  SKIP_WITHOUT_DEVICE(Precision::double_);
+  const TriangleMesh mesh = torus(24, 16);
+  const Surface surface(mesh);
+  OptimiseOptions options;
+  options.iterations = 30;
+  options.tolerance = 0;
+  std::vector<Progress> steps;
+  std::vector<std::string> warnings;
+  Context context = collecting(warnings);
+  context.progress = [&](const Progress& step) { steps.push_back(step); };
+  const auto run = [&] {
+    steps.clear();
+    FallbackBackend backend(device_backend(surface, with_precision(Precision::double_)), NeighbourSource::nearest,
+                            context);
+    FreeRun free(backend, random_seeds(mesh, 250, 3), context);
+    optimise(free.run, options);
+    EXPECT_EQ(free.run.totals.iterations, 30);
+    EXPECT_EQ(free.run.energy, steps.back().energy);
+    return backend.description().kind;
+  };
+  host::inject_fault(Fault::none, 0);
+  EXPECT_NE(run(), "cpu");
+  EXPECT_EQ(steps.size(), 30u);
+  const std::size_t calls = host::fallible_calls();
+  host::inject_fault(Fault::device_lost, calls * 3 / 5);
+  EXPECT_EQ(run(), "cpu");
+  EXPECT_EQ(warnings.size(), 1u);
+  // Where the loss was, steps count again from the first that is not kept.
+  std::size_t resumed = 1;
+  while (resumed < steps.size() && steps[resumed].iteration > steps[resumed - 1].iteration) ++resumed;
+  ASSERT_LT(resumed, steps.size());
+  EXPECT_EQ(steps[resumed].iteration % ResidentDescent::kKeepEvery, 1);
+  EXPECT_GT(steps[resumed].iteration, 1);
+  const std::size_t kept = static_cast<std::size_t>(steps[resumed].iteration) - 2;
+  EXPECT_LE(steps[resumed].energy, steps[kept].energy);
+}
+
+TEST_F(LostInARun, VectorsThatFindNoMemoryAreOnTheHost) {
+  SKIP_WITHOUT_DEVICE(Precision::double_);
+  const TriangleMesh mesh = torus(24, 16);
+  const Surface surface(mesh);
+  const std::unique_ptr<Backend> backend = device_backend(surface, with_precision(Precision::double_));
+  const PlacedSeeds seeds(random_seeds(mesh, 250, 3));
+  Diagram diagram;
+  backend->evaluate(seeds.positions(), Want::moments, diagram);
+  const std::vector<Vec3> gradient(seeds.size());
+  const FeatureCurves curves;
+  const DescentStart start{seeds, curves, diagram.moments, gradient, nullptr, 8};
+  host::inject_fault(Fault::out_of_memory, 2);
+  EXPECT_EQ(backend->descend(start), nullptr);
+  host::inject_fault(Fault::none, 0);
+  EXPECT_NE(backend->descend(start), nullptr);
 }
 
 // --- Without double precision ---
