@@ -83,7 +83,7 @@ DeviceList list_devices() {
         description.rejected = error.what();
       }
     }
-    if (list.devices.empty()) list.problem = "there is no Vulkan device";
+    if (list.devices.empty()) list.problem = "Vulkan's drivers find no device; let the container or user see it";
   } catch (const DeviceError& error) {
     list.problem = error.what();
   }

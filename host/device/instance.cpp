@@ -79,7 +79,7 @@ vk::raii::Instance make_instance(const vk::raii::Context& context) {
     checkpoint("vkCreateInstance");
     return {context, info};
   } catch (const vk::IncompatibleDriverError&) {
-    throw DeviceError("there is no Vulkan driver; install the GPU's driver");
+    throw DeviceError("there is no Vulkan driver that works; install the GPU's driver, or let the container see it");
   } catch (const vk::SystemError& error) {
     fail("Vulkan", "vkCreateInstance", error);
   }
@@ -94,7 +94,8 @@ Instance::Library::Library() {
   const char* name = override_name ? override_name : "libvulkan.so.1";
   handle = dlopen(name, RTLD_NOW | RTLD_LOCAL);
   if (!handle) {
-    throw DeviceError(std::string("there is no Vulkan loader (") + name + "); install the GPU's driver and libvulkan1");
+    throw DeviceError(std::string("there is no Vulkan loader (") + name +
+                      "); install the package libvulkan1 or vulkan-loader, and the GPU's driver");
   }
 }
 

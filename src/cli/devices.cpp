@@ -52,6 +52,11 @@ Json device_entry(const DeviceDescription& device) {
   return entry;
 }
 
+constexpr const char* kNoGpu =
+    "gpu       none. One needs its driver (NVIDIA's, or mesa-vulkan-drivers for AMD and Intel) and the loader\n"
+    "          (libvulkan1). A container needs NVIDIA_DRIVER_CAPABILITIES=all, libxext6 and libegl1, or --device\n"
+    "          /dev/dri; users must be let at /dev/dri/render*. More is under \"devices\" in cli.md.";
+
 std::string describe(const DeviceDescription& device) {
   std::string line = fmt::format(
       "vulkan:{}  {}: {}, driver {}, Vulkan {}, {} of memory, {}, uuid {}", device.index, device.name, device.kind,
@@ -70,6 +75,7 @@ void run(const DevicesCommand& command) {
                             counted(thread_count(), "thread", "threads"), gibibytes(installed_memory())));
   for (const DeviceDescription& device : list.devices) console.print(describe(device));
   if (list.devices.empty()) console.print("vulkan    none: " + list.problem);
+  if (!best_gpu(list)) console.print(kNoGpu);
 
   if (command.report.empty()) return;
   Json report = start_report("devices");
