@@ -92,6 +92,8 @@ void add_device_options(CLI::App& app, DeviceOptions& options) {
   cli::add_words(&app, "--precision", options.precision, cli::kPrecisionWords, cli::kPrecisionWords.list().c_str());
   app.add_option("--double-rung", options.double_rung, "on, off: of single precision")
       ->transform(CLI::CheckedTransformer(kSwitch));
+  app.add_option("--at-once", options.at_once, "pairs that one dispatch clips at most; default: by the device's speed")
+      ->check(CLI::PositiveNumber);
 }
 
 void add_device(CLI::App& app, DeviceRequest& device) {
@@ -105,6 +107,7 @@ std::unique_ptr<Backend> make_device_backend(const Surface& surface, const Devic
   vulkan.precision = options.precision;
   vulkan.neighbours = source;
   vulkan.double_rung = options.double_rung;
+  vulkan.capacities.at_once = options.at_once;
   return host::make_vulkan_backend(surface, host::Device::open(options.device), vulkan);
 }
 

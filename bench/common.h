@@ -38,11 +38,12 @@ struct DeviceOptions {
   DeviceRequest device{.kind = DeviceRequest::Kind::cpu};
   Precision precision = Precision::automatic;
   bool double_rung = true;  // whether single precision hands uncertain pairs to double precision
+  std::size_t at_once = 0;  // pairs that one dispatch clips at most; 0: by the device's speed
 };
 
 // --device
 void add_device(CLI::App& app, DeviceRequest& device);
-// --device, --precision and --double-rung
+// --device, --precision, --double-rung and --at-once
 void add_device_options(CLI::App& app, DeviceOptions& options);
 inline bool is_cpu(const DeviceRequest& device) { return device.kind == DeviceRequest::Kind::cpu; }
 

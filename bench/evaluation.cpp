@@ -37,7 +37,8 @@ struct Options {
   std::size_t repeat = 5;
   DeviceOptions device;
   std::string json;
-  bool once = false;  // one evaluation of the first of each list and nothing else, for its memory
+  bool alone = false;  // without the yardstick and the memory
+  bool once = false;   // one evaluation of the first of each list and nothing else, for its memory
 };
 
 struct Run {
@@ -130,7 +131,7 @@ struct Series {
     neighbours.push_back(phases.delaunay + phases.neighbours);
     owners.push_back(phases.pairs);
     clip.push_back(phases.clip);
-    ratio.push_back(run.total / delaunay);
+    if (delaunay > 0) ratio.push_back(run.total / delaunay);
     if (gradient_norm != 0 && run.gradient_norm != gradient_norm)
       throw Error("the gradient differs from the last run's");
     gradient_norm = run.gradient_norm;
@@ -157,8 +158,9 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
   for (std::size_t r = 0; r < repeat; ++r) {
     for (Series& s : series) {
       // Its own triangulation right before each: what slows one of the two slows the other.
-      delaunay.push_back(delaunay_seconds(seeds));
-      s.add(evaluate(surface, seeds, cli::kNeighbourWords.parse(s.source), s.threads, s.device.get()), delaunay.back());
+      if (!options.alone) delaunay.push_back(delaunay_seconds(seeds));
+      s.add(evaluate(surface, seeds, cli::kNeighbourWords.parse(s.source), s.threads, s.device.get()),
+            options.alone ? 0 : delaunay.back());
     }
     std::fprintf(stderr, "%zu seeds: round %zu of %zu\n", count, r + 1, repeat);
   }
@@ -168,13 +170,14 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
     const Series& base =
         *std::find_if(series.begin(), series.end(), [&](const Series& b) { return b.source == s.source; });
     const EvaluationReport& m = s.last;
-    table.rows.push_back(
-        {std::to_string(count), s.source, std::to_string(s.threads), milliseconds(median(s.total)),
-         milliseconds(median(s.neighbours)), milliseconds(median(s.owners)), milliseconds(median(s.clip)),
-         milliseconds(median(delaunay)), fmt::format("{:.2f}", median(s.ratio)),
-         fmt::format("{:.2f}", median(base.total) / median(s.total)), fmt::format("{:.0f}", s.memory),
-         std::to_string(m.certification.pairs), std::to_string(m.certification.uncertain),
-         std::to_string(m.certification.wider), fmt::format("{:.1e}", std::abs(s.mass - surface.mass) / surface.mass)});
+    table.rows.push_back({std::to_string(count), s.source, std::to_string(s.threads), milliseconds(median(s.total)),
+                          milliseconds(median(s.neighbours)), milliseconds(median(s.owners)),
+                          milliseconds(median(s.clip)), options.alone ? "" : milliseconds(median(delaunay)),
+                          options.alone ? "" : fmt::format("{:.2f}", median(s.ratio)),
+                          fmt::format("{:.2f}", median(base.total) / median(s.total)),
+                          options.alone ? "" : fmt::format("{:.0f}", s.memory), std::to_string(m.certification.pairs),
+                          std::to_string(m.certification.uncertain), std::to_string(m.certification.wider),
+                          fmt::format("{:.1e}", std::abs(s.mass - surface.mass) / surface.mass)});
     if (is_cpu(options.device.device)) continue;
     const DeviceSeconds& d = m.seconds.device;
     std::vector<std::string>& row = table.rows.back();
@@ -206,7 +209,7 @@ void run(const Options& options) {
         Series s;
         s.source = source;
         s.threads = threads;
-        s.memory = peak_memory(options, count, source, threads);
+        if (!options.alone) s.memory = peak_memory(options, count, source, threads);
         all.back().push_back(std::move(s));
       }
   }
@@ -247,6 +250,7 @@ int main(int argc, char** argv) {
   add_device_options(app, options.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
   app.add_option("--json", options.json, "the same as JSON");
+  app.add_flag("--alone", options.alone, "leave out CGAL and the memory, which take longer than all else");
   app.add_flag("--once", options.once)->group("");
   CLI11_PARSE(app, argc, argv);
   try {
