@@ -22,6 +22,7 @@
 #include "common.h"
 #include "core/geometry.h"
 #include "io/files.h"
+#include "mesh/sampling.h"
 
 namespace {
 
@@ -34,7 +35,8 @@ struct Options {
   std::vector<std::string> models{BISECTOR_DEFAULT_MODEL};
   std::string csv, json;
   std::size_t seeds = 100'000;
-  std::vector<std::string> patterns{"random", "grid", "dyadic"}, rungs{"double", "single", "single-only"};
+  std::vector<std::string> patterns{"random", "graded", "patch", "grid", "dyadic"},
+      rungs{"double", "single", "single-only"};
   DeviceOptions device;
   bool once = false;  // the first of each list, in this process
 };
@@ -43,12 +45,7 @@ struct Options {
 // lie at whole multiples of powers of two, so that far more ties are exact, and may reach beyond the box.
 std::vector<Vec3> grid_seeds(const TriangleMesh& mesh, std::size_t count, bool dyadic) {
   const int n = std::max(2, static_cast<int>(std::lround(std::cbrt(static_cast<double>(count)))));
-  Box box{mesh.vertices.front(), mesh.vertices.front()};
-  for (const Vec3& v : mesh.vertices)
-    for (int k = 0; k < 3; ++k) {
-      box.lo[k] = std::min(box.lo[k], v[k]);
-      box.hi[k] = std::max(box.hi[k], v[k]);
-    }
+  Box box = bounding_box(mesh.vertices);
   for (int k = 0; k < 3 && dyadic; ++k) {
     const double extent = box.hi[k] - box.lo[k];
     double spacing = extent > 0 ? std::exp2(std::ceil(std::log2(extent / (n - 1)))) : 1;
@@ -69,6 +66,28 @@ std::vector<Vec3> grid_seeds(const TriangleMesh& mesh, std::size_t count, bool d
   return seeds;
 }
 
+// Random seeds whose spacing grows thirtyfold along x, or is a tenth of the rest's in a ball around a vertex, a tenth
+// of the diagonal in radius.
+std::vector<Vec3> uneven_seeds(const TriangleMesh& mesh, std::size_t count, bool patch) {
+  const Box box = bounding_box(mesh.vertices);
+  std::vector<double> density;
+  for (const Vec3& v : mesh.vertices) {
+    const double along = (v[0] - box.lo[0]) / (box.hi[0] - box.lo[0]);
+    const bool inside = norm(v - mesh.vertices.front()) < 0.1 * norm(box.hi - box.lo);
+    const double spacing = patch ? (inside ? 0.1 : 1) : std::pow(30, along);
+    density.push_back(1 / (spacing * spacing));
+  }
+  std::vector<Vec3> seeds;
+  for (const SurfaceSample& sample : sample_surface(mesh, count, 1, density)) seeds.push_back(sample.point);
+  return seeds;
+}
+
+std::vector<Vec3> seeds_of(const TriangleMesh& mesh, std::size_t count, const std::string& pattern) {
+  if (pattern == "random") return random_seeds(mesh, count);
+  if (pattern == "graded" || pattern == "patch") return uneven_seeds(mesh, count, pattern == "patch");
+  return grid_seeds(mesh, count, pattern == "dyadic");
+}
+
 std::string device_phases(const DeviceSeconds& s) {
   std::string text;
   for (const double seconds : {s.transfer, s.grid, s.neighbours, s.owners, s.clip, s.sort, s.sum})
@@ -81,8 +100,7 @@ void run_once(Options options) {
   const std::string& model = options.models.front();
   const Surface surface(read_mesh(model));
   const std::string& pattern = options.patterns.front();
-  const std::vector<Vec3> seeds = pattern == "random" ? random_seeds(surface.mesh, options.seeds)
-                                                      : grid_seeds(surface.mesh, options.seeds, pattern == "dyadic");
+  const std::vector<Vec3> seeds = seeds_of(surface.mesh, options.seeds, pattern);
   const std::string& rung = options.rungs.front();
   options.device.precision = rung == "double" ? Precision::double_ : Precision::single;
   options.device.double_rung = rung != "single-only";
@@ -176,9 +194,9 @@ int main(int argc, char** argv) {
   CLI::App app{"Counts the pairs that climb each rung of certification on a device, with time and memory."};
   app.add_option("MESH", options.models, "surfaces; default: examples/smooth.off");
   app.add_option("--seeds", options.seeds, "about how many")->check(CLI::Range(2, 100'000'000));
-  app.add_option("--patterns", options.patterns, "random, grid, dyadic")
+  app.add_option("--patterns", options.patterns, "random, graded, patch, grid, dyadic")
       ->delimiter(',')
-      ->check(CLI::IsMember({"random", "grid", "dyadic"}));
+      ->check(CLI::IsMember({"random", "graded", "patch", "grid", "dyadic"}));
   app.add_option("--rungs", options.rungs, "double; single; single-only, without the double rung")
       ->delimiter(',')
       ->check(CLI::IsMember({"double", "single", "single-only"}));

@@ -60,6 +60,7 @@ Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSo
              Backend* device) {
   const ThreadLimit limit(threads);
   Run run;
+  std::vector<Vec3> gradient(seeds.size());
   if (device && seeds.size() > 1) device->evaluate(moved(surface, seeds), Want::moments, run.diagram);
   const Stopwatch watch;
   if (device) {
@@ -67,7 +68,6 @@ Run evaluate(const Surface& surface, const std::vector<Vec3>& seeds, NeighbourSo
   } else {
     run.report = CpuBackend(surface, source).evaluate(seeds, Want::moments, run.diagram);
   }
-  std::vector<Vec3> gradient(seeds.size());
   parallel_each(seeds.size(), [&](std::size_t i) { gradient[i] = -2.0 * run.diagram.moments.cells[i].first; });
   run.gradient_norm = std::sqrt(fixed_sum(seeds.size(), [&](std::size_t i) { return norm2(gradient[i]); }));
   const double missing = std::abs(run.diagram.moments.mass - surface.mass);

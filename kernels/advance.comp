@@ -19,7 +19,7 @@ void main() {
   counters[work + kBeginAfter] = begin;
   counters[work + kEndAfter] = begin + items;
   if (kind == kWorkProposals && items > 0) ++counters[kRounds];
-  const uint groups = (items + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x, x = min(groups, most_groups);
+  const uint groups = (items + group_items - 1) / group_items, x = min(groups, most_groups);
   const uint arguments = kGroups + 3 * kind;
   counters[arguments] = x;
   counters[arguments + 1] = x == 0 ? 0 : (groups + x - 1) / x;

@@ -37,8 +37,8 @@ void main() {
     real masses[kNear];
     const uint count = min(info.y, kNear);
     for (uint k = 0; k < count; ++k) {
-      const uint first = info.x & ~kWideList;
-      const real mass = sum_of((info.x & kWideList) != 0 ? wide_lists[first + k] : lists[first + k], 0);
+      const uint first = info.x & ~kInWideLists;
+      const real mass = sum_of((info.x & kInWideLists) != 0 ? wide_lists[first + k] : lists[first + k], 0);
       uint m = k;
       for (; m > 0 && masses[m - 1] > mass; --m) masses[m] = masses[m - 1];
       masses[m] = mass;

@@ -38,9 +38,9 @@ layout(std430, binding = 15) writeonly buffer Labels { uint labels[]; };
 #include "tet.glsl"
 LOAD_POINT(seed, seed_words)
 
-const uint kMostListed = 512;  // work is bounded; a Delaunay ring may be longer
+const uint kMostListed = kWidestList;  // work is bounded; a Delaunay ring may be longer
 
-uint list_first;
+uint list_first, list_width;
 bool list_wide;
 uint neighbour(uint k) { return list_wide ? wide_lists[list_first + k] : lists[list_first + k]; }
 
@@ -125,8 +125,9 @@ void main() {
     status = owner == slot ? kStatusWhole : kStatusEmpty;
   } else {
     const uvec4 info = list_info[slot];
-    list_wide = (info.x & kWideList) != 0;
-    list_first = info.x & ~kWideList;
+    list_wide = (info.x & kInWideLists) != 0;
+    list_first = info.x & ~kInWideLists;
+    list_width = info.w;
     status = info.y > kMostListed ? kStatusUnsure : clip(info.y, real(uintBitsToFloat(info.z)));
   }
   bounding_count = 0;
@@ -158,7 +159,10 @@ void main() {
     propose_all(tet);
   } else if (kRung == kRungFirst && (status == kStatusShortList || status == kStatusCrowded)) {
     flag(kFlaggedShort, pair);
-  } else if (kRung == kRungDouble && status == kStatusShortList && !list_wide && !again) {
+  } else if (kRung == kRungWide && status == kStatusShortList && list_width != kListWidest) {
+    atomicAdd(counters[kShortAgain], 1u);
+    flag(kFlaggedShort, pair);
+  } else if (kRung == kRungDouble && status == kStatusShortList && list_width != kListWidest && !again) {
     flag(kFlaggedShort, pair | kAgainInDouble);
   } else if (kDoubleNext && status == kStatusUnsure) {
     flag(kFlaggedUncertain, pair);

@@ -63,14 +63,14 @@ struct Commands::Impl {
   }
 
   // Before each command: starts the recording if there is none, and puts the barrier for the uses.
-  void prepare() {
+  void prepare(std::string_view name) {
     if (!recording) {
       device.attempt("vkBeginCommandBuffer", [&] {
         commands.begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
       });
       recording = true;
     }
-    timestamps.mark(commands, phase);
+    timestamps.mark(commands, phase, name);
     hazards.record_barrier(commands);
   }
 
@@ -88,7 +88,7 @@ struct Commands::Impl {
   Staging::Span copy_up(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::size_t unit) {
     const Staging::Span span = stage(bytes, unit);
     use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
-    prepare();
+    prepare("upload");
     commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer, vk::BufferCopy(span.offset, offset, span.bytes));
     work.bytes_up += span.bytes;
     return span;
@@ -96,7 +96,7 @@ struct Commands::Impl {
   Staging::Span copy_down(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::size_t unit) {
     const Staging::Span span = stage(bytes, unit);
     use(buffer, Stage::eTransfer, AccessBit::eTransferRead, {});
-    prepare();
+    prepare("download");
     commands.copyBuffer(*buffer.impl().allocation.buffer, span.buffer, vk::BufferCopy(offset, span.offset, span.bytes));
     work.bytes_down += span.bytes;
     return span;
@@ -152,7 +152,7 @@ struct Commands::Impl {
       use(*binding.buffer, Stage::eComputeShader, reads, writes);
       buffers.emplace_back(*binding.buffer->impl().allocation.buffer, 0, binding.buffer->size());
     }
-    prepare();
+    prepare(kernel.name);
     const vk::DescriptorSet set = descriptors.bind(*pipeline.set_layout, buffers);
     commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
     commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, set, {});
@@ -221,7 +221,7 @@ void Commands::copy(const Buffer& from, std::size_t from_offset, const Buffer& t
   if (!bytes) return;
   impl_->use(from, Stage::eTransfer, AccessBit::eTransferRead, {});
   impl_->use(to, Stage::eTransfer, {}, AccessBit::eTransferWrite);
-  impl_->prepare();
+  impl_->prepare("copy");
   impl_->commands.copyBuffer(*from.impl().allocation.buffer, *to.impl().allocation.buffer,
                              vk::BufferCopy(from_offset, to_offset, bytes));
 }
@@ -231,7 +231,7 @@ void Commands::fill(const Buffer& buffer, std::size_t offset, std::size_t bytes,
   if (offset % 4 || bytes % 4) throw std::logic_error("fill is by whole words");
   if (!bytes) return;
   impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
-  impl_->prepare();
+  impl_->prepare("fill");
   impl_->commands.fillBuffer(*buffer.impl().allocation.buffer, offset, bytes, word);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -35,7 +36,9 @@ vk::raii::Device make_device(const Candidate& candidate) {
 
 Device::Impl::Impl(std::shared_ptr<const Instance> shared_instance, const Candidate& candidate)
     : instance(std::move(shared_instance)), about(candidate), memory(about.physical.getMemoryProperties()),
-      device(make_device(about)), queue(device, about.queue_family, 0), pipelines(std::in_place, *this) {}
+      device(make_device(about)), queue(device, about.queue_family, 0), pipelines(std::in_place, *this) {
+  if (const char* path = std::getenv("BISECTOR_KERNEL_TIMES")) kernel_times.emplace(path);
+}
 
 std::unique_ptr<Device> Device::Impl::make(std::shared_ptr<const Instance> instance, const Candidate& candidate) {
   std::unique_ptr<Device> device(new Device(std::make_unique<Impl>(std::move(instance), candidate)));

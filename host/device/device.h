@@ -3,7 +3,8 @@
 //
 // Environment variables: BISECTOR_CACHE names a file or folder to keep compiled pipelines in (nothing is kept without
 // it); BISECTOR_VULKAN_VALIDATION=1 or 2 enables the validation layers; BISECTOR_VULKAN_LOADER names another loader
-// than libvulkan.so.1.
+// than libvulkan.so.1; BISECTOR_KERNEL_TIMES names a CSV file for the time that each kernel took, written when the
+// device is closed.
 #pragma once
 
 #include <cstddef>

@@ -10,6 +10,7 @@
 #include "host/device/device.h"
 #include "host/device/instance.h"
 #include "host/device/pipelines.h"
+#include "host/device/timestamps.h"
 
 namespace bisector::host {
 
@@ -32,6 +33,7 @@ struct Device::Impl {
   vk::raii::Device device;
   vk::raii::Queue queue;
   std::optional<Pipelines> pipelines;
+  std::optional<KernelTimes> kernel_times;
 };
 
 }  // namespace bisector::host

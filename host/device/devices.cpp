@@ -51,7 +51,7 @@ std::vector<const Candidate*> matching(const std::vector<Candidate>& candidates,
 }  // namespace
 
 std::unique_ptr<Device> Device::open(const DeviceRequest& request) {
-  const auto instance = std::make_shared<const Instance>();
+  const auto instance = Instance::shared();
   const std::vector<Candidate> candidates = enumerate_candidates(*instance);
   const std::vector<const Candidate*> found = matching(candidates, request);
   if (found.empty()) {
@@ -73,7 +73,7 @@ std::unique_ptr<Device> Device::open(const DeviceRequest& request) {
 DeviceList list_devices() {
   DeviceList list;
   try {
-    const auto instance = std::make_shared<const Instance>();
+    const auto instance = Instance::shared();
     for (const Candidate& candidate : enumerate_candidates(*instance)) {
       DeviceDescription& description = list.devices.emplace_back(candidate.description);
       if (!description.rejected.empty()) continue;

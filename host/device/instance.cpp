@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -105,6 +106,29 @@ PFN_vkGetInstanceProcAddr Instance::Library::entry() const {
   const auto entry = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(handle, "vkGetInstanceProcAddr"));
   if (!entry) throw DeviceError("the Vulkan loader lacks vkGetInstanceProcAddr; install it anew");
   return entry;
+}
+
+std::shared_ptr<const Instance> Instance::shared() {
+  std::string environment;
+  for (const char* name : {"BISECTOR_VULKAN_LOADER", "BISECTOR_VULKAN_VALIDATION", "VK_DRIVER_FILES",
+                           "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES"}) {
+    const char* value = std::getenv(name);
+    environment += value ? value : "";
+    environment += '\n';
+  }
+  struct Kept {
+    std::mutex mutex;
+    std::string environment;
+    std::shared_ptr<const Instance> instance;
+  };
+  // Never destroyed, for drivers may be gone by then.
+  static Kept& kept = *new Kept;
+  const std::lock_guard lock(kept.mutex);
+  if (!kept.instance || kept.environment != environment) {
+    kept.instance = std::make_shared<const Instance>();
+    kept.environment = environment;
+  }
+  return kept.instance;
 }
 
 Instance::Instance() : context_(library_.entry()), instance_(make_instance(context_)), messenger_(nullptr) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 
 #include "host/device/vulkan.h"
 
@@ -11,6 +12,10 @@ class Instance {
  public:
   // Throws DeviceError that says what is missing: the loader, a driver, or the validation layer that was asked for.
   Instance();
+  // The process's instance. It is kept until the environment names another loader, driver or validation: NVIDIA's
+  // driver finds nothing more once it has been unloaded and loaded some dozens of times. Throws as the constructor
+  // does.
+  static std::shared_ptr<const Instance> shared();
   Instance(const Instance&) = delete;
   Instance& operator=(const Instance&) = delete;
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 #include <utility>
 
 #include "host/device/device_impl.h"
@@ -11,8 +12,32 @@ namespace {
 constexpr std::uint32_t kQueries = 128;  // of a pool
 }
 
-void Timestamps::mark(const vk::raii::CommandBuffer& commands, Phase phase) {
-  if (!device_.about.timestamp_bits || (!phases_.empty() && phases_.back() == phase)) return;
+KernelTimes::~KernelTimes() {
+  std::FILE* file = std::fopen(path_.c_str(), "w");
+  if (!file) return;
+  std::vector<std::pair<std::string, Sum>> sorted(sums_.begin(), sums_.end());
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a.second.seconds > b.second.seconds; });
+  std::fprintf(file, "kernel,runs,ms\n");
+  for (const auto& [name, sum] : sorted) {
+    std::fprintf(file, "%s,%zu,%.4f\n", name.c_str(), sum.runs, 1e3 * sum.seconds);
+  }
+  std::fclose(file);
+}
+
+void KernelTimes::add(const std::string& name, double seconds) {
+  Sum& sum = sums_[name];
+  ++sum.runs;
+  sum.seconds += seconds;
+}
+
+void Timestamps::mark(const vk::raii::CommandBuffer& commands, Phase phase, std::string_view name) {
+  if (!device_.about.timestamp_bits) return;
+  if (device_.kernel_times) {
+    names_.emplace_back(name);
+  } else if (!phases_.empty() && phases_.back() == phase) {
+    return;
+  }
   using Stage = vk::PipelineStageFlagBits;
   write(commands, phases_.empty() ? Stage::eTopOfPipe : Stage::eBottomOfPipe);
   phases_.push_back(phase);
@@ -48,9 +73,12 @@ void Timestamps::collect() {
   const std::uint64_t mask = ~std::uint64_t{0} >> (64 - std::max(1u, device_.about.timestamp_bits));
   for (std::size_t i = 0; i < phases_.size(); ++i) {
     const std::uint64_t elapsed = (ticks[i + 1] - ticks[i]) & mask;
-    seconds_.*phases_[i] += static_cast<double>(elapsed) * device_.about.timestamp_period;
+    const double seconds = static_cast<double>(elapsed) * device_.about.timestamp_period;
+    seconds_.*phases_[i] += seconds;
+    if (device_.kernel_times) device_.kernel_times->add(names_[i], seconds);
   }
   phases_.clear();
+  names_.clear();
   written_ = 0;
 }
 

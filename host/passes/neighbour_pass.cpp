@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint32_t kLeastEntries = 12;  // of a list, for most cells to be certified by theirs
 // Wide lists that there is memory for at first: some, and of seeds on surfaces, of which 0.2 % need one, a share.
-constexpr std::size_t kLeastTargets = 4096, kSeedsPerTarget = 64;
+constexpr std::size_t kLeastWide = 4096, kSeedsPerWide = 64;
 // A squared radius beyond kInfinity of kernels/real.glsl: all seeds are listed.
 constexpr float kUnlimited = 2e37f;
 // Relative, by which squared radii are made smaller, for rounding them to single precision may make none larger.
@@ -26,7 +26,7 @@ constexpr std::size_t kWord = sizeof(std::uint32_t);
 
 NeighbourPass::NeighbourPass(Device& device, bool is_double, const ListSizes& sizes)
     : device_(device), double_(is_double), sizes_(sizes), tree_(device), info_(device), lists_(device),
-      wide_lists_(device), targets_(device), is_target_(device) {}
+      wide_lists_(device), targets_(device), width_(device) {}
 
 void NeighbourPass::begin(Commands& commands, const DeviceSeeds& seeds) {
   const std::size_t n = seeds.count();
@@ -38,38 +38,43 @@ void NeighbourPass::begin(Commands& commands, const DeviceSeeds& seeds) {
                                   device_.description().name, n, device_.limits().storage_range));
   lists_.reserve(n * most_ * kWord);
   info_.reserve(n * sizeof(ListInfo));
-  const std::size_t wanted = std::max({kLeastTargets, n / kSeedsPerTarget, most_wanted_ + most_wanted_ / 2});
-  target_capacity_ = std::min({wanted, std::max(n, kLeastTargets), range / sizes_.wide_most});
-  wide_lists_.reserve(target_capacity_ * sizes_.wide_most * kWord);
-  targets_.reserve(target_capacity_ * kWord);
-  is_target_.reserve(n * kWord);
+  const std::size_t room =
+      std::max({kLeastWide * sizes_.wide, n / kSeedsPerWide * sizes_.wide, most_wanted_ + most_wanted_ / 2});
+  wide_capacity_ = std::min({room, n * (sizes_.wide + kWidestList), range});
+  may_grow_ = wide_capacity_ < range;
+  wide_lists_.reserve(wide_capacity_ * kWord);
+  targets_.reserve(2 * n * kWord);
+  width_.reserve(n * kWord);
   commands.phase(&DeviceSeconds::grid);
-  commands.fill(is_target_, 0, n * kWord, 0);
+  commands.fill(width_, 0, n * kWord, 0);
   tree_.record(commands, seeds, double_);
 }
 
 void NeighbourPass::list_nearest(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters) {
   commands.phase(&DeviceSeconds::neighbours);
-  commands.dispatch(kernel("neighbours", double_, {most_, false, sizes_.opened}),
-                    {reads(seeds.words), reads(seeds.ids), reads(tree_.boxes()), writes(lists_), writes(info_),
-                     updates(counters), reads(targets_)},
-                    tree_.push<NeighboursPush>(seeds), seeds.count());
+  commands.dispatch(
+      kernel("neighbours", double_, {most_, std::bit_ceil(most_), sizes_.opened}),
+      {reads(seeds.words), reads(seeds.ids), reads(tree_.boxes()), updates(lists_), writes(info_), updates(counters)},
+      tree_.push<NeighboursPush>(seeds), seeds.count());
 }
 
 void NeighbourPass::choose_targets(Commands& commands, const Buffer& flagged, std::size_t first_flagged,
                                    const Buffer& pairs, const Buffer& counters) {
   commands.phase(&DeviceSeconds::neighbours);
-  const WideTargetsPush push{static_cast<uint>(first_flagged), static_cast<uint>(target_capacity_)};
-  commands.dispatch_indirect({"wide_targets", {}},
-                             {reads(flagged), reads(pairs), updates(is_target_), writes(targets_), updates(counters)},
-                             push, counters, (kGroups + 3 * kWorkShort) * kWord);
+  commands.dispatch_indirect(
+      {"wide_targets", {}},
+      {reads(flagged), reads(pairs), updates(width_), writes(targets_), updates(counters), reads(info_)},
+      WideTargetsPush{static_cast<uint>(first_flagged)}, counters, (kGroups + 3 * kWorkShort) * kWord);
 }
 
 void NeighbourPass::widen(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters) {
-  commands.dispatch_indirect(kernel("neighbours", double_, {sizes_.wide_most, true, sizes_.wide_opened}),
+  WideListsPush push = tree_.push<WideListsPush>(seeds);
+  push.wide_capacity = static_cast<uint>(wide_capacity_);
+  push.may_grow = may_grow_;
+  commands.dispatch_indirect(kernel("wide_lists", double_, {sizes_.wide}),
                              {reads(seeds.words), reads(seeds.ids), reads(tree_.boxes()), writes(wide_lists_),
                               writes(info_), updates(counters), reads(targets_)},
-                             tree_.push<NeighboursPush>(seeds), counters, (kGroups + 3 * kWorkTargets) * kWord);
+                             push, counters, (kGroups + 3 * kWorkTargets) * kWord);
 }
 
 void NeighbourPass::upload_lists(Commands& commands, const DeviceSeeds& seeds, const Neighbours& neighbours) {
@@ -82,8 +87,8 @@ void NeighbourPass::upload_lists(Commands& commands, const DeviceSeeds& seeds, c
     const double radius = list.radius * seeds.scale;
     const bool unlimited = list.radius == std::numeric_limits<double>::infinity();
     const float squared = unlimited ? kUnlimited : static_cast<float>(radius * radius * (1 - kRadiusMargin));
-    info.push_back(
-        {static_cast<uint>(values.size()), static_cast<uint>(list.end - list.begin), std::bit_cast<uint>(squared), 0});
+    info.push_back({static_cast<uint>(values.size()), static_cast<uint>(list.end - list.begin),
+                    std::bit_cast<uint>(squared), kListWidest});
     values.insert(values.end(), list.begin, list.end);
   }
   commands.phase(&DeviceSeconds::transfer);

@@ -10,14 +10,14 @@
 
 namespace bisector::host {
 
-// How long lists are, and how many boxes of the tree are looked at for one.
+// How long lists are, and how many boxes of the tree are looked at for a first one.
 struct ListSizes {
-  std::uint32_t most, opened;  // of a first list
-  std::uint32_t wide_most, wide_opened;
+  std::uint32_t most, opened;
+  std::uint32_t wide;  // entries of the next list, a power of two
 };
 // A random planar cell has six neighbours and is certified by about 16 nearest seeds, a random spatial one has 15.5 and
 // takes about 80, or 20 once it is optimised.
-inline constexpr ListSizes kSurfaceLists{32, 2048, 224, 4096}, kSolidLists{96, 4096, 256, 8192};
+inline constexpr ListSizes kSurfaceLists{32, 2048, 128}, kSolidLists{96, 4096, 256};
 
 class NeighbourPass {
  public:
@@ -35,10 +35,11 @@ class NeighbourPass {
                       const Buffer& counters);
   // Records the search for the wider lists of the cells that are at work.
   void widen(Commands& commands, const DeviceSeeds& seeds, const Buffer& counters);
-  // How many cells wanted wider lists in the evaluation: there is room for as many in the next.
-  void wanted(std::size_t targets) { most_wanted_ = std::max(most_wanted_, targets); }
+  // How many entries the evaluation has wanted for wider lists: there is room for more from the next begin() on.
+  void wanted(std::size_t entries) { most_wanted_ = std::max(most_wanted_, entries); }
 
-  std::size_t target_capacity() const { return target_capacity_; }
+  // Cells that can be listed for wider lists in an evaluation: each for both.
+  std::size_t target_capacity() const { return targets_.size() / sizeof(uint); }
   const SeedTree& tree() const { return tree_; }
   const Buffer& info() const { return info_; }
   const Buffer& lists() const { return lists_; }
@@ -49,9 +50,10 @@ class NeighbourPass {
   bool double_;
   ListSizes sizes_;
   SeedTree tree_;
-  Buffer info_, lists_, wide_lists_, targets_, is_target_;
-  std::uint32_t most_ = 0;  // entries of a first list
-  std::size_t target_capacity_ = 0, most_wanted_ = 0;
+  Buffer info_, lists_, wide_lists_, targets_, width_;
+  std::uint32_t most_ = 0;                           // entries of a first list
+  std::size_t wide_capacity_ = 0, most_wanted_ = 0;  // entries of wider lists
+  bool may_grow_ = true;
 };
 
 }  // namespace bisector::host

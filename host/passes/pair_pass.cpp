@@ -136,11 +136,20 @@ void PairPass::learn_speed(std::size_t pairs, double seconds) {
 }
 
 // Makes room for what was too small; all has to be done again.
-void PairPass::grow(const PairJob& job, uint overflow) {
+void PairPass::grow(const PairJob& job, const Counters& counters) {
+  const uint overflow = counters[kOverflow];
   job.commands.fill(job.counters, kOverflow * kWord, kWord, 0);
   if (overflow & kOverflowProposals) buffers_.proposal_capacity *= 2;
   if (overflow & kOverflowTable) buffers_.table_size *= 2;
   if (overflow & kOverflowFlagged) buffers_.flagged_capacity *= 2;
+  if (overflow & kOverflowWide) {
+    // First lists once more, in place of wider ones that are empty.
+    job.neighbours.wanted(2 * counters[kWideEntries]);
+    clear_work(job, kWideTargets, 1);
+    job.commands.fill(job.counters, kWideEntries * kWord, kWord, 0);
+    job.neighbours.begin(job.commands, job.seeds);
+    job.neighbours.list_nearest(job.commands, job.seeds, job.counters);
+  }
   if (!(overflow & kOverflowPairs)) return;
   const std::size_t most = most_pairs();
   if (job.store.capacity >= most)
@@ -162,17 +171,17 @@ bool PairPass::run_batch(const PairJob& job, std::size_t batch, Certification& c
     }
     const Counters counters = gather_and_count(job);
     if (counters[kOverflow]) {
-      grow(job, counters[kOverflow]);
+      grow(job, counters);
       return false;
     }
     job.store.count = counters[kPairs];
     if (!for_cpu_.empty()) answer(job, counters);
     else if (!are_left(counters, kProposals) && !are_left(counters, kPairs) && !are_left(counters, kShortLists) &&
              !are_left(counters, kUnsure)) {
-      certification.wider += counters[kShortLists];
+      certification.wider += counters[kShortLists] - counters[kShortAgain];
       certification.uncertain = counters[kUnsurePairs];
       count_lists(counters, certification);
-      job.neighbours.wanted(counters[kWideTargets]);
+      job.neighbours.wanted(counters[kWideEntries]);
       rounds_ =
           std::clamp(static_cast<int>(counters[kRounds]) - kClimbs * kRoundsAfterClimb + 1, kLeastRounds, kMostRounds);
       return true;
@@ -238,7 +247,7 @@ void PairPass::clear_lists(const PairJob& job) { clear_work(job, kShortLists, 3)
 void PairPass::start(const PairJob& job, std::size_t batch) {
   job.commands.phase(&DeviceSeconds::clip);
   job.commands.fill(buffers_.table, 0, buffers_.table_size * kWord, 0);
-  job.commands.fill(job.counters, kRounds * kWord, kWord, 0);
+  job.commands.fill(job.counters, kRounds * kWord, 2 * kWord, 0);  // and kShortAgain
   clear_work(job, kProposals, 1);
   clear_lists(job);
   job.domain.start(job, buffers_, batch);
@@ -247,7 +256,8 @@ void PairPass::start(const PairJob& job, std::size_t batch) {
 }
 
 void PairPass::advance(const PairJob& job, uint kind, std::size_t capacity, std::size_t most) {
-  const AdvancePush push{kind, word(capacity), device_.limits().groups, word(std::min<std::size_t>(most, kNone))};
+  const AdvancePush push{kind, word(capacity), device_.limits().groups, word(std::min<std::size_t>(most, kNone)),
+                         kind == kWorkTargets ? 1 : kGroupSize};
   job.commands.dispatch({"advance", {}}, {updates(job.counters)}, push, 1);
 }
 

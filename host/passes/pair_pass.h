@@ -121,7 +121,7 @@ class PairPass {
   void reserve(const PairJob& job);
   void reserve_flagged();
   std::size_t most_gathered() const;
-  void grow(const PairJob& job, uint overflow);
+  void grow(const PairJob& job, const Counters& counters);
   std::size_t refine(const PairJob& job, const PairStore::Range& range, const Buffer& cells, float share,
                      Certification& certification);
   bool run_batch(const PairJob& job, std::size_t batch, Certification& certification);

@@ -27,16 +27,18 @@ LAYOUT_CONSTANT uint kForCpu = 12;
 LAYOUT_CONSTANT uint kWideTargets = 15;
 LAYOUT_CONSTANT uint kGroups = 18;  // of the first kind
 
-LAYOUT_CONSTANT uint kOverflow = 36;  // bits kOverflow...: which buffers were too small
-LAYOUT_CONSTANT uint kRounds = 37;    // of proposals that came to anything
+LAYOUT_CONSTANT uint kOverflow = 36;    // bits kOverflow...: which buffers were too small
+LAYOUT_CONSTANT uint kRounds = 37;      // of proposals that came to anything
+LAYOUT_CONSTANT uint kShortAgain = 38;  // pairs that are listed once more as their wider list was too short too
 // Of one evaluation.
-LAYOUT_CONSTANT uint kCoincident = 38;       // seeds that this precision cannot tell apart from another
-LAYOUT_CONSTANT uint kUncertainOwners = 39;  // points without a certain owner
-LAYOUT_CONSTANT uint kDuplicatePairs = 40;   // must stay 0
-LAYOUT_CONSTANT uint kUnsurePairs = 41;      // pairs with an uncertain decision
-LAYOUT_CONSTANT uint kUnsureInDouble = 42;   // and those of them that double precision left uncertain
-LAYOUT_CONSTANT uint kItems = 43;            // pairs that are not empty
-LAYOUT_CONSTANT uint kLargeCells = 44;       // with more items than rank.comp goes through
+LAYOUT_CONSTANT uint kCoincident = 39;       // seeds that this precision cannot tell apart from another
+LAYOUT_CONSTANT uint kUncertainOwners = 40;  // points without a certain owner
+LAYOUT_CONSTANT uint kDuplicatePairs = 41;   // must stay 0
+LAYOUT_CONSTANT uint kUnsurePairs = 42;      // pairs with an uncertain decision
+LAYOUT_CONSTANT uint kUnsureInDouble = 43;   // and those of them that double precision left uncertain
+LAYOUT_CONSTANT uint kItems = 44;            // pairs that are not empty
+LAYOUT_CONSTANT uint kLargeCells = 45;       // with more items than rank.comp goes through
+LAYOUT_CONSTANT uint kWideEntries = 46;      // of wider lists, whether or not there is memory for them
 
 LAYOUT_CONSTANT uint kCounters = 48;  // words of the buffer
 
@@ -44,6 +46,7 @@ LAYOUT_CONSTANT uint kOverflowProposals = 1;
 LAYOUT_CONSTANT uint kOverflowPairs = 2;
 LAYOUT_CONSTANT uint kOverflowTable = 4;
 LAYOUT_CONSTANT uint kOverflowFlagged = 8;
+LAYOUT_CONSTANT uint kOverflowWide = 16;
 
 LAYOUT_END
 

@@ -65,7 +65,13 @@ LAYOUT_CONSTANT uint kGatheredWords = 3;
 LAYOUT_CONSTANT uint kAnswerWords = 2;
 
 // A list of neighbours whose first entry has this bit lies among the wide ones.
-LAYOUT_CONSTANT uint kWideList = 0x80000000u;
+LAYOUT_CONSTANT uint kInWideLists = 0x80000000u;
+// How wide a list is. A cell gets wider ones as it needs them.
+LAYOUT_CONSTANT uint kListFirst = 0;
+LAYOUT_CONSTANT uint kListWide = 1;
+LAYOUT_CONSTANT uint kListWidest = 2;  // kWidestList entries, or there was no memory for them
+// Of a cell's slot, where it is listed for a wider list: the widest.
+LAYOUT_CONSTANT uint kWidestTarget = 0x80000000u;
 
 LAYOUT_END
 
@@ -89,9 +95,9 @@ struct PointOwner {
 struct SortItem {
   uint slot, pair;
 };
-// Of a slot; the radius is a float's bits, squared, in lengths of the device.
+// Of a slot; the radius is a float's bits, squared, in lengths of the device; the width is one of kList... above.
 struct ListInfo {
-  uint first, count, squared_radius, unused;
+  uint first, count, squared_radius, width;
 };
 // Of a slot: the caller's index, and the low words of the coordinates as doubles.
 struct SeedId {

@@ -49,8 +49,15 @@ PUSH_CONSTANTS(OwnersPush) {
 
 #if LAYOUT_CPLUSPLUS || defined(PUSH_WIDE_TARGETS)
 PUSH_CONSTANTS(WideTargetsPush) {
-  uint first_flagged;    // entry of the buffer of flagged pairs
-  uint target_capacity;  // wide lists that there is memory for
+  uint first_flagged;  // entry of the buffer of flagged pairs
+};
+#endif
+
+#if LAYOUT_CPLUSPLUS || defined(PUSH_WIDE_LISTS)
+PUSH_CONSTANTS(WideListsPush) {
+  TREE_PUSH_CONSTANTS
+  uint wide_capacity;  // entries that there is memory for
+  uint may_grow;       // whether there may be memory for more
 };
 #endif
 
@@ -87,6 +94,7 @@ PUSH_CONSTANTS(AdvancePush) {
   uint capacity;     // of its buffer
   uint most_groups;  // in one dimension of a dispatch
   uint most_items;   // of one dispatch
+  uint group_items;  // of a workgroup
 };
 #endif
 
@@ -191,11 +199,13 @@ static_assert(sizeof(NeighboursPush) == 16 + 4 * kTreeLevels && offsetof(Neighbo
               offsetof(NeighboursPush, level_begin) == 16);
 static_assert(sizeof(OwnersPush) == 24 + 4 * kTreeLevels && offsetof(OwnersPush, level_begin) == 16 &&
               offsetof(OwnersPush, report_uncertain) == 20 + 4 * kTreeLevels);
-static_assert(sizeof(WideTargetsPush) == 8 && offsetof(WideTargetsPush, target_capacity) == 4);
+static_assert(sizeof(WideTargetsPush) == 4);
+static_assert(sizeof(WideListsPush) == 24 + 4 * kTreeLevels &&
+              offsetof(WideListsPush, may_grow) == 20 + 4 * kTreeLevels);
 static_assert(sizeof(StartFacetsPush) == 20 && offsetof(StartFacetsPush, pair_capacity) == 16);
 static_assert(sizeof(StartSamplesPush) == 16 && offsetof(StartSamplesPush, proposal_capacity) == 12);
 static_assert(sizeof(StartTetsPush) == 12 && offsetof(StartTetsPush, proposal_capacity) == 8);
-static_assert(sizeof(AdvancePush) == 16 && offsetof(AdvancePush, most_items) == 12);
+static_assert(sizeof(AdvancePush) == 20 && offsetof(AdvancePush, group_items) == 16);
 static_assert(sizeof(AdmitPush) == 8 && offsetof(AdmitPush, pair_capacity) == 4);
 static_assert(sizeof(ClipPush) == 32 && offsetof(ClipPush, residual) == 4 && offsetof(ClipPush, cell_count) == 28);
 static_assert(sizeof(DoubtfulPush) == 20 && offsetof(DoubtfulPush, mean_density) == 12 &&

@@ -17,6 +17,10 @@ LAYOUT_CONSTANT uint kTreeArity = 8;
 LAYOUT_CONSTANT uint kTreeLevels = 12;
 LAYOUT_CONSTANT uint kBoxWords = 6;  // of a node: floats, the lower corner, then the upper one
 
+// Entries of the widest lists of neighbours, which take nearly all the shared memory that a workgroup has on every
+// device. A power of two.
+LAYOUT_CONSTANT uint kWidestList = 1024;
+
 // Terms that sum.comp adds in a row, by the CPU's rule of sums (voronoi/fixed_tree_sum.h).
 LAYOUT_CONSTANT uint kSumBlock = 32;
 

@@ -2,11 +2,13 @@
 // rows.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <numeric>
 #include <vector>
 
 #include "bisector/mesh.h"
+#include "core/parallel.h"
 
 namespace bisector {
 
@@ -21,6 +23,25 @@ Csr<T> group_into_rows(std::size_t rows, const List& list) {
   grouped.values.resize(grouped.offsets.back());
   std::vector<std::size_t> next(grouped.offsets.begin(), grouped.offsets.end() - 1);
   list([&](std::size_t row, const T& value) { grouped.values[next[row]++] = value; });
+  return grouped;
+}
+
+// The same in parallel for values 0 to count - 1; the order within a row is any.
+template <class T, class RowOf, class ValueOf>
+Csr<T> scatter_into_rows(std::size_t rows, std::size_t count, const RowOf& row_of, const ValueOf& value_of) {
+  constexpr std::size_t kChunk = 16384;
+  Csr<T> grouped;
+  grouped.offsets.assign(rows + 1, 0);
+  const auto take = [](std::size_t& counter) {
+    return std::atomic_ref<std::size_t>(counter).fetch_add(1, std::memory_order_relaxed);
+  };
+  parallel_each(
+      count, [&](std::size_t i) { take(grouped.offsets[row_of(i) + 1]); }, kChunk);
+  std::partial_sum(grouped.offsets.begin(), grouped.offsets.end(), grouped.offsets.begin());
+  grouped.values.resize(grouped.offsets.back());
+  std::vector<std::size_t> next(grouped.offsets.begin(), grouped.offsets.end() - 1);
+  parallel_each(
+      count, [&](std::size_t i) { grouped.values[take(next[row_of(i)])] = value_of(i); }, kChunk);
   return grouped;
 }
 

@@ -8,11 +8,14 @@
 
 #include "core/degenerate.h"
 #include "core/geometry.h"
+#include "core/parallel.h"
 #include "mesh/topology.h"
 
 namespace bisector {
 
 namespace {
+
+constexpr std::size_t kAtOnce = 4096;  // items of a chunk of a sum
 
 struct TriangleShape {
   double q = 0;
@@ -41,12 +44,17 @@ std::vector<std::array<Index, 2>> sorted_features(const TriangleMesh& mesh) {
   return edges;
 }
 
-void measure_triangles(const TriangleMesh& mesh, QualityReport& report) {
-  report.q_min = report.q_min_free = std::numeric_limits<double>::infinity();
-  report.theta_min = report.theta_min_free = 180;
-  const std::vector<std::array<Index, 2>> features = sorted_features(mesh);
+// Of some of the triangles: sums where the report has means, counts where it has percents.
+struct TriangleSums {
+  QualityReport report;
   std::size_t below_30 = 0, free_below_30 = 0;
-  for (const Triangle& t : mesh.triangles) {
+
+  TriangleSums() {
+    report.q_min = report.q_min_free = report.edge_min = std::numeric_limits<double>::infinity();
+    report.theta_min = report.theta_min_free = 180;
+  }
+
+  void add(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& features, const Triangle& t) {
     const std::array<Vec3, 3> p{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
     const double area = triangle_area(p[0], p[1], p[2]);
     const TriangleShape shape = measure_shape(p, area);
@@ -67,41 +75,85 @@ void measure_triangles(const TriangleMesh& mesh, QualityReport& report) {
     free_below_30 += free_angle_below_30;
     if (!(area > 0)) {
       ++report.zero_area;
-      continue;
+      return;
     }
     report.q_ave += shape.q;
     report.theta_min_ave += *smallest;
     report.area += area;
   }
+
+  void add(const TriangleSums& other) {
+    const QualityReport& o = other.report;
+    report.q_min = std::min(report.q_min, o.q_min);
+    report.q_min_free = std::min(report.q_min_free, o.q_min_free);
+    report.theta_min = std::min(report.theta_min, o.theta_min);
+    report.theta_max = std::max(report.theta_max, o.theta_max);
+    report.theta_min_free = std::min(report.theta_min_free, o.theta_min_free);
+    report.theta_max_free = std::max(report.theta_max_free, o.theta_max_free);
+    report.zero_area += o.zero_area;
+    report.q_ave += o.q_ave;
+    report.theta_min_ave += o.theta_min_ave;
+    report.area += o.area;
+    below_30 += other.below_30;
+    free_below_30 += other.free_below_30;
+  }
+};
+
+// Sums over chunks of fixed size, added in their order: the same for any number of threads.
+template <class Sums, class Add>
+Sums sum_chunks(std::size_t n, const Add& add) {
+  std::vector<Sums> sums((n + kAtOnce - 1) / kAtOnce);
+  parallel_chunks(n, kAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) add(sums[c], i);
+  });
+  Sums all;
+  for (const Sums& s : sums) all.add(s);
+  return all;
+}
+
+void measure_triangles(const TriangleMesh& mesh, QualityReport& report) {
+  const std::vector<std::array<Index, 2>> features = sorted_features(mesh);
+  const auto sums = sum_chunks<TriangleSums>(
+      mesh.triangles.size(), [&](TriangleSums& s, std::size_t t) { s.add(mesh, features, mesh.triangles[t]); });
+  report = sums.report;
   const auto count = static_cast<double>(mesh.triangles.size());
   const double measured = count - static_cast<double>(report.zero_area);
   if (std::isinf(report.q_min_free)) report.q_min_free = report.q_min;
-  report.theta_below_30 = 100 * static_cast<double>(below_30) / count;
-  report.theta_below_30_free = 100 * static_cast<double>(free_below_30) / count;
+  report.theta_below_30 = 100 * static_cast<double>(sums.below_30) / count;
+  report.theta_below_30_free = 100 * static_cast<double>(sums.free_below_30) / count;
   if (measured > 0) {
     report.q_ave /= measured;
     report.theta_min_ave /= measured;
   }
 }
 
-void measure_edges(const TriangleMesh& mesh, QualityReport& report) {
-  const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
-  std::vector<Index> neighbours(mesh.vertices.size(), 0);
-  std::vector<char> border(mesh.vertices.size(), 0);
-  report.edge_min = std::numeric_limits<double>::infinity();
-  for (std::size_t e = 0; e < table.edges.size(); ++e) {
+struct LengthSums {
+  double least = std::numeric_limits<double>::infinity(), most = 0, sum = 0;
+
+  void add(const LengthSums& other) {
+    least = std::min(least, other.least);
+    most = std::max(most, other.most);
+    sum += other.sum;
+  }
+};
+
+void measure_edges(const TriangleMesh& mesh, const EdgeTable& table, QualityReport& report) {
+  const auto lengths = sum_chunks<LengthSums>(table.edges.size(), [&](LengthSums& sums, std::size_t e) {
     const auto [a, b] = table.edges[e];
     const double length = norm(mesh.vertices[b] - mesh.vertices[a]);
-    report.edge_min = std::min(report.edge_min, length);
-    report.edge_max = std::max(report.edge_max, length);
-    report.edge_ave += length;
-    for (const Index v : {a, b}) {
+    sums.add({length, length, length});
+  });
+  report.edge_min = lengths.least;
+  report.edge_max = lengths.most;
+  report.edge_ave = lengths.sum / static_cast<double>(table.edges.size());
+
+  std::vector<Index> neighbours(mesh.vertices.size(), 0);
+  std::vector<char> border(mesh.vertices.size(), 0);
+  for (std::size_t e = 0; e < table.edges.size(); ++e)
+    for (const Index v : table.edges[e]) {
       ++neighbours[v];
       if (table.half_edges.size(e) == 1) border[v] = 1;
     }
-  }
-  report.edge_ave /= static_cast<double>(table.edges.size());
-
   std::size_t interior = 0, regular = 0;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (neighbours[v] == 0 || border[v]) continue;
@@ -117,8 +169,9 @@ QualityReport measure_quality(const TriangleMesh& mesh) {
   QualityReport report;
   if (mesh.triangles.empty()) return report;
   measure_triangles(mesh, report);
-  measure_edges(mesh, report);
-  report.topology = analyse_topology(mesh.triangles, mesh.vertices.size());
+  const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
+  measure_edges(mesh, table, report);
+  report.topology = analyse_topology(mesh.triangles, mesh.vertices.size(), table);
   return report;
 }
 

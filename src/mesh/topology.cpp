@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -19,31 +20,55 @@ namespace bisector {
 
 namespace {
 
-constexpr std::size_t kVerticesAtOnce = 4096;  // of a parallel loop
+constexpr std::size_t kVerticesAtOnce = 4096, kEdgesAtOnce = 16384;  // of a parallel loop
 
-// Links the corners (3 t + k) at both ends of an edge over all its triangles.
-void join_fans(const std::vector<Triangle>& triangles, const EdgeTable& table, std::size_t edge, DisjointSets<>& fans) {
-  const std::size_t* sides = table.half_edges.begin(edge);
-  for (std::size_t s = 1; s < table.half_edges.size(edge); ++s)
-    for (const Index v : table.edges[edge])
-      fans.join(corner_at(triangles, sides[0], v), corner_at(triangles, sides[s], v));
+// A side of a triangle at a vertex.
+struct Spoke {
+  Index to;              // the other vertex
+  std::size_t triangle;  // which of those around the vertex
+};
+
+// Whether the triangles around a vertex, linked through the edges that they share there, fall apart. Each has two of
+// the spokes.
+bool fall_apart(std::vector<Spoke>& spokes) {
+  DisjointSets<> fans(spokes.size() / 2);
+  std::sort(spokes.begin(), spokes.end(), [](const Spoke& a, const Spoke& b) { return a.to < b.to; });
+  for (std::size_t k = 1; k < spokes.size(); ++k)
+    if (spokes[k].to == spokes[k - 1].to) fans.join(spokes[k].triangle, spokes[k - 1].triangle);
+  for (std::size_t k = 1; k < spokes.size() / 2; ++k)
+    if (fans.root(k) != fans.root(0)) return true;
+  return false;
+}
+
+// Whether the triangles of every edge of two run along it in opposite directions.
+bool are_coherent(const std::vector<Triangle>& triangles, const EdgeTable& table) {
+  std::atomic<bool> coherent{true};
+  parallel_chunks(table.edges.size(), kEdgesAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const std::size_t* sides = table.half_edges.begin(e);
+      if (table.half_edges.size(e) == 2 && origin(triangles, sides[0]) == origin(triangles, sides[1])) coherent = false;
+    }
+  });
+  return coherent;
 }
 
 }  // namespace
 
-std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count,
-                                 const EdgeTable& table) {
-  DisjointSets<> fans(3 * triangles.size());
-  for (std::size_t e = 0; e < table.edges.size(); ++e) join_fans(triangles, table, e, fans);
-  constexpr std::size_t kUnseen = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> fan(vertex_count, kUnseen);
+std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  const Csr<std::size_t> corners = scatter_into_rows<std::size_t>(
+      vertex_count, 3 * triangles.size(), [&](std::size_t h) { return origin(triangles, h); },
+      [](std::size_t h) { return h; });
   std::vector<char> split(vertex_count, 0);
-  for (std::size_t corner = 0; corner < 3 * triangles.size(); ++corner) {
-    const Index v = origin(triangles, corner);
-    const std::size_t root = fans.root(corner);
-    if (fan[v] == kUnseen) fan[v] = root;
-    if (fan[v] != root) split[v] = 1;
-  }
+  parallel_chunks(vertex_count, kVerticesAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::vector<Spoke> spokes;
+    for (std::size_t v = begin; v < end; ++v) {
+      spokes.clear();
+      for (const std::size_t* h = corners.begin(v); h != corners.end(v); ++h)
+        for (const std::size_t other : {next_half_edge(*h), next_half_edge(next_half_edge(*h))})
+          spokes.push_back({origin(triangles, other), static_cast<std::size_t>(h - corners.begin(v))});
+      split[v] = fall_apart(spokes);
+    }
+  });
   return split;
 }
 
@@ -72,12 +97,14 @@ Csr<EdgeSide> edge_sides(const std::vector<Triangle>& triangles, std::size_t ver
   if (n > std::numeric_limits<Index>::max())
     throw Error(fmt::format("{} triangles are too many; at most {} can be indexed", triangles.size(),
                             std::numeric_limits<Index>::max() / 3));
-  Csr<EdgeSide> sides = group_into_rows<EdgeSide>(vertex_count, [&](const auto& put) {
-    for (std::size_t h = 0; h < n; ++h) {
-      const auto [low, high] = std::minmax({origin(triangles, h), origin(triangles, next_half_edge(h))});
-      put(low, EdgeSide{high, static_cast<Index>(h)});
-    }
-  });
+  const auto ends = [&](std::size_t h) {
+    return ascending(origin(triangles, h), origin(triangles, next_half_edge(h)));
+  };
+  Csr<EdgeSide> sides = scatter_into_rows<EdgeSide>(
+      vertex_count, n, [&](std::size_t h) { return ends(h)[0]; },
+      [&](std::size_t h) {
+        return EdgeSide{ends(h)[1], static_cast<Index>(h)};
+      });
   EdgeSide* const all = sides.values.data();
   parallel_each(
       vertex_count,
@@ -122,21 +149,23 @@ EdgeTable edge_table(const std::vector<Triangle>& triangles, std::size_t vertex_
 }
 
 MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
-  if (triangles.empty()) return {};
-  const EdgeTable table = edge_table(triangles, vertex_count);
+  return triangles.empty() ? MeshTopology{}
+                           : analyse_topology(triangles, vertex_count, edge_table(triangles, vertex_count));
+}
+
+MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count,
+                              const EdgeTable& table) {
   MeshTopology topology;
-  topology.oriented = true;
+  topology.oriented = are_coherent(triangles, table);
   DisjointSets<> parts(vertex_count);
   for (std::size_t e = 0; e < table.edges.size(); ++e) {
     const auto [a, b] = table.edges[e];
-    const std::size_t* sides = table.half_edges.begin(e);
     const std::size_t count = table.half_edges.size(e);
     parts.join(a, b);
     if (count == 1) ++topology.boundary_edges;
     if (count > 2 || a == b) ++topology.non_manifold_edges;
-    if (count == 2 && origin(triangles, sides[0]) == origin(triangles, sides[1])) topology.oriented = false;
   }
-  const std::vector<char> split = split_vertices(triangles, vertex_count, table);
+  const std::vector<char> split = split_vertices(triangles, vertex_count);
   topology.non_manifold_vertices = static_cast<std::size_t>(std::count(split.begin(), split.end(), 1));
   topology.closed = topology.boundary_edges == 0;
   topology.manifold = topology.non_manifold_edges == 0 && topology.non_manifold_vertices == 0;
@@ -175,6 +204,7 @@ std::vector<Index> label_components(const std::vector<Triangle>& triangles, std:
 
 void orient(std::vector<Triangle>& triangles, std::size_t vertex_count) {
   const EdgeTable table = edge_table(triangles, vertex_count);
+  if (are_coherent(triangles, table)) return;
   std::vector<std::size_t> edge_of(3 * triangles.size());
   for (std::size_t e = 0; e < table.edges.size(); ++e)
     for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of[*h] = e;

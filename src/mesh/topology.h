@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bisector/mesh.h"
+#include "bisector/quality.h"
 #include "core/parallel.h"
 
 namespace bisector {
@@ -41,9 +42,11 @@ void each_edge(const Csr<EdgeSide>& sides, const Visit& visit) {
       kVerticesAtOnce);
 }
 
+// The same for triangles whose edges are known. There are some.
+MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count, const EdgeTable& table);
+
 // For each vertex whether its triangles hang together through its edges in more than one fan.
-std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count,
-                                 const EdgeTable& table);
+std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 
 // The vertices at the other ends of each vertex's edges, ascending.
 Csr<Index> vertex_neighbours(const std::vector<Triangle>& triangles, std::size_t vertex_count);

@@ -150,7 +150,7 @@ class Polygoniser {
       if (twins.twin[h] != kNoTwin || twins.is_single[h]) continue;
       for (const std::size_t end : {h, next_half_edge(h)}) fixed_[origin(triangles, end)] = 1;
     }
-    const std::vector<char> split = split_vertices(triangles, n, edge_table(triangles, n));
+    const std::vector<char> split = split_vertices(triangles, n);
     for (std::size_t v = 0; v < n; ++v) fixed_[v] |= split[v];
   }
 

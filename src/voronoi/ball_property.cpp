@@ -37,27 +37,6 @@ std::vector<Index> singletons(std::size_t n) {
   return parent;
 }
 
-// Vertices whose triangles, linked through edges, fall apart into several fans.
-std::vector<char> singular_vertices(const std::vector<Triangle>& triangles, std::size_t vertices) {
-  const EdgeTable table = edge_table(triangles, vertices);
-  std::vector<Index> fans = singletons(3 * triangles.size());
-  const auto corner_at = [&](std::size_t half_edge, Index v) {
-    const std::size_t t = half_edge / 3, k = half_edge % 3;
-    return static_cast<Index>(triangles[t][k] == v ? half_edge : 3 * t + (k + 1) % 3);
-  };
-  for (std::size_t e = 0; e < table.edges.size(); ++e)
-    for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h)
-      for (const Index v : table.edges[e]) join(fans, corner_at(*table.half_edges.begin(e), v), corner_at(*h, v));
-  std::vector<Index> fan(vertices, kNone);
-  std::vector<char> singular(vertices, 0);
-  for (Index corner = 0; corner < fans.size(); ++corner) {
-    const Index v = triangles[corner / 3][corner % 3], root = root_of(fans, corner);
-    if (fan[v] == kNone) fan[v] = root;
-    if (fan[v] != root) singular[v] = 1;
-  }
-  return singular;
-}
-
 // The diagram as a cell complex. Sets and first visits are kept in arrays over the whole diagram, but what one cell's
 // examination touches belongs to that cell alone.
 class Complex {
@@ -381,7 +360,7 @@ class Complex {
   void forgive_singular_vertices(BallReport& report) const {
     const auto suspect = [](const BallReport::Cell& c) { return c.components == 1 && c.euler == 1 && c.loops != 1; };
     if (std::none_of(report.cells.begin(), report.cells.end(), suspect)) return;
-    const std::vector<char> singular = singular_vertices(triangles_, polygon_at_.size());
+    const std::vector<char> singular = split_vertices(triangles_, polygon_at_.size());
     std::vector<char> touched(of_cell_.rows(), 0);
     for (std::size_t v = 0; v < singular.size(); ++v)
       if (singular[v] && polygon_at_[v] != kNone) touched[diagram_.pairs[polygon_at_[v]].cell] = 1;

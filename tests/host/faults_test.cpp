@@ -50,6 +50,34 @@ TEST_F(Faults, AllLeaveAsDeviceError) {
   EXPECT_TRUE(scenario());
 }
 
+// The instance is made once, and anew where the environment says otherwise.
+TEST_F(Faults, OfTheInstanceLeaveAsDeviceErrorToo) {
+  ASSERT_TRUE(scenario());
+  std::vector<std::string> calls;
+  {
+    const Environment loader("BISECTOR_VULKAN_LOADER", "libvulkan.so.1");
+    inject_fault(Fault::none, 0);
+    log_fallible_calls(&calls);
+    ASSERT_TRUE(scenario());
+    log_fallible_calls(nullptr);
+  }
+  EXPECT_EQ(std::ranges::count(calls, "vkCreateInstance"), 1);
+  const std::size_t first = static_cast<std::size_t>(std::ranges::find(calls, "vkCreateInstance") - calls.begin());
+  for (std::size_t call = 0; call <= first; ++call) {
+    inject_fault(Fault::none, 0);
+    ASSERT_TRUE(scenario());
+    const Environment loader("BISECTOR_VULKAN_LOADER", "libvulkan.so.1");
+    inject_fault(Fault::out_of_memory, call);
+    EXPECT_THROW(scenario(), DeviceError) << call;
+  }
+  inject_fault(Fault::none, 0);
+  calls.clear();
+  log_fallible_calls(&calls);
+  EXPECT_TRUE(scenario());
+  log_fallible_calls(nullptr);
+  EXPECT_EQ(std::ranges::count(calls, "vkCreateInstance"), 0);
+}
+
 TEST_F(Faults, RejectADeviceInTheList) {
   const std::size_t devices = list_devices().devices.size();
   inject_fault(Fault::none, 0);
