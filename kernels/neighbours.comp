@@ -158,7 +158,8 @@ void main() {
   [[unroll]] for (uint k = 0; k < kMost; ++k)
     if (k < count) lists[first + k] = found[k];
   bool doubtful = false;
-  [[unroll]] for (uint k = 1; k < kMost; ++k) doubtful = doubtful || (k < count && in_doubt(squares[k - 1], squares[k]));
+  [[unroll]] for (uint k = 1; k < kMost; ++k)
+    if (k < count && in_doubt(squares[k - 1], squares[k])) doubtful = true;
   if (doubtful) {
     [[dont_unroll]] for (uint k = 1; k < count; ++k) {
       const uint other = lists[first + k];
