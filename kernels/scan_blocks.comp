@@ -11,8 +11,7 @@ layout(std430, binding = 1) writeonly buffer Totals { uint totals[]; };
 shared uint sums[kGroupSize];
 
 void main() {
-  const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-  const uint lane = gl_LocalInvocationID.x;
+  const uint block = workgroup(), lane = lane_of_workgroup();
   const uint first = (block * kGroupSize + lane) * kScanLane;
   uint own = 0;
   [[dont_unroll]] for (uint k = 0; k < kScanLane; ++k)

@@ -4,10 +4,16 @@
 
 #include "host/device/buffer_impl.h"
 #include "host/device/device_impl.h"
+#include "host/device/poison.h"
 
 namespace bisector::host {
 
-Buffer::Buffer(Device& device) : impl_(new Impl{device.impl(), {}}) {}
+Buffer::Impl::Impl(Device::Impl& owner, Lifetime contents) : device(owner), lifetime(contents) {
+  device.buffers.push_back(this);
+}
+Buffer::Impl::~Impl() { std::erase(device.buffers, this); }
+
+Buffer::Buffer(Device& device, Lifetime lifetime) : impl_(std::make_unique<Impl>(device.impl(), lifetime)) {}
 Buffer::~Buffer() = default;
 Buffer::Buffer(Buffer&&) noexcept = default;
 Buffer& Buffer::operator=(Buffer&&) noexcept = default;
@@ -28,6 +34,8 @@ void Buffer::reserve(std::size_t bytes) {
   const std::size_t grown = std::clamp((size() + size() / 2) / kUnit * kUnit, least, most);
   impl_->allocation = {};
   impl_->allocation = allocate_local(impl_->device, grown);
+  impl_->computed = false;
+  if (impl_->device.poison) fill_at_once(*impl_, *impl_->device.poison);
 }
 
 }  // namespace bisector::host

@@ -8,10 +8,13 @@
 
 namespace bisector::host {
 
+// For how long what kernels write into a buffer is of use.
+enum class Lifetime { evaluation, kept };
+
 // Device-local memory for storage, transfers and indirect arguments. Memory is asked for once and kept for reuse.
 class Buffer {
  public:
-  explicit Buffer(Device& device);
+  explicit Buffer(Device& device, Lifetime lifetime = Lifetime::evaluation);
   ~Buffer();
   Buffer(Buffer&&) noexcept;
   Buffer& operator=(Buffer&&) noexcept;

@@ -150,6 +150,7 @@ struct Commands::Impl {
       const vk::AccessFlags reads = binding.access == Access::write ? vk::AccessFlags() : AccessBit::eShaderRead;
       const vk::AccessFlags writes = binding.access == Access::read ? vk::AccessFlags() : AccessBit::eShaderWrite;
       use(*binding.buffer, Stage::eComputeShader, reads, writes);
+      binding.buffer->impl().computed |= binding.access != Access::read;
       buffers.emplace_back(*binding.buffer->impl().allocation.buffer, 0, binding.buffer->size());
     }
     prepare(kernel.name);

@@ -68,4 +68,6 @@ void limit_storage_range(Device& device, std::size_t bytes) {
   range = std::min(range, bytes);
 }
 
+void permute_invocations(Device& device, std::uint32_t odd) { device.impl().pipelines->set_order(odd); }
+
 }  // namespace bisector::host

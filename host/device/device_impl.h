@@ -1,11 +1,14 @@
 // What a Device consists of.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "host/device/attempt.h"
+#include "host/device/buffer.h"
 #include "host/device/candidates.h"
 #include "host/device/device.h"
 #include "host/device/instance.h"
@@ -34,6 +37,8 @@ struct Device::Impl {
   vk::raii::Queue queue;
   std::optional<Pipelines> pipelines;
   std::optional<KernelTimes> kernel_times;
+  std::vector<Buffer::Impl*> buffers;   // all that there are
+  std::optional<std::uint32_t> poison;  // what new memory is filled with, for tests (host/device/faults.h)
 };
 
 }  // namespace bisector::host

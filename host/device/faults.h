@@ -1,7 +1,8 @@
-// Failures on purpose, for tests.
+// Failures and adversity on purpose, for tests.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -21,5 +22,15 @@ void log_fallible_calls(std::vector<std::string>* names);
 // From now on the device has no double precision, or binds no more bytes than this.
 void hide_float64(Device& device);
 void limit_storage_range(Device& device, std::size_t bytes);
+
+// From now on memory that the device's buffers get is full of this word.
+void poison_new_memory(Device& device, std::uint32_t word);
+// Overwrites what kernels have written so far into the device's buffers, but for those whose contents are kept from one
+// evaluation to the next. To be called between evaluations. Throws DeviceError.
+void poison_computed(Device& device, std::uint32_t word);
+
+// Kernels that are used from now on for the first time take their items in another order, given by an odd number other
+// than 1: workgroups go backwards, and the lanes of each are mixed.
+void permute_invocations(Device& device, std::uint32_t odd);
 
 }  // namespace bisector::host

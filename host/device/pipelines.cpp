@@ -8,6 +8,7 @@
 
 #include "host/device/device_impl.h"
 #include "host/device/modules.h"
+#include "kernels/layout/sizes.h"
 
 namespace bisector::host {
 namespace {
@@ -74,10 +75,15 @@ Pipeline Pipelines::make(const Kernel& kernel, std::size_t bindings, std::size_t
     return vk::raii::ShaderModule(device, vk::ShaderModuleCreateInfo({}, words.size_bytes(), words.data()));
   });
 
+  std::vector<std::uint32_t> values = kernel.constants;
   std::vector<vk::SpecializationMapEntry> entries;
-  for (std::uint32_t i = 0; i < kernel.constants.size(); ++i) entries.emplace_back(i, i * 4, 4);
-  const vk::SpecializationInfo constants(static_cast<std::uint32_t>(entries.size()), entries.data(),
-                                         kernel.constants.size() * 4, kernel.constants.data());
+  for (std::uint32_t i = 0; i < values.size(); ++i) entries.emplace_back(i, i * 4, 4);
+  if (order_ != 1) {
+    entries.emplace_back(kOrderConstant, static_cast<std::uint32_t>(values.size() * 4), 4);
+    values.push_back(order_);
+  }
+  const vk::SpecializationInfo constants(static_cast<std::uint32_t>(entries.size()), entries.data(), values.size() * 4,
+                                         values.data());
   const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *shader, "main", &constants);
   vk::raii::Pipeline pipeline = device_.attempt("vkCreateComputePipelines of " + kernel.name, [&] {
     return vk::raii::Pipeline(device, cache_, vk::ComputePipelineCreateInfo({}, stage, *layout));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 
@@ -28,6 +29,9 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
+  // The order in which the kernels of pipelines made from now on take their items (kernels/common.glsl).
+  void set_order(std::uint32_t order) { order_ = order; }
+
   // Throws std::logic_error if there is no such kernel, or it was used before with other numbers; DeviceError.
   const Pipeline& get(const Kernel& kernel, std::size_t bindings, std::size_t push_bytes);
 
@@ -42,6 +46,7 @@ class Pipelines {
   CacheOwner owner_;
   std::filesystem::path file_;  // empty if there is none
   vk::raii::PipelineCache cache_;
+  std::uint32_t order_ = 1;
   std::map<Kernel, Pipeline, Less> pipelines_;
 };
 

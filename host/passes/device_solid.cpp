@@ -41,7 +41,7 @@ double device_scale(const Solid& solid) { return std::ldexp(1.0, 16 - std::ilogb
 DeviceSolid::DeviceSolid(Device& device, Commands& commands, const Solid& given, bool as_whole, double scale,
                          bool is_double, bool with_doubles)
     : solid(given), whole(as_whole), frames(whole ? std::vector<TetFrame>{enclosure_frame(given)} : tet_frames(given)),
-      words(device), double_words(device), meta(device), has_doubles(with_doubles) {
+      words(device), double_words(device), meta(device, Lifetime::kept), has_doubles(with_doubles) {
   const std::size_t bytes =
       is_double || with_doubles ? tet_layout(true).words * sizeof(double) : tet_layout(false).words * sizeof(float);
   if (frames.size() > device.limits().storage_range / bytes)

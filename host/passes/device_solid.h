@@ -28,7 +28,7 @@ struct DeviceSolid {
   std::vector<Index> vertices;  // that tetrahedra with volume use
   Buffer words;                 // in the backend's precision
   Buffer double_words;          // for the rung of double precision; may be empty
-  Buffer meta;
+  Buffer meta;                  // what a batch notes in it, on the device, lies beside what is given once
   bool has_doubles;
 };
 

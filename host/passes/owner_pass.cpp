@@ -9,7 +9,7 @@
 namespace bisector::host {
 
 OwnerPass::OwnerPass(Device& device, bool is_double)
-    : double_(is_double), positions_(device), owners_(device), uncertain_(device), found_(device) {}
+    : double_(is_double), positions_(device), owners_(device, Lifetime::kept), uncertain_(device), found_(device) {}
 
 void OwnerPass::set_points(Commands& commands, std::vector<Vec3> points, double scale) {
   points_ = std::move(points);

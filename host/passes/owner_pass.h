@@ -28,7 +28,9 @@ class OwnerPass {
  private:
   bool double_;
   std::vector<Vec3> points_;
-  Buffer positions_, owners_, uncertain_, found_;
+  Buffer positions_;
+  Buffer owners_;  // the last ones are where the search for the next begins
+  Buffer uncertain_, found_;
   bool from_scratch_ = true;
 };
 

@@ -8,6 +8,9 @@ LAYOUT_BEGIN
 
 LAYOUT_CONSTANT uint kGroupSize = 64;  // invocations of a workgroup, of every kernel
 
+// The specialisation constant of all kernels that says in which order they take their items (common.glsl).
+LAYOUT_CONSTANT uint kOrderConstant = 100;
+
 LAYOUT_CONSTANT uint kScanLane = 16;     // values that one invocation of scan_blocks.comp sums
 LAYOUT_CONSTANT uint kScanBlock = 1024;  // and one workgroup: kGroupSize * kScanLane
 

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "host/device/faults.h"
 #include "tests/host/fixture.h"
 
 namespace bisector::host {
@@ -195,6 +196,49 @@ TEST_F(CommandsTest, ManyItemsAreLaidOutInTwoDimensions) {
   commands.download(values, 0, result.data(), kCount * std::size_t{4});
   commands.run();
   EXPECT_TRUE(result == std::vector<std::uint32_t>(kCount, 2));
+}
+
+// Each item is taken once in any order, as they come unless another one is asked for.
+TEST_F(CommandsTest, ItemsAreTakenInAnyOrder) {
+  constexpr std::uint32_t kCount = 5 * kGroupSize;
+  for (const std::uint32_t odd : {1u, 37u, 63u}) {
+    const std::unique_ptr<Device> fresh = Device::open();
+    permute_invocations(*fresh, odd);
+    Commands commands(*fresh);
+    Buffer items(*fresh);
+    items.reserve(kCount * 4);
+    commands.dispatch({"test_order", {}}, {writes(items)}, CountPush{kCount}, kCount);
+    std::vector<std::uint32_t> taken(kCount);
+    commands.download(items, 0, taken.data(), kCount * 4);
+    commands.run();
+    EXPECT_EQ(taken == counting(kCount), odd == 1);
+    std::ranges::sort(taken);
+    EXPECT_EQ(taken, counting(kCount));
+  }
+}
+
+TEST_F(CommandsTest, MemoryIsPoisoned) {
+  constexpr std::uint32_t kCount = 1000, kFirst = 0xffffffff, kSecond = 7;
+  poison_new_memory(*device, kFirst);
+  Commands commands(*device);
+  Buffer added(*device), kept(*device, Lifetime::kept), given(*device), made(*device);
+  made.reserve(16);
+  made.reserve(kCount * 4);  // grows
+  for (Buffer* buffer : {&added, &kept, &given}) put(commands, *buffer, std::vector<std::uint32_t>(kCount, 1));
+  for (Buffer* buffer : {&added, &kept})
+    commands.dispatch({"test_add", {}}, {updates(*buffer)}, CountPush{kCount}, kCount);
+  commands.run();
+  poison_computed(*device, kSecond);
+  const auto expect_all = [&](const Buffer& buffer, std::uint32_t word) {
+    std::vector<std::uint32_t> words(kCount);
+    commands.download(buffer, 0, words.data(), kCount * 4);
+    commands.run();
+    EXPECT_TRUE(words == std::vector<std::uint32_t>(kCount, word)) << word;
+  };
+  expect_all(made, kFirst);
+  expect_all(added, kSecond);
+  expect_all(kept, 2);
+  expect_all(given, 1);
 }
 
 TEST_F(CommandsTest, KernelsAreBuiltForBothPrecisions) {
