@@ -23,7 +23,7 @@ shared double terms[kGroupSize];
 BLOCK_SUM(sum_of_terms, terms)
 
 void main() {
-  const uint i = invocation(), lane = gl_LocalInvocationID.x, at = 3 * i;
+  const uint i = invocation(), lane = lane_of_workgroup(), at = 3 * i;
   if (i < count) {
     precise dvec3 d = dvec3(0.0LF);
     if (kUpdate != kNegateUpdate) d = dvec3(direction[at], direction[at + 1], direction[at + 2]);

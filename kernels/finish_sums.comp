@@ -19,12 +19,12 @@ BLOCK_SUM(sum_of_sums, sums)
 
 void main() {
   const uint blocks = (count + kSumBlock - 1) / kSumBlock;
-  [[dont_unroll]] for (uint task = gl_LocalInvocationID.x; task < kinds * blocks; task += kGroupSize) {
+  [[dont_unroll]] for (uint task = lane_of_workgroup(); task < kinds * blocks; task += kGroupSize) {
     const uint kind = task / blocks, first = task % blocks * kSumBlock;
     sums[task] = sum_of_terms(kind * count + first, min(kSumBlock, count - first));
   }
   barrier();
-  const uint kind = gl_LocalInvocationID.x;
+  const uint kind = lane_of_workgroup();
   if (kind >= kinds) return;
   const double sum = sum_of_sums(kind * blocks, blocks);
   if (kUse == kStoreSums) {

@@ -52,7 +52,7 @@ dvec3 held(dvec3 g, uint i) {
 }
 
 void main() {
-  const uint i = invocation(), lane = gl_LocalInvocationID.x;
+  const uint i = invocation(), lane = lane_of_workgroup();
   if (i < count) {
     const uint at = 3 * i;
     const double mass = cell_number(i, 0);

@@ -184,9 +184,8 @@ void sort_doubtful(uint count) {
 }
 
 void main() {
-  lane = gl_LocalInvocationID.x;
-  const uint target =
-      counters[kWideTargets + kBeginAfter] + gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  lane = lane_of_workgroup();
+  const uint target = counters[kWideTargets + kBeginAfter] + workgroup();
   if (target >= counters[kWideTargets + kEndAfter]) return;
   own_slot = targets[target] & ~kWidestTarget;
   own = seed(own_slot);

@@ -57,9 +57,10 @@ struct Commands::Impl {
   Phase phase = &DeviceSeconds::transfer;
   bool recording = false;
 
-  void use(const Buffer& buffer, vk::PipelineStageFlags stages, vk::AccessFlags reads, vk::AccessFlags writes) {
+  void use(const Buffer& buffer, vk::PipelineStageFlags stages, vk::AccessFlags reads, vk::AccessFlags writes,
+           const ByteRange& written = {}) {
     if (!buffer.size()) throw std::logic_error("a buffer is used that has no memory");
-    hazards.use(*buffer.impl().allocation.buffer, stages, reads, writes);
+    hazards.use(*buffer.impl().allocation.buffer, stages, reads, writes, written);
   }
 
   // Before each command: starts the recording if there is none, and puts the barrier for the uses.
@@ -87,7 +88,7 @@ struct Commands::Impl {
   // Records the transfer of up to `bytes` from staging memory, which the caller fills, and the other way.
   Staging::Span copy_up(const Buffer& buffer, std::size_t offset, std::size_t bytes, std::size_t unit) {
     const Staging::Span span = stage(bytes, unit);
-    use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+    use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite, {offset, offset + span.bytes});
     prepare("upload");
     commands.copyBuffer(span.buffer, *buffer.impl().allocation.buffer, vk::BufferCopy(span.offset, offset, span.bytes));
     work.bytes_up += span.bytes;
@@ -221,7 +222,7 @@ void Commands::copy(const Buffer& from, std::size_t from_offset, const Buffer& t
   check_range(to, to_offset, bytes);
   if (!bytes) return;
   impl_->use(from, Stage::eTransfer, AccessBit::eTransferRead, {});
-  impl_->use(to, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+  impl_->use(to, Stage::eTransfer, {}, AccessBit::eTransferWrite, {to_offset, to_offset + bytes});
   impl_->prepare("copy");
   impl_->commands.copyBuffer(*from.impl().allocation.buffer, *to.impl().allocation.buffer,
                              vk::BufferCopy(from_offset, to_offset, bytes));
@@ -231,7 +232,7 @@ void Commands::fill(const Buffer& buffer, std::size_t offset, std::size_t bytes,
   check_range(buffer, offset, bytes);
   if (offset % 4 || bytes % 4) throw std::logic_error("fill is by whole words");
   if (!bytes) return;
-  impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite);
+  impl_->use(buffer, Stage::eTransfer, {}, AccessBit::eTransferWrite, {offset, offset + bytes});
   impl_->prepare("fill");
   impl_->commands.fillBuffer(*buffer.impl().allocation.buffer, offset, bytes, word);
 }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,13 @@ void inject_fault(Fault fault, std::size_t call);
 std::size_t fallible_calls();
 // From now on the names of such calls are appended here; null: nowhere.
 void log_fallible_calls(std::vector<std::string>* names);
+
+// Of the barriers between commands, the `ordinal`-th from now on (from 0) is not recorded; null: all are.
+void leave_out_barrier(std::optional<std::size_t> ordinal);
+// Barriers since the last leave_out_barrier().
+std::size_t barriers();
+// Whether the one left out stood between two kernels alone, of which each reads and writes all the buffers concerned.
+bool left_out_between_updates();
 
 // From now on the device has no double precision, or binds no more bytes than this.
 void hide_float64(Device& device);

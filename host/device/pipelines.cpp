@@ -53,6 +53,12 @@ const Pipeline& Pipelines::get(const Kernel& kernel, std::size_t bindings, std::
   return found->second;
 }
 
+std::vector<KernelUse> Pipelines::used() const {
+  std::vector<KernelUse> all;
+  for (const auto& [kernel, pipeline] : pipelines_) all.push_back({kernel, pipeline.bindings, pipeline.push_bytes});
+  return all;
+}
+
 Pipeline Pipelines::make(const Kernel& kernel, std::size_t bindings, std::size_t push_bytes) const {
   if (bindings > kMaxBindings) throw std::logic_error("kernel " + kernel.name + " has too many bindings");
   const vk::raii::Device& device = device_.device;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <vector>
 
 #include "host/device/cache_file.h"
 #include "host/device/commands.h"
@@ -18,6 +19,12 @@ struct Pipeline {
   vk::raii::DescriptorSetLayout set_layout;
   vk::raii::PipelineLayout layout;
   vk::raii::Pipeline pipeline;
+};
+
+// A kernel and what get() is asked for.
+struct KernelUse {
+  Kernel kernel;
+  std::size_t bindings, push_bytes;
 };
 
 class Pipelines {
@@ -34,6 +41,8 @@ class Pipelines {
 
   // Throws std::logic_error if there is no such kernel, or it was used before with other numbers; DeviceError.
   const Pipeline& get(const Kernel& kernel, std::size_t bindings, std::size_t push_bytes);
+  // Those made so far, in alphabetical order.
+  std::vector<KernelUse> used() const;
 
  private:
   struct Less {
