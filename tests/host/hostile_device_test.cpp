@@ -9,10 +9,12 @@
 #include <vector>
 
 #include "backend/cpu_backend.h"
+#include "cvt/optimise.h"
 #include "host/device/faults.h"
 #include "host/passes/vulkan_backend.h"
 #include "host/passes/vulkan_solid_backend.h"
 #include "support/models.h"
+#include "support/run.h"
 #include "support/setups.h"
 #include "support/solids.h"
 
@@ -152,6 +154,38 @@ TEST_P(Hostile, TheOrderOfInvocationsDoesNotShow) {
   expect_all_undisturbed(
       options_for(GetParam(), false), {is_double ? SolidCells::whole : SolidCells::clipped},
       [](Device& device) { host::permute_invocations(device, 37); }, [](Device&) {});
+}
+
+// Steps of a descent, whose vectors stay on the device.
+void expect_undisturbed_descent(Processor processor, const std::shared_ptr<Device>& as_it_is,
+                                const std::shared_ptr<Device>& disturbed) {
+  const TriangleMesh mesh = box(2);
+  const Surface surface(mesh);
+  const auto optimised = [&](Backend& backend) {
+    FreeRun free(backend, random_seeds(mesh, 200, 74));
+    OptimiseOptions options;
+    options.iterations = 8;
+    optimise(free.run, options);
+    options.constrained = true;
+    options.iterations = 3;
+    optimise(free.run, options);
+    return free.seeds();
+  };
+  const host::VulkanOptions options = options_for(processor, false);
+  const Seeds found = optimised(*host::make_vulkan_backend(surface, disturbed, options));
+  EXPECT_EQ(found, optimised(*host::make_vulkan_backend(surface, as_it_is, options)));
+  if (processor != Processor::double_) return;
+  CpuBackend cpu(surface, NeighbourSource::nearest);
+  EXPECT_EQ(found, optimised(cpu));
+}
+
+TEST_P(Hostile, ADescentIsUndisturbed) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  SKIP_WITHOUT_DEVICE(Processor::double_);
+  const std::shared_ptr<Device> plain = open(), disturbed = open();
+  host::poison_new_memory(*disturbed, 0xffffffffu);
+  host::permute_invocations(*disturbed, 37);
+  expect_undisturbed_descent(GetParam(), plain, disturbed);
 }
 
 }  // namespace
