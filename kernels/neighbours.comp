@@ -125,7 +125,8 @@ void main() {
   // Twice as many seeds as a list has, around the own.
   const uint leaves = nodes_of(0), home = own_slot / kTreeArity, beside = (kMost + kTreeArity - 1) / kTreeArity;
   const uint begin = home > beside ? home - beside : 0, end = min(home + beside + 1, leaves);
-  // Leaves are looked for until each invocation has one, for these take far longer than boxes and are best seen together.
+  // Each invocation goes on to its next leaf before any leaf is seen: a leaf takes far longer than a box, and all take
+  // theirs together.
   uint leaf = begin, level = top_level, node = 0, opened = 0;
   bool more = true;
   [[dont_unroll]] while (true) {
