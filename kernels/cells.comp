@@ -37,8 +37,7 @@ void main() {
     real masses[kNear];
     const uint count = min(info.y, kNear);
     for (uint k = 0; k < count; ++k) {
-      const uint first = info.x & ~kInWideLists;
-      const real mass = sum_of((info.x & kInWideLists) != 0 ? wide_lists[first + k] : lists[first + k], 0);
+      const real mass = sum_of(info.w != kListFirst ? wide_lists[info.x + k] : lists[info.x + k], 0);
       uint m = k;
       for (; m > 0 && masses[m - 1] > mass; --m) masses[m] = masses[m - 1];
       masses[m] = mass;

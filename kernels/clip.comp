@@ -39,8 +39,7 @@ LOAD_POINT(seed, seed_words)
 const uint kMostListed = kWidestList;  // work is bounded; a Delaunay ring may be longer
 
 uint list_first, list_width;
-bool list_wide;
-uint neighbour(uint k) { return list_wide ? wide_lists[list_first + k] : lists[list_first + k]; }
+uint neighbour(uint k) { return list_width != kListFirst ? wide_lists[list_first + k] : lists[list_first + k]; }
 
 #include "clipper.glsl"
 #include "moments_store.glsl"
@@ -88,8 +87,7 @@ void main() {
     return;
   }
   const uvec4 info = list_info[slot];
-  list_wide = (info.x & kInWideLists) != 0;
-  list_first = info.x & ~kInWideLists;
+  list_first = info.x;
   list_width = info.w;
   begin_facet(facet, slot);
   uint status = info.y > kMostListed ? kStatusUnsure : clip(info.y, real(uintBitsToFloat(info.z)));

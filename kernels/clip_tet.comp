@@ -41,8 +41,7 @@ LOAD_POINT(seed, seed_words)
 const uint kMostListed = kWidestList;  // work is bounded; a Delaunay ring may be longer
 
 uint list_first, list_width;
-bool list_wide;
-uint neighbour(uint k) { return list_wide ? wide_lists[list_first + k] : lists[list_first + k]; }
+uint neighbour(uint k) { return list_width != kListFirst ? wide_lists[list_first + k] : lists[list_first + k]; }
 
 #include "tet_clipper.glsl"
 #include "moments_store.glsl"
@@ -125,8 +124,7 @@ void main() {
     status = owner == slot ? kStatusWhole : kStatusEmpty;
   } else {
     const uvec4 info = list_info[slot];
-    list_wide = (info.x & kInWideLists) != 0;
-    list_first = info.x & ~kInWideLists;
+    list_first = info.x;
     list_width = info.w;
     status = info.y > kMostListed ? kStatusUnsure : clip(info.y, real(uintBitsToFloat(info.z)));
   }

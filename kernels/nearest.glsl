@@ -1,12 +1,10 @@
-// Distances of seeds from one of them. In single precision, which is enough to tell nearly all of them apart.
+// Distances of seeds from one of them, in single precision, which is enough to tell nearly all of them apart.
 //
 // To include: seed_tree.glsl, the function `seed` and the buffer `ids`.
 
 const float kFarthest = 3e38;
 
-float narrow_square(uint other, Point own, inout bool met) {
-  const real3 d = difference(seed(other), own);
-  if (d == real3(0.0)) met = true;
+float narrow_square(real3 d) {
   const vec3 narrow = vec3(d);
   precise float squared = narrow.x * narrow.x + narrow.y * narrow.y + narrow.z * narrow.z;
   return squared;

@@ -29,7 +29,6 @@ LOAD_POINT(seed, seed_words)
 // registers.
 float squares[kMost];
 uint found[kMost];
-uint seen = 0;
 float left_out = kFarthest;  // the least square of a seed that is not among them
 float leaf_squares[kTreeArity];
 uint leaf_found[kTreeArity];
@@ -64,14 +63,14 @@ void sort_leaf() {
   [[unroll]] for (uint k = 1; k < 6; k += 2) ORDER_LEAF(k, k + 1)
 }
 
-#define MERGE(apart)                                                            \
-  if (apart < kMerged) {                                                        \
-    [[unroll]] for (uint place = kPadding; place < kMerged - apart; ++place)    \
-      if ((place & apart) == 0)                                                 \
-        NEARER_FIRST(squares[place - kPadding], found[place - kPadding],        \
+const uint kPadding = kMerged - kMost;  // places before the list
+#define MERGE(apart)                                                                     \
+  if (apart < kMerged) {                                                                 \
+    [[unroll]] for (uint place = kPadding; place < kMerged - apart; ++place)             \
+      if ((place & apart) == 0)                                                          \
+        NEARER_FIRST(squares[place - kPadding], found[place - kPadding],                 \
                      squares[place - kPadding + apart], found[place - kPadding + apart]) \
   }
-const uint kPadding = kMerged - kMost;
 
 // Takes the leaf's seeds that are nearer than the farthest of the list into it: the nearest of both, ascending and then
 // descending or the other way round, are sorted by Batcher's bitonic merge. It is for powers of two; places before the
@@ -100,8 +99,9 @@ void see_leaf(uint leaf) {
     leaf_squares[k] = kFarthest;
     leaf_found[k] = other;
     if (other < seed_count && other != own_slot) {
-      leaf_squares[k] = narrow_square(other, own, met);
-      ++seen;
+      const real3 d = difference(seed(other), own);
+      met = met || d == real3(0.0);
+      leaf_squares[k] = narrow_square(d);
     }
     nearest = min(nearest, leaf_squares[k]);
   }
@@ -148,12 +148,9 @@ void main() {
     see_leaf(next);
   }
   // Of seeds at the same distance all are listed or none, so that lists do not depend on the order of slots.
-  uint count = min(seen, kMost);
-  const float farthest = squares[kMost - 1];
-  if (left_out < kFarthest && left_out <= farthest) {
-    [[unroll]] for (uint k = 0; k < kMost; ++k)
-      if (squares[k] >= farthest) --count;
-  }
+  const float farthest = squares[kMost - 1], bound = left_out <= farthest ? farthest : kFarthest;
+  uint count = 0;
+  [[unroll]] for (uint k = 0; k < kMost; ++k) count += squares[k] < bound ? 1 : 0;
   const uint first = own_slot * kMost;
   [[unroll]] for (uint k = 0; k < kMost; ++k)
     if (k < count) lists[first + k] = found[k];

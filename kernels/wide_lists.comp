@@ -13,7 +13,7 @@ layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
 layout(std430, binding = 2) readonly buffer Boxes { float boxes[]; };
 layout(std430, binding = 3) writeonly buffer WideLists { uint wide_lists[]; };
-layout(std430, binding = 4) writeonly buffer Info { uvec4 list_info[]; };  // ListInfo
+layout(std430, binding = 4) buffer Info { uvec4 list_info[]; };  // ListInfo
 layout(std430, binding = 5) buffer Counters { uint counters[]; };
 layout(std430, binding = 6) readonly buffer Targets { uint targets[]; };
 #define PUSH_WIDE_LISTS
@@ -28,36 +28,42 @@ const uint kBatch = kGroupSize * kTreeArity;  // of seeds, a leaf for each invoc
 const uint kStack = 512;                      // nodes that are still to be looked at
 const uint kReserved = 96;                    // of them, for what one node at a time may add
 const uint kLevelShift = 28;
-const uint kMostRounds = 512;  // through the stack
+const uint kMostRounds = 96;  // through the stack; more would end llvmpipe's loops
 
-shared float squares[kWidestList];  // of the list, ascending
-shared uint found[kWidestList];
-shared float new_squares[kBatch];
-shared uint new_found[kBatch];
+// The list, ascending, and from kNew on what was collected for it.
+const uint kNew = kWidestList;
+shared float squares[kNew + kBatch];
+shared uint found[kNew + kBatch];
 shared uint stack[kStack];
-shared uint stack_size, new_count, list_first, swaps, least_left_out;
+shared uint stack_size, new_count, list_first, swaps, least_left_out, incomplete;
 
 uint lane, most, own_slot;
 Point own;
-bool met = false;
 float left_out = kFarthest;  // the least square of a seed that this invocation left out of the list
 
-bool after(float square_a, uint a, float square_b, uint b) {
-  return square_a > square_b || (square_a == square_b && a > b);
+// Puts what lies at two places in order, the nearer first or last.
+void order(uint a, uint b, bool nearer_first) {
+  const float square_a = squares[a], square_b = squares[b];
+  const uint found_a = found[a], found_b = found[b];
+  if ((square_a > square_b || (square_a == square_b && found_a > found_b)) != nearer_first) return;
+  squares[a] = square_b;
+  squares[b] = square_a;
+  found[a] = found_b;
+  found[b] = found_a;
 }
 
 void collect(uint leaf) {
   const uint end = min((leaf + 1) * kTreeArity, seed_count);
   [[dont_unroll]] for (uint other = leaf * kTreeArity; other < end; ++other) {
     if (other == own_slot) continue;
-    const float squared = narrow_square(other, own, met);
+    const float squared = narrow_square(difference(seed(other), own));
     if (squared >= squares[most - 1]) {
       left_out = min(left_out, squared);
       continue;
     }
-    const uint at = atomicAdd(new_count, 1u);
-    new_squares[at] = squared;
-    new_found[at] = other;
+    const uint at = kNew + atomicAdd(new_count, 1u);
+    squares[at] = squared;
+    found[at] = other;
   }
 }
 
@@ -72,49 +78,30 @@ void merge() {
     uint size = 2;
     [[dont_unroll]] while (size < count) size *= 2;
     [[dont_unroll]] for (uint k = count + lane; k < size; k += kGroupSize) {
-      new_squares[k] = kFarthest;
-      new_found[k] = kNone;
+      squares[kNew + k] = kFarthest;
+      found[kNew + k] = kNone;
     }
     barrier();
     [[dont_unroll]] for (uint run = 2; run <= size; run *= 2) {
       [[dont_unroll]] for (uint apart = run / 2; apart > 0; apart /= 2) {
         [[dont_unroll]] for (uint i = lane; i < size / 2; i += kGroupSize) {
-          const uint a = lower_place(i, apart), b = a + apart;
-          const float square_a = new_squares[a], square_b = new_squares[b];
-          const uint found_a = new_found[a], found_b = new_found[b];
-          if (after(square_a, found_a, square_b, found_b) == ((a & run) == 0)) {
-            new_squares[a] = square_b;
-            new_squares[b] = square_a;
-            new_found[a] = found_b;
-            new_found[b] = found_a;
-          }
+          const uint a = lower_place(i, apart);
+          order(kNew + a, kNew + a + apart, (a & run) == 0);
         }
         barrier();
       }
     }
     // The nearest of both, ascending and then descending or the other way round, which one more merge sorts.
     [[dont_unroll]] for (uint i = lane; i < min(size, most); i += kGroupSize) {
-      const uint at = most - 1 - i;
-      const bool nearer = after(squares[at], found[at], new_squares[i], new_found[i]);
-      left_out = min(left_out, nearer ? squares[at] : new_squares[i]);
-      if (nearer) {
-        squares[at] = new_squares[i];
-        found[at] = new_found[i];
-      }
+      order(most - 1 - i, kNew + i, true);
+      left_out = min(left_out, squares[kNew + i]);
     }
-    if (size > most) left_out = min(left_out, new_squares[most]);
+    if (size > most) left_out = min(left_out, squares[kNew + most]);
     barrier();
     [[dont_unroll]] for (uint apart = most / 2; apart > 0; apart /= 2) {
       [[dont_unroll]] for (uint i = lane; i < most / 2; i += kGroupSize) {
-        const uint a = lower_place(i, apart), b = a + apart;
-        const float square_a = squares[a], square_b = squares[b];
-        const uint found_a = found[a], found_b = found[b];
-        if (after(square_a, found_a, square_b, found_b)) {
-          squares[a] = square_b;
-          squares[b] = square_a;
-          found[a] = found_b;
-          found[b] = found_a;
-        }
+        const uint a = lower_place(i, apart);
+        order(a, a + apart, true);
       }
       barrier();
     }
@@ -187,16 +174,17 @@ void main() {
   lane = lane_of_workgroup();
   const uint target = counters[kWideTargets + kBeginAfter] + workgroup();
   if (target >= counters[kWideTargets + kEndAfter]) return;
-  own_slot = targets[target] & ~kWidestTarget;
+  own_slot = targets[target];
   own = seed(own_slot);
-  const bool widest = (targets[target] & kWidestTarget) != 0;
+  const uint width = list_info[own_slot].w + 1;
+  const bool widest = width == kListWidest;
   most = widest ? kWidestList : kWide;
   [[dont_unroll]] for (uint k = lane; k < most; k += kGroupSize) {
     squares[k] = kFarthest;
     found[k] = kNone;
   }
   if (lane == 0) {
-    new_count = 0;
+    new_count = incomplete = 0;
     least_left_out = floatBitsToUint(kFarthest);
     list_first = atomicAdd(counters[kWideEntries], most);
   }
@@ -209,26 +197,25 @@ void main() {
   }
   const bool searched = search(begin, end);
   atomicMin(least_left_out, floatBitsToUint(left_out));
+  if (!loops_complete(two)) incomplete = 1;
   barrier();
   // As in neighbours.comp, of seeds at the same distance all are listed or none.
-  const float farthest = squares[most - 1], least = uintBitsToFloat(least_left_out);
+  const float farthest = squares[most - 1];
   uint count = min(seed_count - 1, most);
-  if (least < kFarthest && least <= farthest) {
+  if (uintBitsToFloat(least_left_out) <= farthest) {
     [[dont_unroll]] while (count > 0 && squares[count - 1] >= farthest) --count;
   }
   const uint first = list_first;
   // A list that there is no memory for, nor can be, is empty.
   const bool fits = first + most <= wide_capacity;
   if (!fits && may_grow != 0) atomicOr(counters[kOverflow], kOverflowWide);
-  const bool complete = searched && fits && loops_complete(two);
+  const bool complete = searched && fits && incomplete == 0;
   if (complete) {
     sort_doubtful(count);
     [[dont_unroll]] for (uint k = lane; k < count; k += kGroupSize) wide_lists[first + k] = found[k];
   }
   if (lane == 0) {
     const float limit = count < seed_count - 1 ? certain_square(farthest) : float(kInfinity);
-    list_info[own_slot] = uvec4(first | kInWideLists, complete ? count : 0, floatBitsToUint(complete ? limit : 0.0),
-                                widest ? kListWidest : kListWide);
+    list_info[own_slot] = uvec4(first, complete ? count : 0, floatBitsToUint(complete ? limit : 0.0), width);
   }
-  if (met && lane == 0) atomicAdd(counters[kCoincident], 1u);
 }

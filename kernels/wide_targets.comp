@@ -19,5 +19,5 @@ void main() {
   const uint slot = pairs[flagged[first_flagged + item] & ~kAgainInDouble].y;
   const uint width = list_info[slot].w + 1;
   if (width > kListWidest || atomicMax(wide[slot], width) >= width) return;
-  targets[atomicAdd(counters[kWideTargets], 1u)] = slot | (width == kListWidest ? kWidestTarget : 0u);
+  targets[atomicAdd(counters[kWideTargets], 1u)] = slot;
 }

@@ -13,6 +13,7 @@ struct Capacities {
   std::size_t flagged = 0;    // pairs of one batch in each list of those that climb a rung
   std::size_t pairs = 0;      // of all batches
   std::size_t at_once = 0;    // pairs that one dispatch clips at most
+  std::size_t wide = 0;       // entries of wider lists of neighbours
 };
 
 }  // namespace bisector::host

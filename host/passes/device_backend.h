@@ -54,9 +54,9 @@ class DeviceBackend : public Base {
   // `scale` and `box` are the domain's; `cpu` are what Cpu is made of beside the domain and the source.
   template <class Domain, class... CpuOptions>
   DeviceBackend(const Domain& domain, std::shared_ptr<Device> device, const Precisions& precisions,
-                NeighbourSource source, double scale, const Box& box, bool in_solid, CpuOptions... cpu)
-      : Base(domain), stage_(std::move(device), precisions, source, scale, box, in_solid),
-        cpu_(domain, source, cpu...) {}
+                const VulkanOptions& options, double scale, const Box& box, bool in_solid, CpuOptions... cpu)
+      : Base(domain), stage_(std::move(device), precisions, options, scale, box, in_solid),
+        cpu_(domain, options.neighbours, cpu...) {}
 
   EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) final {
     if (!stage_.within_reach(seeds)) {

@@ -24,9 +24,9 @@ constexpr std::size_t kWord = sizeof(std::uint32_t);
 
 }  // namespace
 
-NeighbourPass::NeighbourPass(Device& device, bool is_double, const ListSizes& sizes)
+NeighbourPass::NeighbourPass(Device& device, bool is_double, const ListSizes& sizes, std::size_t wide)
     : device_(device), double_(is_double), sizes_(sizes), tree_(device), info_(device), lists_(device),
-      wide_lists_(device), targets_(device), width_(device) {}
+      wide_lists_(device), targets_(device), width_(device), asked_wide_(wide) {}
 
 void NeighbourPass::begin(Commands& commands, const DeviceSeeds& seeds) {
   const std::size_t n = seeds.count();
@@ -38,9 +38,9 @@ void NeighbourPass::begin(Commands& commands, const DeviceSeeds& seeds) {
                                   device_.description().name, n, device_.limits().storage_range));
   lists_.reserve(n * most_ * kWord);
   info_.reserve(n * sizeof(ListInfo));
-  const std::size_t room =
-      std::max({kLeastWide * sizes_.wide, n / kSeedsPerWide * sizes_.wide, most_wanted_ + most_wanted_ / 2});
-  wide_capacity_ = std::min({room, n * (sizes_.wide + kWidestList), range});
+  const std::size_t expected = asked_wide_ ? asked_wide_ : std::max(kLeastWide, n / kSeedsPerWide) * sizes_.wide;
+  wide_capacity_ =
+      std::min({std::max(expected, most_wanted_ + most_wanted_ / 2), n * (sizes_.wide + kWidestList), range});
   may_grow_ = wide_capacity_ < range;
   wide_lists_.reserve(wide_capacity_ * kWord);
   targets_.reserve(2 * n * kWord);
@@ -73,7 +73,7 @@ void NeighbourPass::widen(Commands& commands, const DeviceSeeds& seeds, const Bu
   push.may_grow = may_grow_;
   commands.dispatch_indirect(kernel("wide_lists", double_, {sizes_.wide}),
                              {reads(seeds.words), reads(seeds.ids), reads(tree_.boxes()), writes(wide_lists_),
-                              writes(info_), updates(counters), reads(targets_)},
+                              updates(info_), updates(counters), reads(targets_)},
                              push, counters, (kGroups + 3 * kWorkTargets) * kWord);
 }
 
@@ -88,7 +88,7 @@ void NeighbourPass::upload_lists(Commands& commands, const DeviceSeeds& seeds, c
     const bool unlimited = list.radius == std::numeric_limits<double>::infinity();
     const float squared = unlimited ? kUnlimited : static_cast<float>(radius * radius * (1 - kRadiusMargin));
     info.push_back({static_cast<uint>(values.size()), static_cast<uint>(list.end - list.begin),
-                    std::bit_cast<uint>(squared), kListWidest});
+                    std::bit_cast<uint>(squared), kListFirst});
     values.insert(values.end(), list.begin, list.end);
   }
   commands.phase(&DeviceSeconds::transfer);

@@ -21,7 +21,8 @@ inline constexpr ListSizes kSurfaceLists{32, 2048, 128}, kSolidLists{96, 4096, 2
 
 class NeighbourPass {
  public:
-  NeighbourPass(Device& device, bool is_double, const ListSizes& sizes);
+  // `wide`: entries of wider lists that there is room for at first; 0: by what is expected.
+  NeighbourPass(Device& device, bool is_double, const ListSizes& sizes, std::size_t wide);
 
   // Reserves memory for lists and the tree; not while commands are recorded. Records the tree.
   void begin(Commands& commands, const DeviceSeeds& seeds);
@@ -52,7 +53,7 @@ class NeighbourPass {
   SeedTree tree_;
   Buffer info_, lists_, wide_lists_, targets_, width_;
   std::uint32_t most_ = 0;                           // entries of a first list
-  std::size_t wide_capacity_ = 0, most_wanted_ = 0;  // entries of wider lists
+  std::size_t asked_wide_, wide_capacity_ = 0, most_wanted_ = 0;  // entries of wider lists
   bool may_grow_ = true;
 };
 

@@ -144,7 +144,7 @@ void PairPass::grow(const PairJob& job, const Counters& counters) {
   if (overflow & kOverflowFlagged) buffers_.flagged_capacity *= 2;
   if (overflow & kOverflowWide) {
     // First lists once more, in place of wider ones that are empty.
-    job.neighbours.wanted(2 * counters[kWideEntries]);
+    job.neighbours.wanted(counters[kWideEntries]);
     clear_work(job, kWideTargets, 1);
     job.commands.fill(job.counters, kWideEntries * kWord, kWord, 0);
     job.neighbours.begin(job.commands, job.seeds);

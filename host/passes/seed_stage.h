@@ -10,6 +10,7 @@
 #include "host/passes/neighbour_pass.h"
 #include "host/passes/scan.h"
 #include "host/passes/seeds.h"
+#include "host/passes/vulkan_backend.h"
 #include "kernels/layout/counters.h"
 #include "kernels/layout/pairs.h"
 
@@ -25,7 +26,7 @@ Precisions choose_precisions(const Device& device, Precision asked, bool double_
 class SeedStage {
  public:
   // `box` is the domain's; `in_solid`: seeds lie in space, not on a surface.
-  SeedStage(std::shared_ptr<Device> device, const Precisions& precisions, NeighbourSource source, double scale,
+  SeedStage(std::shared_ptr<Device> device, const Precisions& precisions, const VulkanOptions& options, double scale,
             const Box& box, bool in_solid);
 
   // Whether all seeds have coordinates that single precision can square. To be asked before begin().

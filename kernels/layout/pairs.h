@@ -64,14 +64,11 @@ LAYOUT_CONSTANT uint kGatheredWords = 3;
 // And its answers: pair, status.
 LAYOUT_CONSTANT uint kAnswerWords = 2;
 
-// A list of neighbours whose first entry has this bit lies among the wide ones.
-LAYOUT_CONSTANT uint kInWideLists = 0x80000000u;
-// How wide a list is. A cell gets wider ones as it needs them.
+// How wide a list of neighbours is; all but first ones lie in a buffer of their own. A cell gets wider ones as it needs
+// them.
 LAYOUT_CONSTANT uint kListFirst = 0;
 LAYOUT_CONSTANT uint kListWide = 1;
 LAYOUT_CONSTANT uint kListWidest = 2;  // kWidestList entries, or there was no memory for them
-// Of a cell's slot, where it is listed for a wider list: the widest.
-LAYOUT_CONSTANT uint kWidestTarget = 0x80000000u;
 
 LAYOUT_END
 

@@ -50,7 +50,7 @@ struct TriangleSums {
   std::size_t below_30 = 0, free_below_30 = 0;
 
   TriangleSums() {
-    report.q_min = report.q_min_free = report.edge_min = std::numeric_limits<double>::infinity();
+    report.q_min = report.q_min_free = std::numeric_limits<double>::infinity();
     report.theta_min = report.theta_min_free = 180;
   }
 

@@ -31,13 +31,12 @@ struct Spoke {
 // Whether the triangles around a vertex, linked through the edges that they share there, fall apart. Each has two of
 // the spokes.
 bool fall_apart(std::vector<Spoke>& spokes) {
-  DisjointSets<> fans(spokes.size() / 2);
+  std::size_t parts = spokes.size() / 2;
+  DisjointSets<> fans(parts);
   std::sort(spokes.begin(), spokes.end(), [](const Spoke& a, const Spoke& b) { return a.to < b.to; });
   for (std::size_t k = 1; k < spokes.size(); ++k)
-    if (spokes[k].to == spokes[k - 1].to) fans.join(spokes[k].triangle, spokes[k - 1].triangle);
-  for (std::size_t k = 1; k < spokes.size() / 2; ++k)
-    if (fans.root(k) != fans.root(0)) return true;
-  return false;
+    if (spokes[k].to == spokes[k - 1].to && fans.join(spokes[k].triangle, spokes[k - 1].triangle)) --parts;
+  return parts > 1;
 }
 
 // Whether the triangles of every edge of two run along it in opposite directions.

@@ -479,7 +479,8 @@ TEST_P(Buffers, Grow) {
   check("pairs", {.pairs = 64});
   check("batches", {.batch_pairs = 100});
   check("dispatches", {.at_once = 64});
-  check("all", {.batch_pairs = 100, .table = 16, .proposals = 16, .flagged = 1, .pairs = 16, .at_once = 64});
+  check("wide lists", {.wide = 1});
+  check("all", {.batch_pairs = 100, .table = 16, .proposals = 16, .flagged = 1, .pairs = 16, .at_once = 64, .wide = 1});
 }
 
 // Without the double rung all that single precision is unsure of goes to the CPU, and the lists grow while that is

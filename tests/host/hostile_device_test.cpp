@@ -156,36 +156,28 @@ TEST_P(Hostile, TheOrderOfInvocationsDoesNotShow) {
       [](Device& device) { host::permute_invocations(device, 37); }, [](Device&) {});
 }
 
-// Steps of a descent, whose vectors stay on the device.
-void expect_undisturbed_descent(Processor processor, const std::shared_ptr<Device>& as_it_is,
-                                const std::shared_ptr<Device>& disturbed) {
+// Its vectors stay on the device.
+TEST_P(Hostile, ADescentIsUndisturbed) {
+  SKIP_WITHOUT_DEVICE(GetParam());
+  SKIP_WITHOUT_DEVICE(Processor::double_);
   const TriangleMesh mesh = box(2);
   const Surface surface(mesh);
   const auto optimised = [&](Backend& backend) {
     FreeRun free(backend, random_seeds(mesh, 200, 74));
-    OptimiseOptions options;
-    options.iterations = 8;
-    optimise(free.run, options);
-    options.constrained = true;
-    options.iterations = 3;
-    optimise(free.run, options);
+    optimise_both(free.run, 8, 3);
     return free.seeds();
   };
-  const host::VulkanOptions options = options_for(processor, false);
-  const Seeds found = optimised(*host::make_vulkan_backend(surface, disturbed, options));
-  EXPECT_EQ(found, optimised(*host::make_vulkan_backend(surface, as_it_is, options)));
-  if (processor != Processor::double_) return;
-  CpuBackend cpu(surface, NeighbourSource::nearest);
-  EXPECT_EQ(found, optimised(cpu));
-}
-
-TEST_P(Hostile, ADescentIsUndisturbed) {
-  SKIP_WITHOUT_DEVICE(GetParam());
-  SKIP_WITHOUT_DEVICE(Processor::double_);
-  const std::shared_ptr<Device> plain = open(), disturbed = open();
+  const auto on_device = [&](const std::shared_ptr<Device>& device) {
+    return optimised(*host::make_vulkan_backend(surface, device, options_for(GetParam(), false)));
+  };
+  const std::shared_ptr<Device> disturbed = open();
   host::poison_new_memory(*disturbed, 0xffffffffu);
   host::permute_invocations(*disturbed, 37);
-  expect_undisturbed_descent(GetParam(), plain, disturbed);
+  const Seeds found = on_device(disturbed);
+  EXPECT_EQ(found, on_device(open()));
+  if (GetParam() != Processor::double_) return;
+  CpuBackend cpu(surface, NeighbourSource::nearest);
+  EXPECT_EQ(found, optimised(cpu));
 }
 
 }  // namespace

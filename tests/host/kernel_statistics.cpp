@@ -55,7 +55,7 @@ std::string text_of(const host::Kernel& kernel) {
 }
 
 int run() {
-  const auto instance = std::make_shared<const host::Instance>();
+  const auto instance = host::Instance::shared();
   std::shared_ptr<host::Device> able;
   const host::Candidate* absent = nullptr;
   const std::vector<host::Candidate> candidates = host::enumerate_candidates(*instance);

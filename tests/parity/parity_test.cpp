@@ -454,12 +454,7 @@ struct Optimised {
 
 Optimised optimised_on(Backend& backend, std::vector<Vec3> seeds) {
   FreeRun free(backend, std::move(seeds));
-  OptimiseOptions options;
-  options.iterations = 30;
-  optimise(free.run, options);
-  options.constrained = true;
-  options.iterations = 5;
-  optimise(free.run, options);
+  optimise_both(free.run, 30, 5);
   return {free.seeds(), free.run.energy};
 }
 

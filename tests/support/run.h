@@ -25,6 +25,16 @@ struct FreeRun {
   CvtRun run;
 };
 
+// Free steps, then such along the surface.
+inline void optimise_both(CvtRun& run, int free, int constrained) {
+  OptimiseOptions options;
+  options.iterations = free;
+  optimise(run, options);
+  options.constrained = true;
+  options.iterations = constrained;
+  optimise(run, options);
+}
+
 inline std::vector<Vec3> optimised_seeds(Backend& backend, std::vector<Vec3> seeds, const OptimiseOptions& options) {
   FreeRun free(backend, std::move(seeds));
   optimise(free.run, options);
