@@ -52,7 +52,7 @@ class NeighbourPass {
   ListSizes sizes_;
   SeedTree tree_;
   Buffer info_, lists_, wide_lists_, targets_, width_;
-  std::uint32_t most_ = 0;                           // entries of a first list
+  std::uint32_t most_ = 0;                                        // entries of a first list
   std::size_t asked_wide_, wide_capacity_ = 0, most_wanted_ = 0;  // entries of wider lists
   bool may_grow_ = true;
 };

@@ -31,8 +31,8 @@ Precisions choose_precisions(const Device& device, Precision asked, bool double_
 
 SeedStage::SeedStage(std::shared_ptr<Device> opened, const Precisions& precisions, const VulkanOptions& options,
                      double scale, const Box& box, bool in_solid)
-    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung), source_(options.neighbours),
-      box_(box), commands(*device_), scan(*device_), counters(*device_), seeds(*device_),
+    : device_(std::move(opened)), double_(precisions.is_double), double_rung_(precisions.double_rung),
+      source_(options.neighbours), box_(box), commands(*device_), scan(*device_), counters(*device_), seeds(*device_),
       neighbours(*device_, double_, in_solid ? kSolidLists : kSurfaceLists, options.capacities.wide), exact(in_solid) {
   counters.reserve(kCounters * sizeof(std::uint32_t));
   seeds.scale = scale;

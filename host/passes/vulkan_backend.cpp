@@ -31,8 +31,7 @@ class VulkanBackend : public DeviceBackend<Backend, CpuBackend> {
 
 VulkanBackend::VulkanBackend(const Surface& surface, std::shared_ptr<Device> device, const VulkanOptions& options,
                              const Precisions& precisions)
-    : DeviceBackend(surface, std::move(device), precisions, options, device_scale(surface), surface.box,
-                    false),
+    : DeviceBackend(surface, std::move(device), precisions, options, device_scale(surface), surface.box, false),
       pairs_(stage_, surface, options.capacities), cells_(stage_.device(), stage_.is_double(), false) {
   std::vector<Index> triangles;
   for (const FacetSummary& summary : surface.summaries) triangles.push_back(summary.triangle);

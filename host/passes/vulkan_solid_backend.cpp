@@ -60,8 +60,7 @@ class VulkanSolidBackend : public DeviceBackend<SolidBackend, CpuSolidBackend> {
 
 VulkanSolidBackend::VulkanSolidBackend(const Solid& solid, std::shared_ptr<Device> device, const VulkanOptions& options,
                                        const Precisions& precisions, SolidCells how)
-    : DeviceBackend(solid, std::move(device), precisions, options, device_scale(solid), box_of(solid), true,
-                    how),
+    : DeviceBackend(solid, std::move(device), precisions, options, device_scale(solid), box_of(solid), true, how),
       whole_(how == SolidCells::whole && solid.density.empty()), shell_(stage_, solid.boundary, options.capacities),
       shell_cells_(stage_.device(), stage_.is_double(), false),
       device_solid_(stage_.device(), stage_.commands, solid, whole_, stage_.seeds.scale, stage_.is_double(),

@@ -168,7 +168,7 @@ TEST_P(Hostile, ADescentIsUndisturbed) {
     return free.seeds();
   };
   const auto on_device = [&](const std::shared_ptr<Device>& device) {
-    return optimised(*host::make_vulkan_backend(surface, device, options_for(GetParam(), false)));
+    return optimised(*host::make_vulkan_backend(surface, device, options_for(GetParam(), true)));
   };
   const std::shared_ptr<Device> disturbed = open();
   host::poison_new_memory(*disturbed, 0xffffffffu);

@@ -133,8 +133,8 @@ TEST_P(SolidFaults, LeaveAsDeviceErrorOrFallBack) {
 
 TEST_P(SolidFaults, BuffersGrow) {
   SKIP_WITHOUT_DEVICE(processor_of(GetParam()));
-  const std::vector<host::Capacities> each{
-      {.table = 64}, {.proposals = 64}, {.flagged = 1}, {.pairs = 64}, {.at_once = 64}, {.wide = 1}},
+  const std::vector<host::Capacities> each{{.table = 64}, {.proposals = 64}, {.flagged = 1},
+                                           {.pairs = 64}, {.at_once = 64},   {.wide = 1}},
       all{{.batch_pairs = 20, .table = 16, .proposals = 16, .flagged = 1, .pairs = 16, .at_once = 64, .wide = 1}};
   for (const SolidCells how : {SolidCells::whole, SolidCells::clipped}) {
     const Evaluated roomy = evaluated(*device_backend(solid_, with_precision(GetParam()), how), seeds_);
