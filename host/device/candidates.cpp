@@ -93,6 +93,7 @@ Candidate describe(vk::raii::PhysicalDevice physical, unsigned index) {
   const auto& driver = chain.get<vk::PhysicalDeviceDriverProperties>();
   text.uuid = uuid_text(chain.get<vk::PhysicalDeviceIDProperties>().deviceUUID.data());
   text.driver = std::string(driver.driverName.data()) + ' ' + driver.driverInfo.data();
+  candidate.unrolls = driver.driverID != vk::DriverId::eGoogleSwiftshader;
   candidate.allocation = chain.get<vk::PhysicalDeviceMaintenance3Properties>().maxMemoryAllocationSize;
 
   const vk::PhysicalDeviceLimits& limits = basic.limits;

@@ -76,7 +76,9 @@ Pipeline Pipelines::make(const Kernel& kernel, std::size_t bindings, std::size_t
     return vk::raii::PipelineLayout(device, vk::PipelineLayoutCreateInfo({}, *set_layout, push));
   });
 
-  const std::span<const std::uint32_t> words = module_words(kernel.name);
+  std::span<const std::uint32_t> words = module_words(kernel.name);
+  std::vector<std::uint32_t> plain;
+  if (!device_.about.unrolls) words = plain = without_loop_control(words);
   const vk::raii::ShaderModule shader = device_.attempt("vkCreateShaderModule", [&] {
     return vk::raii::ShaderModule(device, vk::ShaderModuleCreateInfo({}, words.size_bytes(), words.data()));
   });
