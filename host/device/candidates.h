@@ -21,7 +21,7 @@ struct Candidate {
   std::uint32_t queue_family = 0;
   std::uint32_t timestamp_bits = 0;  // 0 without timestamps
   double timestamp_period = 0;       // seconds
-  bool unrolls = true;  // false where the driver takes minutes to compile loops that are unrolled
+  bool unrolls = true;               // false where the driver takes minutes to compile loops that are unrolled
 };
 
 // In the loader's order. Throws DeviceError.

@@ -1,7 +1,7 @@
 #include "check/device_check.h"
 
 #include <cmath>
-#include <memory>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -264,7 +264,8 @@ struct Check {
   Precision asked;
   const Context& context;
   const std::function<void(const DeviceCheckRow&)>& done;
-  std::vector<Precision> precisions = {};  // known from the first domain on
+  std::vector<Precision> precisions = {};                                  // known from the first domain on
+  std::map<std::pair<Precision, NeighbourSource>, Compute> computes = {};  // kernels are compiled once for each
   std::vector<DeviceCheckRow> rows = {};
 
   template <class Cpu, class Domain, class Problem>
@@ -275,7 +276,8 @@ struct Check {
       const Measured expected = measure(cpu, problem.seeds, all_parts(domain));
       for (const Precision p : precisions) {
         context.check();
-        const auto backend = make_backend(domain, {device, p, source}, context);
+        Compute& compute = computes.try_emplace({p, source}, ComputeOptions{device, p, source}, context).first->second;
+        const auto backend = compute.backend(domain);
         const Measured found = measure(*backend, problem.seeds, all_parts(domain));
         DeviceCheckRow row{problem.model,
                            problem.seeds_name,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <vector>
 
@@ -31,6 +32,42 @@ class DisjointSets {
   }
 
  private:
+  std::vector<I> parent_;
+};
+
+// The same for links that many threads find. A root is hooked below a lower one by compare-and-swap; what another
+// thread reads late is an ancestor still (Anderson and Woll 1991).
+template <class I>
+class ConcurrentSets {
+ public:
+  explicit ConcurrentSets(std::size_t n) : parent_(n) {
+    for (std::size_t i = 0; i < n; ++i) parent_[i] = static_cast<I>(i);
+  }
+
+  // Makes one set of those that i and j are in; false if they were one already. Of all calls as many are true as there
+  // are sets fewer, in whatever order they come.
+  bool join(I i, I j) {
+    for (;;) {
+      i = root(i);
+      j = root(j);
+      if (i == j) return false;
+      I high = std::max(i, j);
+      if (at(high).compare_exchange_weak(high, std::min(i, j), std::memory_order_relaxed)) return true;
+    }
+  }
+
+ private:
+  std::atomic_ref<I> at(I i) { return std::atomic_ref<I>(parent_[i]); }
+  I root(I i) {
+    for (;;) {
+      const I parent = at(i).load(std::memory_order_relaxed);
+      if (parent == i) return i;
+      const I above = at(parent).load(std::memory_order_relaxed);
+      if (above != parent) at(i).store(above, std::memory_order_relaxed);
+      i = above;
+    }
+  }
+
   std::vector<I> parent_;
 };
 

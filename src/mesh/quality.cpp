@@ -1,6 +1,7 @@
 #include "bisector/quality.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -149,11 +150,13 @@ void measure_edges(const TriangleMesh& mesh, const EdgeTable& table, QualityRepo
 
   std::vector<Index> neighbours(mesh.vertices.size(), 0);
   std::vector<char> border(mesh.vertices.size(), 0);
-  for (std::size_t e = 0; e < table.edges.size(); ++e)
-    for (const Index v : table.edges[e]) {
-      ++neighbours[v];
-      if (table.half_edges.size(e) == 1) border[v] = 1;
-    }
+  parallel_chunks(table.edges.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e)
+      for (const Index v : table.edges[e]) {
+        std::atomic_ref(neighbours[v]).fetch_add(1, std::memory_order_relaxed);
+        if (table.half_edges.size(e) == 1) std::atomic_ref(border[v]).store(1, std::memory_order_relaxed);
+      }
+  });
   std::size_t interior = 0, regular = 0;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (neighbours[v] == 0 || border[v]) continue;

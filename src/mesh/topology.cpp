@@ -39,6 +39,24 @@ bool fall_apart(std::vector<Spoke>& spokes) {
   return parts > 1;
 }
 
+// Calls visit(vertex, spokes) for every vertex, in parallel. It may change the spokes.
+template <class Visit>
+void each_vertex(const std::vector<Triangle>& triangles, std::size_t vertex_count, const Visit& visit) {
+  const Csr<std::size_t> corners = scatter_into_rows<std::size_t>(
+      vertex_count, 3 * triangles.size(), [&](std::size_t h) { return origin(triangles, h); },
+      [](std::size_t h) { return h; });
+  parallel_chunks(vertex_count, kVerticesAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::vector<Spoke> spokes;
+    for (std::size_t v = begin; v < end; ++v) {
+      spokes.clear();
+      for (const std::size_t* h = corners.begin(v); h != corners.end(v); ++h)
+        for (const std::size_t other : {next_half_edge(*h), next_half_edge(next_half_edge(*h))})
+          spokes.push_back({origin(triangles, other), static_cast<std::size_t>(h - corners.begin(v))});
+      visit(v, spokes);
+    }
+  });
+}
+
 // Whether the triangles of every edge of two run along it in opposite directions.
 bool are_coherent(const std::vector<Triangle>& triangles, const EdgeTable& table) {
   std::atomic<bool> coherent{true};
@@ -54,20 +72,9 @@ bool are_coherent(const std::vector<Triangle>& triangles, const EdgeTable& table
 }  // namespace
 
 std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
-  const Csr<std::size_t> corners = scatter_into_rows<std::size_t>(
-      vertex_count, 3 * triangles.size(), [&](std::size_t h) { return origin(triangles, h); },
-      [](std::size_t h) { return h; });
   std::vector<char> split(vertex_count, 0);
-  parallel_chunks(vertex_count, kVerticesAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::vector<Spoke> spokes;
-    for (std::size_t v = begin; v < end; ++v) {
-      spokes.clear();
-      for (const std::size_t* h = corners.begin(v); h != corners.end(v); ++h)
-        for (const std::size_t other : {next_half_edge(*h), next_half_edge(next_half_edge(*h))})
-          spokes.push_back({origin(triangles, other), static_cast<std::size_t>(h - corners.begin(v))});
-      split[v] = fall_apart(spokes);
-    }
-  });
+  each_vertex(triangles, vertex_count,
+              [&](std::size_t v, std::vector<Spoke>& spokes) { split[v] = fall_apart(spokes); });
   return split;
 }
 
@@ -156,29 +163,36 @@ MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_
                               const EdgeTable& table) {
   MeshTopology topology;
   topology.oriented = are_coherent(triangles, table);
-  DisjointSets<> parts(vertex_count);
-  for (std::size_t e = 0; e < table.edges.size(); ++e) {
-    const auto [a, b] = table.edges[e];
-    const std::size_t count = table.half_edges.size(e);
-    parts.join(a, b);
-    if (count == 1) ++topology.boundary_edges;
-    if (count > 2 || a == b) ++topology.non_manifold_edges;
-  }
-  const std::vector<char> split = split_vertices(triangles, vertex_count);
-  topology.non_manifold_vertices = static_cast<std::size_t>(std::count(split.begin(), split.end(), 1));
+  ConcurrentSets<Index> parts(vertex_count);
+  std::atomic<std::size_t> joined{0}, of_one{0}, of_many{0};
+  parallel_chunks(table.edges.size(), kEdgesAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::size_t joins = 0, ones = 0, many = 0;
+    for (std::size_t e = begin; e < end; ++e) {
+      const auto [a, b] = table.edges[e];
+      const std::size_t count = table.half_edges.size(e);
+      joins += parts.join(a, b);
+      ones += count == 1;
+      many += count > 2 || a == b;
+    }
+    joined += joins;
+    of_one += ones;
+    of_many += many;
+  });
+  enum : char { unused, whole, split };
+  std::vector<char> kinds(vertex_count, unused);
+  each_vertex(triangles, vertex_count, [&](std::size_t v, std::vector<Spoke>& spokes) {
+    if (!spokes.empty()) kinds[v] = fall_apart(spokes) ? split : whole;
+  });
+  const auto count_of = [&](char kind) { return static_cast<std::size_t>(std::ranges::count(kinds, kind)); };
+  const std::size_t used = vertex_count - count_of(unused);
+  topology.boundary_edges = of_one;
+  topology.non_manifold_edges = of_many;
+  topology.non_manifold_vertices = count_of(split);
   topology.closed = topology.boundary_edges == 0;
   topology.manifold = topology.non_manifold_edges == 0 && topology.non_manifold_vertices == 0;
-
-  std::vector<char> used(vertex_count, 0);
-  for (const Triangle& t : triangles)
-    for (const Index v : t) used[v] = 1;
-  long long vertices = 0;
-  for (std::size_t v = 0; v < vertex_count; ++v) {
-    if (!used[v]) continue;
-    ++vertices;
-    if (parts.root(v) == v) ++topology.components;
-  }
-  topology.euler = vertices - static_cast<long long>(table.edges.size()) + static_cast<long long>(triangles.size());
+  topology.components = used - joined;
+  topology.euler = static_cast<long long>(used) - static_cast<long long>(table.edges.size()) +
+                   static_cast<long long>(triangles.size());
   return topology;
 }
 
@@ -202,8 +216,11 @@ std::vector<Index> label_components(const std::vector<Triangle>& triangles, std:
 }
 
 void orient(std::vector<Triangle>& triangles, std::size_t vertex_count) {
-  const EdgeTable table = edge_table(triangles, vertex_count);
-  if (are_coherent(triangles, table)) return;
+  orient(triangles, edge_table(triangles, vertex_count));
+}
+
+bool orient(std::vector<Triangle>& triangles, const EdgeTable& table) {
+  if (are_coherent(triangles, table)) return false;
   std::vector<std::size_t> edge_of(3 * triangles.size());
   for (std::size_t e = 0; e < table.edges.size(); ++e)
     for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h) edge_of[*h] = e;
@@ -231,6 +248,7 @@ void orient(std::vector<Triangle>& triangles, std::size_t vertex_count) {
   }
   for (std::size_t t = 0; t < triangles.size(); ++t)
     if (state[t] == turned) std::swap(triangles[t][1], triangles[t][2]);
+  return true;
 }
 
 }  // namespace bisector

@@ -45,6 +45,10 @@ void each_edge(const Csr<EdgeSide>& sides, const Visit& visit) {
 // The same for triangles whose edges are known. There are some.
 MeshTopology analyse_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count, const EdgeTable& table);
 
+// What orient() does, for triangles whose edges are known; true if it turned any. Half-edges of those that it turned
+// are others then.
+bool orient(std::vector<Triangle>& triangles, const EdgeTable& table);
+
 // For each vertex whether its triangles hang together through its edges in more than one fan.
 std::vector<char> split_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count);
 

@@ -18,6 +18,7 @@
 #include "core/stopwatch.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
+#include "mesh/topology.h"
 #include "remesh/coarse_surface.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/fit.h"
@@ -144,6 +145,7 @@ class Pipeline {
   Divided divide_sheets();
   void improve_quality();
   void extract();
+  void analyse_result();
   void extract_features(const std::vector<Index>& vertex_of);
   void fit();
 
@@ -364,6 +366,18 @@ void Pipeline::improve_quality() {
   result_.seconds.improve += watch.seconds();
 }
 
+// Its triangles all face one way where the input's do.
+void Pipeline::analyse_result() {
+  std::vector<Triangle>& triangles = result_.mesh.triangles;
+  const std::size_t vertices = result_.mesh.vertices.size();
+  if (!triangles.empty()) {
+    EdgeTable table = edge_table(triangles, vertices);
+    if (input_topology_.oriented && orient(triangles, table)) table = edge_table(triangles, vertices);
+    result_.topology = analyse_topology(triangles, vertices, table);
+  }
+  result_.topology_matches = same_topology(result_.topology, input_topology_);
+}
+
 void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
   TriangleMesh& mesh = result_.mesh;
   for (const auto& [a, b] : features_.edges) {
@@ -389,7 +403,7 @@ void Pipeline::extract() {
   const Divided divided = divide_sheets();
   const Dual dual = divided.polygons ? extract_dual(*divided.polygons) : diagram.dual;
   result_.mesh = dual_mesh(divided.vertices, dual);
-  if (input_topology_.oriented) orient(result_.mesh.triangles, result_.mesh.vertices.size());
+  analyse_result();
   const std::vector<Index> vertex_of = dual_vertices(dual, divided.vertices.size());
   result_.places.resize(result_.mesh.vertices.size());
   for (Index i = 0; i < run_.seeds.size(); ++i)
@@ -397,8 +411,6 @@ void Pipeline::extract() {
   if (!surface_.mesh.labels.empty())
     for (Index t : dual.mesh_triangle) result_.mesh.labels.push_back(surface_.mesh.labels[t]);
   extract_features(vertex_of);
-  result_.topology = analyse_topology(result_.mesh.triangles, result_.mesh.vertices.size());
-  result_.topology_matches = same_topology(result_.topology, input_topology_);
   result_.ball_property = divided.ball.holds;
   result_.divided = divided.vertices.size() - run_.seeds.size();
   result_.faults = topology_faults(divided.ball, divided.vertices);

@@ -1,9 +1,9 @@
 #include "voronoi/ball_property.h"
 
 #include <algorithm>
+#include <atomic>
 #include <map>
 #include <mutex>
-#include <numeric>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -18,6 +18,7 @@ namespace bisector {
 namespace {
 
 constexpr std::size_t kChunk = 64;  // cells
+constexpr std::size_t kItemsAtOnce = 16384;
 
 // Disjoint sets over indices of a shared array; a root is the lowest of its set.
 Index root_of(std::vector<Index>& parent, Index i) {
@@ -33,8 +34,35 @@ void join(std::vector<Index>& parent, Index i, Index j) {
 
 std::vector<Index> singletons(std::size_t n) {
   std::vector<Index> parent(n);
-  std::iota(parent.begin(), parent.end(), Index{0});
+  parallel_chunks(n, kItemsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) parent[i] = static_cast<Index>(i);
+  });
   return parent;
+}
+
+// One more than the highest cell.
+std::size_t count_cells(const RestrictedPolygons& polygons) {
+  std::atomic<std::size_t> cells{0};
+  parallel_chunks(polygons.pairs.size(), kItemsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::size_t highest = 0;
+    for (std::size_t p = begin; p < end; ++p) highest = std::max<std::size_t>(highest, polygons.pairs[p].cell + 1);
+    std::size_t known = cells;
+    while (known < highest && !cells.compare_exchange_weak(known, highest)) {
+    }
+  });
+  return cells;
+}
+
+// The polygons of each cell, ascending.
+Csr<Index> polygons_of_cells(const RestrictedPolygons& polygons) {
+  Csr<Index> of_cell = scatter_into_rows<Index>(
+      count_cells(polygons), polygons.pairs.size(), [&](std::size_t p) { return polygons.pairs[p].cell; },
+      [](std::size_t p) { return static_cast<Index>(p); });
+  parallel_each(of_cell.rows(), [&](std::size_t cell) {
+    std::sort(of_cell.values.begin() + static_cast<std::ptrdiff_t>(of_cell.offsets[cell]),
+              of_cell.values.begin() + static_cast<std::ptrdiff_t>(of_cell.offsets[cell + 1]));
+  });
+  return of_cell;
 }
 
 // The diagram as a cell complex. Sets and first visits are kept in arrays over the whole diagram, but what one cell's
@@ -49,11 +77,7 @@ class Complex {
     link_triangles();
     parts_ = singletons(polygons.pairs.size());
     lines_ = singletons(polygons.labels.size());
-    Index cells = 0;
-    for (const auto& pair : diagram_.pairs) cells = std::max(cells, pair.cell + 1);
-    of_cell_ = group_into_rows<Index>(cells, [&](const auto& put) {
-      for (Index p = 0; p < diagram_.pairs.size(); ++p) put(diagram_.pairs[p].cell, p);
-    });
+    of_cell_ = polygons_of_cells(diagram_);
   }
 
   BallReport check() {

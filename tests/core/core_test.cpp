@@ -1,11 +1,16 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
 #include <stdexcept>
 #include <vector>
 
 #include "bisector/error.h"
+#include "core/disjoint_sets.h"
 #include "core/geometry.h"
 #include "core/grouping.h"
+#include "core/parallel.h"
+#include "core/random.h"
 #include "core/stopwatch.h"
 #include "core/words.h"
 
@@ -78,6 +83,27 @@ TEST(Words, UnknownWordsAndValuesAreRefused) {
     EXPECT_STREQ(error.what(), "'plum' is none of apple, pear");
   }
   EXPECT_THROW(kFruits.word_of(Fruit::quince), std::logic_error);
+}
+
+// Chains in random order make all threads hook the same few roots.
+TEST(ConcurrentSets, AsManyCallsJoinAsThereAreSetsFewer) {
+  constexpr std::size_t kItems = 20000, kLinks = 50000;
+  std::vector<std::array<std::size_t, 2>> links;
+  for (std::size_t k = 0; k < kLinks; ++k) {
+    Random random(3, k);
+    const std::size_t i = random.bits() % kItems, step = random.bits() % 3;
+    links.push_back({i, (i + step) % kItems});
+  }
+  DisjointSets<> expected(kItems);
+  std::size_t joins = 0;
+  for (const auto& [i, j] : links) joins += expected.join(i, j);
+  for (int round = 0; round < 10; ++round) {
+    ConcurrentSets<std::size_t> sets(kItems);
+    std::atomic<std::size_t> found{0};
+    parallel_each(
+        kLinks, [&](std::size_t k) { found += sets.join(links[k][0], links[k][1]); }, 16);
+    ASSERT_EQ(found, joins);
+  }
 }
 
 TEST(Stopwatch, LapsAddUp) {

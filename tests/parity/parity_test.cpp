@@ -227,7 +227,7 @@ const std::vector<std::unique_ptr<Problem>>& problems_of(const Model& model) {
 // --- Diagrams ---
 
 void expect_parity(const Problem& problem, const Setup& setup) {
-  const std::unique_ptr<Backend> backend = make_backend(problem.surface, options_of(setup));
+  const std::unique_ptr<Backend> backend = backend_for(problem.surface, setup);
   EXPECT_LE(backend->mass_tolerance(), tolerance_of(setup.processor).sum);
   EXPECT_EQ(backend->description().precision, setup.processor == Processor::single ? "single" : "double");
   EXPECT_EQ(backend->description().kind == "cpu", setup.processor == Processor::cpu);
@@ -240,7 +240,7 @@ void expect_parity(const Problem& problem, const Setup& setup) {
     if (&set == &problem.sets.front() && problem.surface.density.empty()) {
       SCOPED_TRACE("a fresh object and one thread");
       const ThreadLimit limit(1);
-      const std::unique_ptr<Backend> fresh = make_backend(problem.surface, options_of(setup));
+      const std::unique_ptr<Backend> fresh = backend_for(problem.surface, setup);
       expect_same_diagram(diagram_of(*fresh, set.seeds), found);
     }
     first_run.push_back(std::move(found.moments));
@@ -318,7 +318,7 @@ TEST_P(Parities, DegenerateDiagramsAreTheCpus) {
       continue;  // without area
     }
     const Diagram reference = test::diagram_of(*surface, seeds, NeighbourSource::nearest);
-    const std::unique_ptr<Backend> backend = make_backend(*surface, options_of(GetParam()));
+    const std::unique_ptr<Backend> backend = backend_for(*surface, GetParam());
     expect_parity(*surface, reference, diagram_of(*backend, seeds), GetParam().processor);
   }
 }
@@ -344,7 +344,7 @@ TEST_P(Parities, GradedSeedsStayOnTheDevice) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const TriangleMesh mesh = torus(60, 40);
   const Surface surface(mesh);
-  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  const std::unique_ptr<Backend> backend = backend_for(surface, GetParam());
   const std::vector<Vec3> seeds = graded_seeds(mesh, 10'000);
   const Evaluated found = diagram_of(*backend, seeds);
   expect_parity(surface, test::diagram_of(surface, seeds, NeighbourSource::nearest), found, GetParam().processor);
@@ -364,7 +364,7 @@ TEST_P(Parities, ACellMayOwnThousandsOfTriangles) {
   const Diagram reference = test::diagram_of(surface, seeds, NeighbourSource::nearest);
   ASSERT_GT(reference.moments.triangles.size(seeds.size() - 1), 4096u);
   ASSERT_LT(reference.moments.triangles.values.size(), 64 * seeds.size());
-  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  const std::unique_ptr<Backend> backend = backend_for(surface, GetParam());
   for (int round = 0; round < 2; ++round)
     expect_parity(surface, reference, diagram_of(*backend, seeds), GetParam().processor);
 }
@@ -375,7 +375,7 @@ TEST_P(Parities, AnEvaluationTakesFewSubmissions) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const TriangleMesh mesh = icosphere(6);
   const Surface surface(mesh);
-  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  const std::unique_ptr<Backend> backend = backend_for(surface, GetParam());
   std::vector<std::size_t> counts{10'000, 100'000};
   if (GetParam().processor == Processor::double_) counts.push_back(1'000'000);
   for (const std::size_t count : counts) {
@@ -407,7 +407,7 @@ TEST_P(Parities, ADescentStaysOnTheDevice) {
     options.tolerance = 0;
     options.constrained = constrained;
     const auto bytes_of = [&](int iterations) {
-      const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+      const std::unique_ptr<Backend> backend = backend_for(surface, GetParam());
       FreeRun free(*backend, seeds);
       options.iterations = iterations;
       optimise(free.run, options);
@@ -426,7 +426,7 @@ TEST_P(Parities, WhatIsKeptBetweenDiagramsDoesNotShow) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const TriangleMesh mesh = torus(40, 24);
   const Surface surface(mesh);
-  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  const std::unique_ptr<Backend> backend = backend_for(surface, GetParam());
   SplitMix64 random(18);
   const auto check = [&](const std::vector<Vec3>& seeds, const char* what) {
     SCOPED_TRACE(what);
@@ -469,7 +469,7 @@ TEST_P(Parities, AnOptimisationIsTheCpus) {
   const Surface surface(mesh);
   const std::vector<Vec3> start = random_seeds(mesh, 800, 22);
   CpuBackend cpu(surface, NeighbourSource::nearest);
-  const std::unique_ptr<Backend> backend = make_backend(surface, options_of(GetParam()));
+  const std::unique_ptr<Backend> backend = backend_for(surface, GetParam());
   const Optimised reference = optimised_on(cpu, start), found = optimised_on(*backend, start);
   EXPECT_NEAR(found.energy, reference.energy, 1e-4 * reference.energy);
   const MeshTopology want = analyse_topology(mesh.triangles, mesh.vertices.size());
@@ -537,7 +537,7 @@ TEST_P(Certified, FewPairsReachTheCpu) {
   options.precision = precision_of(processor);
   options.double_rung = false;
   const std::unique_ptr<Backend> backend =
-      host::make_vulkan_backend(surface, host::Device::open(device_for(processor).value()), options);
+      host::make_vulkan_backend(surface, SharedDevice::for_processor(processor), options);
   const Evaluated found = diagram_of(*backend, seeds);
   expect_parity(surface, test::diagram_of(surface, seeds, NeighbourSource::nearest), found, processor);
   const Certification& counts = found.report.certification;

@@ -194,9 +194,9 @@ TEST_P(RemeshRuns, AreTheCpus) {
     return std::make_unique<CpuBackend>(surface, NeighbourSource::nearest);
   });
   EXPECT_EQ(stand_ins > 0, model.stands_in);
-  const std::unique_ptr<Backend> backend = make_backend(problem.surface, options_of(setup));
+  const std::unique_ptr<Backend> backend = backend_for(problem.surface, setup);
   const RemeshResult found =
-      problem.run_on(*backend, [&](const Surface& surface) { return make_backend(surface, options_of(setup)); });
+      problem.run_on(*backend, [&](const Surface& surface) { return backend_for(surface, setup); });
   EXPECT_EQ(found.device.fallback, "");
   EXPECT_EQ(found.untiled, 0u);
   EXPECT_EQ(found.divided, 0u);
@@ -248,7 +248,7 @@ TEST_P(PlacedGradients, AreTheCpusAndTheSlopeOfTheEnergy) {
     SCOPED_TRACE(model.name);
     const PlacedProblem problem(model.mesh, 150);
     CpuBackend cpu(problem.surface, NeighbourSource::nearest);
-    const std::unique_ptr<Backend> backend = make_backend(problem.surface, options_of(setup));
+    const std::unique_ptr<Backend> backend = backend_for(problem.surface, setup);
     const CompletedProblem reference = problem.completed_on(cpu), found = problem.completed_on(*backend);
     EXPECT_TRUE(same_bits(found.gradient.normals, reference.gradient.normals));
     if (setup.processor == Processor::single) {

@@ -234,14 +234,6 @@ void expect_parity(const Solid& solid, const Evaluated& reference, const Evaluat
   }
 }
 
-std::unique_ptr<SolidBackend> backend_of(const Solid& solid, const Setup& setup, SolidCells how) {
-  if (setup.processor == Processor::cpu) return std::make_unique<CpuSolidBackend>(solid, setup.source, how);
-  host::VulkanOptions options;
-  options.precision = precision_of(setup.processor);
-  options.neighbours = setup.source;
-  return host::make_vulkan_solid_backend(solid, host::Device::open(device_for(setup.processor).value()), options, how);
-}
-
 struct ModelCase {
   Setup setup;
   Model model;
@@ -268,7 +260,7 @@ TEST_P(Solids, AreTheCpus) {
     SCOPED_TRACE(name);
     const Solid solid(mesh, uniform ? std::vector<double>{} : varied_density(mesh));
     CpuSolidBackend cpu(solid, NeighbourSource::nearest, how);
-    const std::unique_ptr<SolidBackend> backend = backend_of(solid, setup, how);
+    const std::unique_ptr<SolidBackend> backend = backend_for(solid, setup, how);
     EXPECT_EQ(backend->description().precision, setup.processor == Processor::single ? "single" : "double");
     std::vector<CellMoments> first_run;
     const std::vector<SeedSet> sets = seed_sets(mesh, model.seeds, uniform && how == SolidCells::whole);
@@ -311,14 +303,11 @@ TEST_P(SolidParities, DegenerateDiagramsAreTheCpus) {
   constexpr std::uint64_t kIntegerCases = 4;
   std::vector<SolidCase> cases = solid_cases();
   for (std::uint64_t k = 0; k < kIntegerCases; ++k) cases.push_back(integer_solid_case(k));
-  // Every other one, for devices take long to open, and the rest with the other source of neighbours.
-  const std::size_t stride = GetParam().processor == Processor::cpu ? 1 : 2;
-  for (std::size_t k = GetParam().source == NeighbourSource::nearest ? 0 : stride - 1; k < cases.size(); k += stride) {
-    const auto& [name, mesh, seeds] = cases[k];
+  for (const auto& [name, mesh, seeds] : cases) {
     SCOPED_TRACE(name);
     const Solid solid(mesh);
     CpuSolidBackend cpu(solid, NeighbourSource::nearest);
-    const std::unique_ptr<SolidBackend> backend = backend_of(solid, GetParam(), SolidCells::whole);
+    const std::unique_ptr<SolidBackend> backend = backend_for(solid, GetParam());
     expect_parity(solid, solid_diagram_of(cpu, seeds), solid_diagram_of(*backend, seeds), GetParam().processor);
   }
 }
@@ -328,7 +317,7 @@ TEST_P(SolidParities, WhatIsKeptBetweenDiagramsDoesNotShow) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const TetMesh mesh = shaken_crate(3);
   const Solid solid(mesh);
-  const std::unique_ptr<SolidBackend> backend = make_backend(solid, options_of(GetParam()));
+  const std::unique_ptr<SolidBackend> backend = backend_for(solid, GetParam());
   EXPECT_EQ(&backend->surface(), &solid.boundary);
   SplitMix64 random(44);
   const auto check = [&](const std::vector<Vec3>& seeds, const char* what) {
@@ -352,7 +341,7 @@ TEST_P(SolidParities, WhatIsKeptBetweenDiagramsDoesNotShow) {
 TEST_P(SolidParities, CellsBehindCavitiesAreFound) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const Solid solid(shell_of_pores());
-  const std::unique_ptr<SolidBackend> backend = make_backend(solid, options_of(GetParam()));
+  const std::unique_ptr<SolidBackend> backend = backend_for(solid, GetParam());
   CpuSolidBackend cpu(solid, NeighbourSource::nearest);
   const std::vector<Vec3> seeds = lattice_of_pores();
   const Evaluated found = solid_diagram_of(*backend, seeds);
@@ -365,7 +354,7 @@ TEST_P(SolidParities, GridsStayOnTheDevice) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const TetMesh mesh = shaken_crate(2);
   const Solid solid(mesh);
-  const std::unique_ptr<SolidBackend> backend = make_backend(solid, options_of(GetParam()));
+  const std::unique_ptr<SolidBackend> backend = backend_for(solid, GetParam());
   const Evaluated found = evaluated(*backend, grid_in(mesh, 7), Want::moments);
   EXPECT_NEAR(found.moments.mass, solid.mass, tolerance_of(GetParam().processor).sum * solid.mass);
   if (GetParam().processor != Processor::cpu) {
@@ -376,7 +365,7 @@ TEST_P(SolidParities, GridsStayOnTheDevice) {
 TEST_P(SolidParities, SeedsOutOfReachAreTheCpus) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const Solid solid(crate(1));
-  const std::unique_ptr<SolidBackend> backend = make_backend(solid, options_of(GetParam()));
+  const std::unique_ptr<SolidBackend> backend = backend_for(solid, GetParam());
   const std::vector<Vec3> seeds{{0.3, 0.4, 0.5}, {1e15, 0, 0}, {0.7, 0.6, 0.4}};
   CpuSolidBackend cpu(solid, NeighbourSource::nearest);
   expect_same_polyhedra(solid_diagram_of(cpu, seeds).polyhedra, solid_diagram_of(*backend, seeds).polyhedra);

@@ -10,13 +10,18 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
 
+#include "backend/cpu_backend.h"
 #include "check/parity.h"
 #include "compute/compute.h"
+#include "host/device/device.h"
+#include "host/passes/vulkan_backend.h"
+#include "host/passes/vulkan_solid_backend.h"
 #include "support/diagram.h"
 
 namespace bisector::test {
@@ -86,6 +91,42 @@ inline ComputeOptions options_of(const Setup& setup) {
   options.precision = precision_of(setup.processor);
   options.neighbours = setup.source;
   return options;
+}
+
+// The process's device for a processor other than the CPU. Most kernels are the same for all tests, and to compile them
+// takes longer than to run them.
+class SharedDevice : public testing::Environment {
+ public:
+  static std::shared_ptr<host::Device> for_processor(Processor processor) {
+    std::shared_ptr<host::Device>& device = devices_[static_cast<std::size_t>(processor)];
+    if (!device) device = host::Device::open(device_for(processor).value());
+    return device;
+  }
+  // Drivers may be gone when static objects are destroyed.
+  void TearDown() override { devices_ = {}; }
+
+ private:
+  static inline std::array<std::shared_ptr<host::Device>, kProcessors.size()> devices_;
+};
+inline testing::Environment* const shared_device = testing::AddGlobalTestEnvironment(new SharedDevice);
+
+inline host::VulkanOptions vulkan_options_of(const Setup& setup) {
+  host::VulkanOptions options;
+  options.precision = precision_of(setup.processor);
+  options.neighbours = setup.source;
+  return options;
+}
+
+inline std::unique_ptr<Backend> backend_for(const Surface& surface, const Setup& setup) {
+  if (setup.processor == Processor::cpu) return std::make_unique<CpuBackend>(surface, setup.source);
+  return host::make_vulkan_backend(surface, SharedDevice::for_processor(setup.processor), vulkan_options_of(setup));
+}
+
+inline std::unique_ptr<SolidBackend> backend_for(const Solid& solid, const Setup& setup,
+                                                 SolidCells how = SolidCells::whole) {
+  if (setup.processor == Processor::cpu) return std::make_unique<CpuSolidBackend>(solid, setup.source, how);
+  return host::make_vulkan_solid_backend(solid, SharedDevice::for_processor(setup.processor), vulkan_options_of(setup),
+                                         how);
 }
 
 #define SKIP_WITHOUT_DEVICE(processor) \
