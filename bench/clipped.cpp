@@ -195,7 +195,7 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", options.seeds, "counts of sites, uniform in the solid")->delimiter(',');
   app.add_option("--repeat", options.repeat, "runs of each")->check(CLI::Range(1, 1000));
   app.add_option("--threads", options.threads, "number of threads")->check(CLI::Range(1, 1024));
-  cli::add_words(&app, "--source", options.source, cli::kNeighbourWords, cli::kNeighbourWords.list().c_str());
+  job::add_words(&app, "--source", options.source, job::kNeighbourWords, job::kNeighbourWords.list().c_str());
   add_device_options(app, options.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
   app.add_option("--plot", options.plot, "also plot total times to this file, as SVG");

@@ -89,7 +89,7 @@ std::string Table::json() const {
 void add_device_options(CLI::App& app, DeviceOptions& options) {
   static const std::map<std::string, bool> kSwitch{{"on", true}, {"off", false}};
   add_device(app, options.device);
-  cli::add_words(&app, "--precision", options.precision, cli::kPrecisionWords, cli::kPrecisionWords.list().c_str());
+  job::add_words(&app, "--precision", options.precision, job::kPrecisionWords, job::kPrecisionWords.list().c_str());
   app.add_option("--double-rung", options.double_rung, "on, off: of single precision")
       ->transform(CLI::CheckedTransformer(kSwitch));
   app.add_option("--at-once", options.at_once, "pairs that one dispatch clips at most; default: by the device's speed")
@@ -97,7 +97,7 @@ void add_device_options(CLI::App& app, DeviceOptions& options) {
 }
 
 void add_device(CLI::App& app, DeviceRequest& device) {
-  cli::add_parsed(&app, "--device", device, parse_device, "cpu, vulkan, vulkan:INDEX or vulkan:UUID");
+  job::add_parsed(&app, "--device", device, parse_device, "cpu, vulkan, vulkan:INDEX or vulkan:UUID");
 }
 
 std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options,

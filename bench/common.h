@@ -7,11 +7,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/parsed_option.h"
-#include "cli/words.h"
 #include "compute/compute.h"
 #include "core/geometry.h"
 #include "core/stopwatch.h"
+#include "job/parsed_option.h"
+#include "job/words.h"
 
 namespace bisector::bench {
 

@@ -97,7 +97,7 @@ double peak_memory(const Options& options, std::size_t seeds, const std::string&
                                  "--device",
                                  word_of(options.device.device),
                                  "--precision",
-                                 std::string(cli::kPrecisionWords.word_of(options.device.precision))};
+                                 std::string(job::kPrecisionWords.word_of(options.device.precision))};
   if (!options.device.double_rung) words.insert(words.end(), {"--double-rung", "off"});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -154,12 +154,12 @@ void measure(const Surface& surface, const Options& options, std::size_t count, 
   const std::vector<Vec3> seeds = random_seeds(surface.mesh, count);
   const std::size_t repeat = count < kMany ? options.repeat : (options.repeat + 1) / 2;
   std::vector<double> delaunay;
-  for (Series& s : series) s.device = device_of(surface, options, cli::kNeighbourWords.parse(s.source));
+  for (Series& s : series) s.device = device_of(surface, options, job::kNeighbourWords.parse(s.source));
   for (std::size_t r = 0; r < repeat; ++r) {
     for (Series& s : series) {
       // Its own triangulation right before each: what slows one of the two slows the other.
       if (!options.alone) delaunay.push_back(delaunay_seconds(seeds));
-      s.add(evaluate(surface, seeds, cli::kNeighbourWords.parse(s.source), s.threads, s.device.get()),
+      s.add(evaluate(surface, seeds, job::kNeighbourWords.parse(s.source), s.threads, s.device.get()),
             options.alone ? 0 : delaunay.back());
     }
     std::fprintf(stderr, "%zu seeds: round %zu of %zu\n", count, r + 1, repeat);
@@ -196,7 +196,7 @@ void run(const Options& options) {
     const ThreadLimit limit(options.threads.front());
     const Surface surface(read_mesh(options.model));
     const std::vector<Vec3> seeds = random_seeds(surface.mesh, options.seeds.front());
-    const NeighbourSource source = cli::kNeighbourWords.parse(options.sources.front());
+    const NeighbourSource source = job::kNeighbourWords.parse(options.sources.front());
     evaluate(surface, seeds, source, options.threads.front(), device_of(surface, options, source).get());
     return;
   }
@@ -244,9 +244,9 @@ int main(int argc, char** argv) {
   app.add_option("--repeat", options.repeat, "runs of each; half as many from 500,000 seeds on")
       ->check(CLI::Range(1, 1000));
   app.add_option("--threads", options.threads, "numbers of threads")->delimiter(',')->check(CLI::Range(1, 1024));
-  app.add_option("--sources", options.sources, cli::kNeighbourWords.list())
+  app.add_option("--sources", options.sources, job::kNeighbourWords.list())
       ->delimiter(',')
-      ->check(cli::parsed_by([](const std::string& word) { cli::kNeighbourWords.parse(word); }));
+      ->check(job::parsed_by([](const std::string& word) { job::kNeighbourWords.parse(word); }));
   add_device_options(app, options.device);
   app.add_option("--csv", options.csv, "also write the table to this file");
   app.add_option("--json", options.json, "the same as JSON");

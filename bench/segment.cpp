@@ -104,10 +104,10 @@ TriangleMesh shuffled(const TriangleMesh& mesh, std::uint64_t seed) {
 }
 
 std::string surfaces_word(const Options& options) {
-  return std::string(cli::kSurfaceWords.word_of(options.segment.surfaces));
+  return std::string(job::kSurfaceWords.word_of(options.segment.surfaces));
 }
 
-std::string start_word(const Options& options) { return std::string(cli::kStartWords.word_of(options.segment.start)); }
+std::string start_word(const Options& options) { return std::string(job::kStartWords.word_of(options.segment.start)); }
 
 SegmentOptions options_of(const Options& options, std::size_t proxies) {
   SegmentOptions segment = options.segment;
@@ -279,8 +279,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Times segmentations and measures their errors."};
   app.add_option("MESH", options.models, "surfaces; default: examples/smooth.off");
   app.add_option("--proxies", options.proxies, "regions, of each mesh or of all; default 22")->delimiter(',');
-  cli::add_words(&app, "--surfaces", options.segment.surfaces, cli::kSurfaceWords, cli::kSurfaceWords.list().c_str());
-  cli::add_words(&app, "--start", options.segment.start, cli::kStartWords, cli::kStartWords.list().c_str());
+  job::add_words(&app, "--surfaces", options.segment.surfaces, job::kSurfaceWords, job::kSurfaceWords.list().c_str());
+  job::add_words(&app, "--start", options.segment.start, job::kStartWords, job::kStartWords.list().c_str());
   app.add_option("--iterations", options.segment.iterations, "Lloyd steps at most")->check(CLI::Range(0, 100'000));
   app.add_option("--smooth", options.segment.smooth, "weight of the borders' length")->check(CLI::Range(0.0, 1e6));
   app.add_option("--fuzzy-rings", options.segment.fuzzy_rings, "width of the strip; 0: as it takes")

@@ -12,17 +12,20 @@
 #include "console.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "options.h"
-#include "outputs.h"
-#include "report.h"
-#include "words.h"
+#include "front.h"
+#include "job/messages.h"
+#include "job/outputs.h"
+#include "job/words.h"
 
 namespace bisector::cli {
 namespace {
 
+using namespace job;
+
 struct CheckCommand {
   DeviceRequest device;
   Precision precision = Precision::automatic;
+  unsigned threads = 0;
   CommonOptions common;
 };
 
@@ -33,6 +36,7 @@ void add_options(CLI::App* app, CheckCommand& command) {
   add_words(app, "--precision", command.precision, kPrecisionWords,
             "auto (both, where the device has double), single or double")
       ->group("Computation");
+  add_threads(app, command.threads);
   add_common_options(app, command.common, "write a JSON report with one row for each case; - for\nstdout");
 }
 
@@ -117,12 +121,12 @@ void run(const CheckCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
   check_outputs({{}, report_output(report_path)}, {});
-  const ThreadLimit limit(command.common.threads);
+  const ThreadLimit limit(command.threads);
   Console console(command.common.quiet, report_path == "-");
   const DeviceRequest device = choose_device(command.device);
 
-  console.phase("making models");
-  const Context context = console.context();
+  console.journal().phase("making models");
+  const Context context = console.journal().context();
   bool first = true;
   const auto rows = check_device(device, command.precision, context, [&](const DeviceCheckRow& row) {
     if (std::exchange(first, false)) {
@@ -136,7 +140,8 @@ void run(const CheckCommand& command) {
   const auto failed = static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [](const DeviceCheckRow& row) { return !row.passed; }));
   const std::string cases = counted(rows.size(), "case", "cases");
-  if (!report_path.empty()) write_report(report_path, check_report(rows, failed, total.seconds()), console.warnings());
+  if (!report_path.empty())
+    write_report(report_path, check_report(rows, failed, total.seconds()), console.journal().warnings());
   if (failed > 0) {
     console.print(fmt::format("FAILED: {} of {} do not agree with the CPU", failed, cases));
     throw Error(fmt::format("{} of {} do not agree with the CPU; do not compute on this device, and please report this",

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <csignal>
 
+#include "job/messages.h"
+
 namespace bisector::cli {
 namespace {
 
@@ -22,13 +24,6 @@ void handle_interrupts(void (*handler)(int)) {
   action.sa_handler = handler;
   action.sa_flags = SA_RESTART;
   for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
-}
-
-std::string one_line(std::string_view text) {
-  std::string line(text);
-  for (char& c : line)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  return line;
 }
 
 std::size_t terminal_width() {
@@ -54,35 +49,27 @@ void stop_watching_interrupts() {
   if (interrupted) throw Cancelled();
 }
 
-void print_error(std::string_view message) { fmt::print(stderr, "bisector: error: {}\n", one_line(message)); }
-
-std::string counted(std::size_t n, const char* one, const char* many) {
-  return fmt::format("{} {}", n, n == 1 ? one : many);
-}
+void print_error(std::string_view message) { fmt::print(stderr, "bisector: error: {}\n", job::one_line(message)); }
 
 Console::Console(bool quiet, bool stdout_is_taken)
-    : quiet_(quiet), live_(!quiet && isatty(STDERR_FILENO)), out_(stdout_is_taken ? stderr : stdout) {}
+    : quiet_(quiet), live_(!quiet && isatty(STDERR_FILENO)), out_(stdout_is_taken ? stderr : stdout),
+      journal_(listener()) {}
 
 Console::~Console() { clear_line(); }
 
-Context Console::context() {
-  Context context;
-  if (live_) context.progress = [this](const Progress& progress) { show(progress); };
-  context.warning = [this](const std::string& line) { warn(line); };
-  context.cancel = &interrupted;
-  return context;
-}
-
-void Console::phase(const std::string& what) {
-  if (interrupted) throw Cancelled();
-  if (live_) show_line(what);
-}
-
-void Console::warn(std::string_view message) {
-  warnings_.push_back(one_line(message));
-  if (quiet_) return;
-  clear_line();
-  fmt::print(stderr, "bisector: warning: {}\n", warnings_.back());
+job::Listener Console::listener() {
+  job::Listener listener;
+  if (live_) {
+    listener.phase = [this](const std::string& what) { show_line(what); };
+    listener.progress = [this](const Progress& progress) { show(progress); };
+  }
+  if (!quiet_)
+    listener.warning = [this](const std::string& warning) {
+      clear_line();
+      fmt::print(stderr, "bisector: warning: {}\n", warning);
+    };
+  listener.cancel = &interrupted;
+  return listener;
 }
 
 void Console::print(std::string_view line) {
@@ -114,7 +101,7 @@ void Console::show(const Progress& progress) {
 
 // The line must not reach the last column, or the terminal would wrap it.
 void Console::show_line(std::string line) {
-  line = one_line(line).substr(0, terminal_width() - 1);
+  line = job::one_line(line).substr(0, terminal_width() - 1);
   const std::size_t length = line.size();
   if (length < shown_) line.append(shown_ - length, ' ');
   fmt::print(stderr, "\r{}", line);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bisector/context.h"
+#include "job/journal.h"
 
 namespace bisector::cli {
 
@@ -26,9 +27,6 @@ void stop_watching_interrupts();
 // One line on stderr: "bisector: error: ...". Control characters in it are replaced.
 void print_error(std::string_view message);
 
-// "1 face", "2 faces".
-std::string counted(std::size_t n, const char* one, const char* many);
-
 class Console {
  public:
   // `quiet` leaves errors only. With `stdout_is_taken`, text for people goes to stderr.
@@ -37,13 +35,8 @@ class Console {
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
-  // For the library; refers to this console.
-  Context context();
-  // Shows what is being done. Throws Cancelled after Ctrl-C.
-  void phase(const std::string& what);
-  void warn(std::string_view message);
-  // All so far, in order, with `quiet` too.
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  // Shows phases, progress and warnings here; Ctrl-C cancels. Has all warnings with `quiet`, too.
+  job::Journal& journal() { return journal_; }
   // One line of the summary.
   void print(std::string_view line);
   // The line that a summary ends with; empty names and "-" are left out.
@@ -52,6 +45,7 @@ class Console {
  private:
   using Clock = std::chrono::steady_clock;
 
+  job::Listener listener();
   void show(const Progress& progress);
   void show_line(std::string line);
   void clear_line();
@@ -59,9 +53,9 @@ class Console {
   bool quiet_;
   bool live_;  // stderr is a terminal and may show progress
   std::FILE* out_;
-  std::vector<std::string> warnings_;
   std::size_t shown_ = 0;  // characters of the progress line
   Clock::time_point start_ = Clock::now(), last_shown_{};
+  job::Journal journal_;
 };
 
 }  // namespace bisector::cli

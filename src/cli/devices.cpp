@@ -1,7 +1,6 @@
 // bisector devices
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <memory>
 #include <string>
@@ -11,12 +10,15 @@
 #include "console.h"
 #include "core/parallel.h"
 #include "core/processor.h"
-#include "options.h"
-#include "outputs.h"
-#include "report.h"
+#include "front.h"
+#include "job/devices.h"
+#include "job/messages.h"
+#include "job/outputs.h"
 
 namespace bisector::cli {
 namespace {
+
+using namespace job;
 
 struct DevicesCommand {
   std::string report;
@@ -27,30 +29,6 @@ void add_options(CLI::App* app, DevicesCommand& command) {
 }
 
 std::string gibibytes(double bytes) { return fmt::format("{:.1f} GiB", bytes / 0x1p30); }
-
-// Bytes; 0 if unknown.
-double installed_memory() {
-  const long pages = sysconf(_SC_PHYS_PAGES), page_size = sysconf(_SC_PAGE_SIZE);
-  return pages > 0 && page_size > 0 ? static_cast<double>(pages) * static_cast<double>(page_size) : 0;
-}
-
-Json cpu_entry() {
-  return {{"name", processor_name()},
-          {"kind", "cpu"},
-          {"precision", "double"},
-          {"threads", thread_count()},
-          {"memory", installed_memory()}};
-}
-
-Json device_entry(const DeviceDescription& device) {
-  Json entry{
-      {"name", device.name},        {"kind", device.kind},     {"precision", device.float64 ? "double" : "single"},
-      {"index", device.index},      {"uuid", device.uuid},     {"driver", device.driver},
-      {"api", device.api},          {"memory", device.memory}, {"float64", device.float64},
-      {"features", device.features}};
-  if (!device.rejected.empty()) entry["rejected"] = device.rejected;
-  return entry;
-}
 
 constexpr const char* kNoGpu =
     "gpu       none. One needs its driver (NVIDIA's, or mesa-vulkan-drivers for AMD and Intel) and the loader\n"
@@ -78,11 +56,7 @@ void run(const DevicesCommand& command) {
   if (!best_gpu(list)) console.print(kNoGpu);
 
   if (command.report.empty()) return;
-  Json report = start_report("devices");
-  report["devices"] = Json::array({cpu_entry()});
-  for (const DeviceDescription& device : list.devices) report["devices"].push_back(device_entry(device));
-  if (list.devices.empty()) report["problem"] = list.problem;
-  write_report(command.report, report, console.warnings());
+  write_report(command.report, devices_report(list), {});
   console.print_written({command.report});
 }
 

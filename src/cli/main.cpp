@@ -13,7 +13,8 @@
 #include "bisector/error.h"
 #include "commands.h"
 #include "console.h"
-#include "options.h"
+#include "front.h"
+#include "job/messages.h"
 
 namespace {
 
@@ -25,24 +26,6 @@ int fail_usage(const std::string& message, const CLI::App* command) {
   return kUsage;
 }
 
-// An error of the library with the options that help.
-std::string with_advice(const bisector::Error& error) {
-  const std::string what = error.what();
-  switch (error.reason()) {
-    case bisector::Reason::other: break;
-    case bisector::Reason::no_such_device: return "--device " + what + "; see 'bisector devices'";
-    // Some say already after a semicolon what would help.
-    case bisector::Reason::device_failed:
-      return what + (what.find("; ") == std::string::npos ? "; use --device cpu" : ", or use --device cpu");
-    case bisector::Reason::no_single_precision:
-      return "--precision single: " + what + "; use --precision double or a device";
-    case bisector::Reason::no_double_precision: return what + "; use --precision single";
-    case bisector::Reason::open_surface: return what + " (--weld), or wrap it (--wrap)";
-    case bisector::Reason::no_solid: return what + ", or wrap it (--wrap)";
-  }
-  return what;
-}
-
 // Runs the command and maps what it throws to an exit code.
 int run_guarded(const std::function<void()>& command) {
   try {
@@ -52,9 +35,9 @@ int run_guarded(const std::function<void()>& command) {
     std::fputs("bisector: cancelled\n", stderr);
     return kInterrupted;
   } catch (const std::bad_alloc&) {
-    print_error("not enough memory; ask for fewer vertices or use a larger machine");
+    print_error(bisector::job::kNoMemory);
   } catch (const bisector::Error& error) {
-    print_error(with_advice(error));
+    print_error(bisector::job::with_advice(error));
   } catch (const std::exception& error) {
     print_error(error.what());
   }

@@ -1,66 +1,19 @@
 // bisector quality
+#include "job/quality.h"
+
 #include <fmt/format.h>
 
 #include <functional>
 #include <memory>
 #include <string>
-#include <utility>
 
-#include "bisector/io.h"
-#include "bisector/quality.h"
-#include "commands.h"
-#include "console.h"
-#include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "mesh/tet_quality.h"
-#include "mesh/tet_topology.h"
-#include "options.h"
-#include "outputs.h"
-#include "report.h"
+#include "front.h"
 #include "summary.h"
 
 namespace bisector::cli {
 namespace {
 
-struct QualityCommand {
-  std::string mesh, reference;
-  CommonOptions common;
-};
-
-void add_options(CLI::App* app, QualityCommand& command) {
-  add_file(app, "MESH", command.mesh, "FILE",
-           "surface to measure: .off, .obj, .ply or .stl; or\n"
-           "tetrahedra: .mesh, .msh, .vtk or .vtu")
-      ->required();
-  add_file(app, "--reference", command.reference, "IN", "also measure the two-sided distance to this mesh")
-      ->group("Output");
-  add_common_options(app, command.common, "write a JSON report; - for stdout");
-}
-
-struct QualityMeasures {
-  QualityReport quality;
-  std::size_t self_intersections = 0;
-  DistanceReport distance;  // if there is a reference
-  TetQualityReport tets;    // if there are tetrahedra; then the others are the boundary's
-  TetTopology tet_topology;
-};
-
-// A surface, or tetrahedra and their boundary.
-struct MeasuredMesh {
-  TetMesh tets;
-  TriangleMesh surface;
-};
-
-MeasuredMesh read_measured(const std::string& path, const Context& context) {
-  if (!is_tet_format(path)) return {{}, read_mesh(path, context)};
-  MeasuredMesh mesh{read_tet_mesh(path, context), {}};
-  mesh.surface = mesh.tets.tets.empty() ? surface_of_marks(mesh.tets) : boundary_surface(mesh.tets);
-  return mesh;
-}
-
-Json size_json(const MeasuredMesh& mesh) {
-  return mesh.tets.tets.empty() ? input_json(mesh.surface) : cli::size_json(mesh.tets);
-}
+using namespace job;
 
 using Row = std::function<void(const char* name, const std::string& value, const char* meaning)>;
 
@@ -96,14 +49,15 @@ void print_tets(Console& console, const TetQualityReport& q, const TetTopology& 
   console.print(line);
 }
 
-void print_quality(Console& console, const QualityCommand& command, const QualityMeasures& measures,
-                   const Json& input) {
+void print_summary(Console& console, const QualityJob& job, const JobFiles& files) {
+  const QualityJob::Measures& measures = job.measures;
+  const Json input = measured_size_json(job.mesh);
   const QualityReport& q = measures.quality;
   const MeshTopology& t = q.topology;
   const auto row = [&](const char* name, const std::string& value, const char* meaning = "") {
     console.print(fmt::format("{:<20}{:>14}{}{}", name, value, *meaning ? "   " : "", meaning));
   };
-  console.print(command.mesh);
+  console.print(job.input);
   row("vertices", fmt::to_string(input["vertices"].get<std::size_t>()));
   row("faces", fmt::to_string(input["faces"].get<std::size_t>()));
   if (input.contains("tets")) {
@@ -138,77 +92,27 @@ void print_quality(Console& console, const QualityCommand& command, const Qualit
   row("euler", fmt::to_string(t.euler), "Euler characteristic V - E + F");
   row("components", fmt::to_string(t.components));
   row("self_intersections", fmt::to_string(measures.self_intersections), "pairs of triangles");
-  if (command.reference.empty()) return;
-  console.print("two-sided distance to " + command.reference + ", % of its diagonal");
-  row("distance_mean", number(measures.distance.mean));
-  row("distance_rms", number(measures.distance.rms));
-  row("distance_max", number(measures.distance.max), "Hausdorff distance, from below");
-}
-
-void run(const QualityCommand& command) {
-  const Stopwatch total;
-  const std::string& report_path = command.common.report;
-  check_outputs({{}, report_output(report_path)}, {command.mesh, command.reference});
-  const ThreadLimit limit(command.common.threads);
-  Console console(command.common.quiet, report_path == "-");
-  const Context context = console.context();
-
-  console.phase("reading " + command.mesh);
-  const Stopwatch reading;
-  const MeasuredMesh measured = read_measured(command.mesh, context);
-  const TriangleMesh& mesh = measured.surface;
-  MeasuredMesh reference;
-  if (!command.reference.empty()) reference = read_measured(command.reference, context);
-  Json seconds{{"total", 0.0}, {"io", reading.seconds()}};
-
-  const Stopwatch measuring;
-  QualityMeasures measures;
-  measures.quality = measure_quality(mesh);
-  const bool solid = !measured.tets.tets.empty();
-  if (solid) {
-    measures.tets = measure_tet_quality(measured.tets);
-    measures.tet_topology = analyse_tet_topology(measured.tets);
+  if (!job.reference_file.empty()) {
+    console.print("two-sided distance to " + job.reference_file + ", % of its diagonal");
+    row("distance_mean", number(measures.distance.mean));
+    row("distance_rms", number(measures.distance.rms));
+    row("distance_max", number(measures.distance.max), "Hausdorff distance, from below");
   }
-  console.phase("looking for self-intersections");
-  measures.self_intersections = count_self_intersections(mesh);
-  if (!command.reference.empty()) {
-    console.phase("measuring the distance to " + command.reference);
-    measures.distance = measure_distance(mesh, reference.surface);
-  }
-  console.phase("done");
-  seconds["quality"] = measuring.seconds();
-  seconds["total"] = total.seconds();
-
-  if (!report_path.empty()) {
-    stop_watching_interrupts();
-    Json report = start_report("quality");
-    report["input"] = size_json(measured);
-    if (!command.reference.empty()) report["reference"] = size_json(reference);
-    report["seconds"] = seconds;
-    Json quality = quality_json(measures.quality);
-    if (solid) add_tets(quality, measures.tets);
-    quality["self_intersections"] = measures.self_intersections;
-    if (!command.reference.empty()) add_distance(quality, measures.distance);
-    report["quality"] = std::move(quality);
-    report["topology"] = topology_json(measures.quality.topology);
-    if (solid) add_tets(report["topology"], measures.tet_topology);
-    write_report(report_path, report, console.warnings());
-  }
-  print_quality(console, command, measures, size_json(measured));
-  if (command.common.verbose) print_seconds(console, seconds);
-  console.print_written({report_path});
+  if (files.common.verbose) print_seconds(console, job.seconds);
 }
 
 }  // namespace
 
 Command add_quality(CLI::App& program) {
-  const auto command = std::make_shared<QualityCommand>();
-  CLI::App* app = add_command(program, "quality", "Measure angles, topology and distance to another mesh.",
-                              "bisector quality MESH [--reference IN] [options]",
-                              "Example:\n"
-                              "  bisector quality out.obj --reference bunny.off");
-  add_options(app, *command);
-  return {app, {}, [=] { run(*command); }};
+  return add_job(
+      program, std::make_shared<QualityJob>(),
+      {"Measure angles, topology and distance to another mesh.", "bisector quality MESH [--reference IN] [options]",
+       "Example:\n"
+       "  bisector quality out.obj --reference bunny.off",
+       "write a JSON report; - for stdout"},
+      [](Console& console, const Job& job, const JobFiles& files) {
+        print_summary(console, dynamic_cast<const QualityJob&>(job), files);
+      });
 }
 
 }  // namespace bisector::cli

@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include "job/messages.h"
+
 namespace bisector::cli {
 namespace {
+
+using namespace job;
 
 void print_phases(Console& console, const char* title, const Json& seconds) {
   std::string line = fmt::format("{:<10}", title);
@@ -19,12 +23,6 @@ std::string size_of(const Json& mesh) {
   std::string size = counted(mesh["vertices"], "vertex", "vertices") + ", " + counted(mesh["faces"], "face", "faces");
   if (mesh.contains("tets")) size += ", " + counted(mesh["tets"], "tetrahedron", "tetrahedra");
   return size;
-}
-
-std::string describe(const MeshTopology& topology) {
-  return fmt::format("{}, {}, {}, {}, Euler characteristic {}", topology.manifold ? "manifold" : "not manifold",
-                     topology.closed ? "closed" : "open", topology.oriented ? "oriented" : "not oriented",
-                     counted(topology.components, "component", "components"), topology.euler);
 }
 
 void print_seconds(Console& console, const Json& seconds, const Json& device_seconds) {

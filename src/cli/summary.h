@@ -6,15 +6,14 @@
 #include "bisector/device.h"
 #include "bisector/quality.h"
 #include "console.h"
+#include "job/report.h"
 #include "mesh/topology.h"
-#include "report.h"
 
 namespace bisector::cli {
 
 const char* yes_no(bool b);
-std::string size_of(const Json& mesh);  // "8 vertices, 12 faces"
-std::string describe(const MeshTopology& topology);
-void print_seconds(Console& console, const Json& seconds, const Json& device_seconds = nullptr);
+std::string size_of(const job::Json& mesh);  // "8 vertices, 12 faces"
+void print_seconds(Console& console, const job::Json& seconds, const job::Json& device_seconds = nullptr);
 // What computed, where that was not the CPU all along.
 void print_device(Console& console, const BackendDescription& device);
 

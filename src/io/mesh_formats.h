@@ -55,6 +55,9 @@ struct Soup {
   std::size_t open_corners() const { return faces.values.size() - faces.offsets.back(); }
 };
 
+// What read_mesh() makes of a file's contents, with its warnings; the path is for these.
+TriangleMesh mesh_of(const std::string& path, Soup soup, const Context& context);
+
 // Readers of a whole file, already in memory; the path is for messages. Indices are checked, coordinates too.
 Soup read_off(const std::string& path, std::string_view bytes);
 Soup read_obj(const std::string& path, std::string_view bytes);

@@ -233,18 +233,6 @@ void warn_of_leftovers(const std::string& path, const TriangleMesh& mesh, const 
     context.warn(fmt::format("{}: {} no area", name_of(path), quantity(flat, "triangle has", "triangles have")));
 }
 
-TriangleMesh to_triangles(const std::string& path, Soup soup, const Context& context) {
-  if (soup.faces.rows() == 0) fail(path, "face 0: there is no face at all; export a surface");
-  if (!soup.ignored.empty())
-    context.warn(fmt::format("{}: {} after the end of the mesh ignored", name_of(path), soup.ignored));
-  TriangleMesh mesh;
-  mesh.vertices = std::move(soup.vertices);
-  split_faces(path, soup, mesh, context);
-  keep_mesh_edges(path, std::move(soup.edges), mesh, context);
-  warn_of_leftovers(path, mesh, context);
-  return mesh;
-}
-
 // --- writing ---
 
 void check_points(const std::string& path, const std::vector<Vec3>& vertices) {
@@ -277,10 +265,22 @@ void check_label_names(const std::string& path, const std::vector<Label>& labels
 
 }  // namespace
 
+TriangleMesh io::mesh_of(const std::string& path, Soup soup, const Context& context) {
+  if (soup.faces.rows() == 0) fail(path, "face 0: there is no face at all; export a surface");
+  if (!soup.ignored.empty())
+    context.warn(fmt::format("{}: {} after the end of the mesh ignored", name_of(path), soup.ignored));
+  TriangleMesh mesh;
+  mesh.vertices = std::move(soup.vertices);
+  split_faces(path, soup, mesh, context);
+  keep_mesh_edges(path, std::move(soup.edges), mesh, context);
+  warn_of_leftovers(path, mesh, context);
+  return mesh;
+}
+
 TriangleMesh read_mesh(const std::string& path, const Context& context) {
   const MeshFormat& format = format_of(path);
   const std::string bytes = read_bytes(path);
-  return to_triangles(path, format.read(path, bytes), context);
+  return mesh_of(path, format.read(path, bytes), context);
 }
 
 void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups) {

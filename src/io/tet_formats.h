@@ -26,6 +26,9 @@ struct TetSoup {
   std::vector<std::int32_t> regions, labels;
 };
 
+// What read_tet_mesh() makes of a file's contents, with its warnings; the path is for these.
+TetMesh mesh_of(const std::string& path, TetSoup soup, const Context& context);
+
 // Readers of a whole file, already in memory; the path is for messages. Indices and coordinates are checked.
 TetSoup read_medit(const std::string& path, std::string_view bytes);
 TetSoup read_gmsh(const std::string& path, std::string_view bytes);

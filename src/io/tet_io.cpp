@@ -111,15 +111,7 @@ bool is_tet_format(const std::string& path) {
   return extension == ".mesh" || extension == ".msh" || extension == ".vtk" || extension == ".vtu";
 }
 
-TetMesh read_tet_mesh(const std::string& path, const Context& context) {
-  const std::string extension = lower_extension(path);
-  TetSoup (*read)(const std::string&, std::string_view) = extension == ".mesh"  ? read_medit
-                                                          : extension == ".msh" ? read_gmsh
-                                                          : extension == ".vtk" ? read_vtk
-                                                          : extension == ".vtu" ? read_vtu
-                                                                                : nullptr;
-  if (!read) fail_extension(path, ".mesh, .msh, .vtk or .vtu");
-  TetSoup soup = read(path, read_bytes(path));
+TetMesh io::mesh_of(const std::string& path, TetSoup soup, const Context& context) {
   if (soup.tets.empty() && soup.triangles.empty())
     fail(path, "there are neither tetrahedra nor triangles; export a mesh of them");
   check_corners(path, "tetrahedron", soup.tets);
@@ -138,6 +130,17 @@ TetMesh read_tet_mesh(const std::string& path, const Context& context) {
   std::sort(mesh.feature_edges.begin(), mesh.feature_edges.end());
   mesh.feature_edges.erase(std::unique(mesh.feature_edges.begin(), mesh.feature_edges.end()), mesh.feature_edges.end());
   return mesh;
+}
+
+TetMesh read_tet_mesh(const std::string& path, const Context& context) {
+  const std::string extension = lower_extension(path);
+  TetSoup (*read)(const std::string&, std::string_view) = extension == ".mesh"  ? read_medit
+                                                          : extension == ".msh" ? read_gmsh
+                                                          : extension == ".vtk" ? read_vtk
+                                                          : extension == ".vtu" ? read_vtu
+                                                                                : nullptr;
+  if (!read) fail_extension(path, ".mesh, .msh, .vtk or .vtu");
+  return mesh_of(path, read(path, read_bytes(path)), context);
 }
 
 void write_tet_mesh(const std::string& path, const TetMesh& mesh) {

@@ -1,5 +1,6 @@
 #include "tetmesh/tetgen.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
@@ -346,6 +347,10 @@ std::string find_tetgen() {
   if (const char* given = std::getenv("BISECTOR_TETGEN"); given && *given) return given;
   std::error_code error;
   const auto runs = [](const fs::path& path) { return !path.empty() && ::access(path.c_str(), X_OK) == 0; };
+  // Beside the shared library that this is part of, or else beside the program.
+  Dl_info here{};
+  if (::dladdr(reinterpret_cast<const void*>(&find_tetgen), &here) != 0 && here.dli_fname[0] == '/')
+    if (const fs::path beside = fs::path(here.dli_fname).parent_path() / "bisector-tetgen"; runs(beside)) return beside;
   const fs::path own = fs::read_symlink("/proc/self/exe", error);
   if (!error && runs(own.parent_path() / "bisector-tetgen")) return own.parent_path() / "bisector-tetgen";
   return runs(BISECTOR_TETGEN_PROGRAM) ? BISECTOR_TETGEN_PROGRAM : "";

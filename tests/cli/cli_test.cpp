@@ -32,9 +32,9 @@
 
 #include "bisector/io.h"
 #include "bisector/quality.h"
-#include "cli/words.h"
 #include "compute/compute.h"
 #include "core/geometry.h"
+#include "job/words.h"
 #include "mesh/tet_topology.h"
 #include "mesh/topology.h"
 #include "support/featured.h"
@@ -178,18 +178,18 @@ TEST_F(Cli, HelpListsAllWords) {
     expect_failure(2, {command, option, "no-such-word"}, "none of " + list);
   };
   for (const char* command : {"remesh", "rvd", "tet"}) {
-    expect_words(command, "--precision", cli::kPrecisionWords.list());
-    expect_words(command, "--neighbors", cli::kNeighbourWords.list());
+    expect_words(command, "--precision", job::kPrecisionWords.list());
+    expect_words(command, "--neighbors", job::kNeighbourWords.list());
   }
-  expect_words("check", "--precision", cli::kPrecisionWords.list());
-  expect_words("remesh", "--topology", cli::kTopologyWords.list());
-  expect_words("remesh", "--energy", cli::kEnergyWords.list());
-  expect_words("remesh", "--detail", cli::kDetailWords.list());
-  expect_words("segment", "--surfaces", cli::kSurfaceWords.list());
-  expect_words("segment", "--start", cli::kStartWords.list());
-  expect_words("tree", "--components", cli::kComponentWords.list());
-  expect_words("tree", "--leaves", cli::kLeafWords.list());
-  expect_words("tree", "--unit", cli::kUnitWords.list());
+  expect_words("check", "--precision", job::kPrecisionWords.list());
+  expect_words("remesh", "--topology", job::kTopologyWords.list());
+  expect_words("remesh", "--energy", job::kEnergyWords.list());
+  expect_words("remesh", "--detail", job::kDetailWords.list());
+  expect_words("segment", "--surfaces", job::kSurfaceWords.list());
+  expect_words("segment", "--start", job::kStartWords.list());
+  expect_words("tree", "--components", job::kComponentWords.list());
+  expect_words("tree", "--leaves", job::kLeafWords.list());
+  expect_words("tree", "--unit", job::kUnitWords.list());
 }
 
 TEST_F(Cli, BadUsage) {

@@ -1,4 +1,4 @@
-#include "options.h"
+#include "job/options.h"
 
 #include <charconv>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
-#include "words.h"
+#include "job/words.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 namespace {
 
 // The number that the whole text is, or nothing.
@@ -73,28 +73,6 @@ FeatureOptions parse_features(const std::string& word) {
 
 }  // namespace
 
-Help::Help(std::string usage) : usage_(std::move(usage)) {
-  column_width(32);
-  label("REQUIRED", "(required)");
-  label("Positionals", "Arguments");
-}
-
-std::string Help::make_usage(const CLI::App*, std::string) const { return "\nUsage: " + usage_ + "\n\n"; }
-
-// One blank line between groups, where CLI11 leaves two.
-std::string Help::make_group(std::string name, bool is_positional, std::vector<const CLI::Option*> options) const {
-  const std::string group = CLI::Formatter::make_group(name, is_positional, options).substr(1);
-  return is_positional ? group + "\n" : group;
-}
-
-CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer) {
-  CLI::App* app = program.add_subcommand(name, about);
-  app->group("Commands")->footer(footer);
-  app->formatter(std::make_shared<Help>(usage));
-  app->get_help_ptr()->description("print this and exit")->group("Output");
-  return app;
-}
-
 CLI::Validator whole_number(std::uint64_t least, std::uint64_t most) {
   return CLI::Validator(
       [=](std::string& text) -> std::string {
@@ -148,14 +126,11 @@ void add_compute_options(CLI::App* app, ComputeOptions& options) {
       ->group("Computation");
 }
 
-void add_common_options(CLI::App* app, CommonOptions& options, const char* about) {
-  app->add_option("--threads", options.threads, "at most so many; default: all cores. The result is the same")
+void add_threads(CLI::App* app, unsigned& threads) {
+  app->add_option("--threads", threads, "at most so many; default: all cores. The result is the same")
       ->type_name("N")
       ->check(whole_number(1, 1024))
       ->group("Computation");
-  add_file(app, "--report", options.report, "FILE", about)->group("Output");
-  app->add_flag("--quiet", options.quiet, "print errors only")->group("Output");
-  app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
 }
 
 CLI::Option* add_random_seed(CLI::App* app, std::uint64_t& random_seed, const char* help) {
@@ -282,4 +257,4 @@ void Usage::check_wrap(const std::string& attribute) const {
   refuse("--feature-file", "a wrap has other vertices than its input; leave out --feature-file or --wrap");
 }
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

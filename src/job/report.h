@@ -11,7 +11,7 @@
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 
 using Json = nlohmann::ordered_json;
 
@@ -38,7 +38,12 @@ Json detail_json(const DetailResult& detail, std::size_t curves);
 // A point, or null if a coordinate is not finite.
 Json point_json(const Vec3& p);
 
-// Writes the report with the run's warnings to a file, or to stdout if the path is "-". Throws Error.
+// Adds to an entry of a report's seconds, which may not be there yet.
+void add_seconds(Json& seconds, const char* key, double value);
+
+// The report with the run's warnings, as text.
+std::string report_text(Json report, const std::vector<std::string>& warnings);
+// Writes that to a file, or to stdout if the path is "-". Throws Error.
 void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings);
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

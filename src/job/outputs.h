@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace bisector::cli {
+namespace bisector::job {
 
 struct Output {
   std::string path;                     // empty: not wanted
@@ -25,4 +25,4 @@ inline const std::vector<std::string> kPolygonFormats{".obj", ".ply", ".off"};
 inline const std::vector<std::string> kTreeFormats{".obj", ".ply", ".off", ".stl", ".igs", ".iges"};
 inline const std::vector<std::string> kTetFormats{".mesh", ".msh", ".vtu"};
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

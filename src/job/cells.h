@@ -8,7 +8,7 @@
 #include "bisector/io.h"
 #include "voronoi/restricted.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 
 // A colour for each of `count` patches, given those that meet: pairs, the higher first, ascending. Neighbours differ,
 // up to eleven neighbours of lower index.
@@ -18,4 +18,4 @@ std::vector<std::array<unsigned char, 3>> contrasting_colours(const std::vector<
 // One polygon per pair of cell and triangle, labelled by its seed, in contrasting colours.
 PolygonMesh coloured_cells(const RestrictedPolygons& polygons, std::size_t seeds);
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

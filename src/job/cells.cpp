@@ -1,4 +1,4 @@
-#include "cells.h"
+#include "job/cells.h"
 
 #include <algorithm>
 #include <bit>
@@ -6,7 +6,7 @@
 
 #include "core/random.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 namespace {
 
 using Colour = std::array<unsigned char, 3>;
@@ -69,4 +69,4 @@ PolygonMesh coloured_cells(const RestrictedPolygons& polygons, std::size_t seeds
   return mesh;
 }
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

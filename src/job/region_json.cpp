@@ -1,4 +1,4 @@
-#include "region_json.h"
+#include "job/region_json.h"
 
 #include <array>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include "core/geometry.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 namespace {
 
 void add_parameters(Json& json, const Plane& plane) {
@@ -150,4 +150,4 @@ Json trims_json(const std::string& input, const TriangleMesh& mesh, const Segmen
   return json;
 }
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

@@ -5,37 +5,18 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "bisector/device.h"
 #include "bisector/features.h"
-#include "parsed_option.h"
+#include "job/parsed_option.h"
 #include "remesh/sizing.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 
 inline constexpr std::uint64_t kMostSeeds = 100'000'000;
-
-struct CommonOptions {
-  std::string report;    // file name, "-" for stdout, or empty
-  unsigned threads = 0;  // 0: all cores
-  bool quiet = false;
-  bool verbose = false;
-};
-
-// Adds a subcommand with nothing but its help: `about` is one line, `footer` holds examples.
-CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer);
-
-// The help of the program or of a command, with its usage written out.
-class Help : public CLI::Formatter {
- public:
-  explicit Help(std::string usage);
-  std::string make_usage(const CLI::App*, std::string) const override;
-  std::string make_group(std::string name, bool is_positional, std::vector<const CLI::Option*> options) const override;
-
- private:
-  std::string usage_;
-};
 
 // --- What a value may be ---
 
@@ -49,8 +30,7 @@ CLI::Validator number_above_zero();
 CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const char* type, const char* help);
 CLI::Option* add_device(CLI::App* app, DeviceRequest& device, const char* help);
 void add_compute_options(CLI::App* app, ComputeOptions& options);
-// --threads, --report with the help `about`, --quiet and --verbose.
-void add_common_options(CLI::App* app, CommonOptions& options, const char* about);
+void add_threads(CLI::App* app, unsigned& threads);
 CLI::Option* add_random_seed(CLI::App* app, std::uint64_t& random_seed, const char* help);
 void add_edge_length(CLI::App* app, double& length, double& relative);
 void add_edge_bounds(CLI::App* app, SizingOptions& sizing);
@@ -73,8 +53,12 @@ void add_wrap(CLI::App* app, WrapOption& wrap);
 // Which options a command was given. An option that would change nothing is an error.
 class Usage {
  public:
-  explicit Usage(const CLI::App& app) : app_(app) {}
-  bool given(const char* option) const { return app_.count(option) > 0; }
+  // `in_memory`: options that stand for files whose contents were given instead.
+  explicit Usage(const CLI::App& app, std::set<std::string> in_memory = {})
+      : app_(app), in_memory_(std::move(in_memory)) {}
+  bool given(const char* option) const {
+    return in_memory_.count(option) > 0 || (app_.get_option_no_throw(option) && app_.count(option) > 0);
+  }
   // Throws CLI::ValidationError if the option was given.
   void refuse(const char* option, const char* why) const;
 
@@ -87,6 +71,7 @@ class Usage {
 
  private:
   const CLI::App& app_;
+  std::set<std::string> in_memory_;
 };
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

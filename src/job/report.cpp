@@ -1,4 +1,4 @@
-#include "report.h"
+#include "job/report.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "bisector/io.h"
 #include "io/files.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 namespace {
 
 std::string dumped(const Json& value) { return value.dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -186,14 +186,23 @@ Json point_json(const Vec3& p) {
   return Json::array({p.x, p.y, p.z});
 }
 
-void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings) {
+void add_seconds(Json& seconds, const char* key, double value) {
+  Json& entry = seconds[key];
+  entry = value + (entry.is_null() ? 0.0 : entry.get<double>());
+}
+
+std::string report_text(Json report, const std::vector<std::string>& warnings) {
   report["warnings"] = warnings;
   std::string text;
   append(text, report, 0);
-  text += '\n';
+  return text + '\n';
+}
+
+void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings) {
+  const std::string text = report_text(std::move(report), warnings);
   if (path != "-") return write_file(path, text);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
     throw Error("the report cannot be written to stdout; check where it is redirected to");
 }
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

@@ -5,9 +5,9 @@
 
 #include "bisector/region_borders.h"
 #include "bisector/segment.h"
-#include "report.h"
+#include "job/report.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 
 // Type, parameters and errors of a region's surface.
 Json region_json(const SegmentRegion& region);
@@ -16,4 +16,4 @@ Json region_json(const SegmentRegion& region);
 Json trims_json(const std::string& input, const TriangleMesh& mesh, const SegmentResult& segmentation,
                 const RegionBorders& borders);
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

@@ -7,7 +7,7 @@
 #include "bisector/tree.h"
 #include "core/words.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 
 inline constexpr auto kPrecisionWords = word_table<Precision>(
     {{Precision::automatic, "auto"}, {Precision::single, "single"}, {Precision::double_, "double"}});
@@ -43,4 +43,4 @@ inline constexpr auto kUnitWords = word_table<IgesUnit>({{IgesUnit::millimetre, 
                                                          {IgesUnit::inch, "in"},
                                                          {IgesUnit::foot, "ft"}});
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

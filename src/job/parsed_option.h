@@ -9,7 +9,7 @@
 #include "bisector/error.h"
 #include "core/words.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 
 // What a parser takes that throws Error for anything else.
 template <class Parse>
@@ -43,4 +43,4 @@ CLI::Option* add_words(CLI::App* app, const char* name, E& value, const WordTabl
       app, name, value, [words](const std::string& word) { return words.parse(word); }, help);
 }
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

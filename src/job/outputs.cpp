@@ -1,4 +1,4 @@
-#include "outputs.h"
+#include "job/outputs.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,7 +12,7 @@
 
 #include "bisector/error.h"
 
-namespace bisector::cli {
+namespace bisector::job {
 namespace {
 
 namespace fs = std::filesystem;
@@ -89,4 +89,4 @@ void check_outputs(const std::vector<Output>& outputs, const std::vector<std::st
   }
 }
 
-}  // namespace bisector::cli
+}  // namespace bisector::job

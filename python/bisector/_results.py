@@ -1,0 +1,314 @@
+"""Results: arrays that belong to the library, a report, and files."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+from ctypes import byref
+from typing import Any, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+from ._library import Array, Handle, call, path_bytes, text
+from ._run import interruptible
+
+_TYPES = (np.dtype(np.float64), np.dtype(np.uint32), np.dtype(np.int32))
+
+
+def _view(handle: Handle, name: str) -> npt.NDArray[Any]:
+    """The library's own numbers, not to be written to; they keep the result alive."""
+    array = Array()
+    call("result_array", handle.value, name.encode(), byref(array))
+    dtype = _TYPES[array.type]
+    shape = (array.rows, array.columns) if array.columns > 1 else (array.rows,)
+    if array.rows == 0:
+        return np.zeros(shape, dtype)
+    buffer = (ctypes.c_char * (array.rows * array.columns * dtype.itemsize)).from_address(array.data)
+    buffer._owner = handle  # type: ignore[attr-defined]
+    view = np.frombuffer(buffer, dtype=dtype).reshape(shape)
+    view.flags.writeable = False
+    return view
+
+
+def _marked(values: npt.NDArray[Any]) -> Optional[npt.NDArray[Any]]:
+    return values if len(values) else None
+
+
+class Result:
+    """What a call made. Arrays are read-only; copy them to change them.
+
+    Points, radii and energies are views of the library's memory; integers are copied to 64 bits when they are first
+    asked for.
+    """
+
+    def __init__(self, handle: Handle) -> None:
+        self._handle = handle
+        self._arrays: "dict[str, npt.NDArray[Any]]" = {}
+        self._report: "Optional[dict[str, Any]]" = None
+
+    def _array(self, name: str) -> npt.NDArray[Any]:
+        if name not in self._arrays:
+            array = _view(self._handle, name)
+            if array.dtype.kind in "iu":
+                array = array.astype(np.int64)
+                array.flags.writeable = False
+            self._arrays[name] = array
+        return self._arrays[name]
+
+    @property
+    def report(self) -> "dict[str, Any]":
+        """The report of docs/cli.md, "Report keys". The first use measures what only the report tells, such as the
+        distance to the input, and may take a while; Ctrl-C ends it."""
+        if self._report is None:
+            handle = self._handle
+            self._report = json.loads(interruptible(lambda callbacks: text("result_report", handle.value, callbacks)))
+        return self._report
+
+    def _save(self, path: "str | os.PathLike[str]", what: str) -> None:
+        handle, name = self._handle, path_bytes(path)
+        interruptible(lambda callbacks: call("result_save", handle.value, what.encode(), name, callbacks))
+
+
+class SurfaceResult(Result):
+    """Triangles."""
+
+    @property
+    def vertices(self) -> npt.NDArray[np.float64]:
+        """(n, 3) float64, in the input's unit."""
+        return self._array("vertices")
+
+    @property
+    def faces(self) -> npt.NDArray[np.int64]:
+        """(m, 3) int64: the vertices of each triangle, counter-clockwise seen from outside."""
+        return self._array("faces")
+
+    @property
+    def labels(self) -> Optional[npt.NDArray[np.int64]]:
+        """(m,) int64: the label of each triangle, or None."""
+        return _marked(self._array("labels"))
+
+    def save(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the mesh as `-o` of the command does, byte for byte, by the extension of the name.
+
+        Raises Error if the format is unknown or the file cannot be written; warns of what the format does not hold.
+        """
+        self._save(path, "output")
+
+    def save_preview(self, path: "str | os.PathLike[str]") -> None:
+        """Draws a picture, as .png."""
+        self._save(path, "preview")
+
+    def _cells(self) -> "list[tuple[str, npt.NDArray[np.int64]]]":
+        return [("triangle", self.faces)]
+
+    def _cell_data(self) -> "dict[str, list[npt.NDArray[np.int64]]]":
+        return {} if self.labels is None else {"label": [self.labels]}
+
+    def to_meshio(self) -> Any:
+        """A meshio.Mesh, with the labels as cell data."""
+        import meshio
+
+        return meshio.Mesh(self.vertices.copy(), self._cells(), cell_data=self._cell_data())
+
+    def to_trimesh(self) -> Any:
+        """A trimesh.Trimesh with the same vertices and faces; labels are its face attribute `label`."""
+        import trimesh
+
+        attributes = {} if self.labels is None else {"label": self.labels.copy()}
+        return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), face_attributes=attributes, process=False)
+
+    def to_pyvista(self) -> Any:
+        """A pyvista.PolyData, with the labels as cell data."""
+        import pyvista
+
+        threes = np.full((len(self.faces), 1), 3, dtype=np.int64)
+        mesh = pyvista.PolyData(self.vertices.copy(), np.hstack([threes, self.faces]).reshape(-1))
+        if self.labels is not None:
+            mesh.cell_data["label"] = self.labels.copy()
+        return mesh
+
+
+class RemeshResult(SurfaceResult):
+    """A remeshed surface; labels are those of the input at the same place."""
+
+    @property
+    def feature_edges(self) -> npt.NDArray[np.int64]:
+        """(k, 2) int64: the edges along the input's features, the lower vertex first."""
+        return self._array("feature_edges")
+
+    def save_features(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the feature edges as lines of two vertices."""
+        self._save(path, "feature-output")
+
+
+class TetResult(SurfaceResult):
+    """Tetrahedra. `faces` are the triangles of the boundary, and `labels` theirs; boundary vertices come first."""
+
+    @property
+    def tets(self) -> npt.NDArray[np.int64]:
+        """(t, 4) int64: the vertices of each tetrahedron, whose volume is positive."""
+        return self._array("tets")
+
+    @property
+    def regions(self) -> Optional[npt.NDArray[np.int64]]:
+        """(t,) int64: the region of each tetrahedron, or None."""
+        return _marked(self._array("regions"))
+
+    @property
+    def feature_edges(self) -> npt.NDArray[np.int64]:
+        """(k, 2) int64: the edges along the boundary's features."""
+        return self._array("feature_edges")
+
+    def save_boundary(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the boundary as a surface."""
+        self._save(path, "boundary")
+
+    def _cells(self) -> "list[tuple[str, npt.NDArray[np.int64]]]":
+        return [("tetra", self.tets), ("triangle", self.faces)]
+
+    def _cell_data(self) -> "dict[str, list[npt.NDArray[np.int64]]]":
+        if self.labels is None and self.regions is None:
+            return {}
+        regions = np.zeros(len(self.tets), np.int64) if self.regions is None else self.regions
+        labels = np.zeros(len(self.faces), np.int64) if self.labels is None else self.labels
+        return {"label": [regions, labels]}
+
+    def to_trimesh(self) -> Any:
+        """The boundary as a trimesh.Trimesh, over all vertices."""
+        return super().to_trimesh()
+
+    def to_pyvista(self) -> Any:
+        """A pyvista.UnstructuredGrid of the tetrahedra, with the regions as cell data."""
+        import pyvista
+
+        fours = np.full((len(self.tets), 1), 4, dtype=np.int64)
+        kinds = np.full(len(self.tets), 10, dtype=np.uint8)
+        grid = pyvista.UnstructuredGrid(np.hstack([fours, self.tets]).reshape(-1), kinds, self.vertices.copy())
+        if self.regions is not None:
+            grid.cell_data["region"] = self.regions.copy()
+        return grid
+
+
+class SegmentResult(SurfaceResult):
+    """The input's triangles; `labels` are their regions, and report["segmentation"]["regions"] has the surfaces."""
+
+    def __init__(self, handle: Handle, has_polygons: bool) -> None:
+        super().__init__(handle)
+        self._has_polygons = has_polygons
+
+    @property
+    def polygons(self) -> "Optional[tuple[npt.NDArray[np.float64], list[npt.NDArray[np.int64]]]]":
+        """With `polygons=True`: vertices (n, 3) and the corners of each polygon; else None."""
+        if not self._has_polygons:
+            return None
+        offsets = self._array("polygon_offsets")
+        corners = self._array("polygon_corners")
+        return self._array("polygon_vertices"), np.split(corners, offsets[1:-1])
+
+    @property
+    def polygon_labels(self) -> Optional[npt.NDArray[np.int64]]:
+        """The region of each polygon, or None."""
+        return self._array("polygon_labels") if self._has_polygons else None
+
+    def save_polygons(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the polygons, for which the call needs `polygons=True`."""
+        self._save(path, "polygons")
+
+    def save_json(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the surfaces with the loops that trim them, which bisector-step reads."""
+        self._save(path, "json")
+
+
+class TreeResult(SurfaceResult):
+    """The branches of trees as closed surfaces; `labels` are the branches of the triangles."""
+
+    @property
+    def nodes(self) -> npt.NDArray[np.float64]:
+        """(k, 3) float64: points on the axes of branches, parents first."""
+        return self._array("nodes")
+
+    @property
+    def node_radii(self) -> npt.NDArray[np.float64]:
+        """(k,) float64, in the points' unit."""
+        return self._array("node_radii")
+
+    @property
+    def node_parents(self) -> npt.NDArray[np.int64]:
+        """(k,) int64: the node that each grows from; -1: a root."""
+        return self._array("node_parents")
+
+    @property
+    def node_branches(self) -> npt.NDArray[np.int64]:
+        """(k,) int64: the branch of each node."""
+        return self._array("node_branches")
+
+    @property
+    def point_branches(self) -> npt.NDArray[np.int64]:
+        """The branch of each point of the scan; -1: none."""
+        return self._array("point_branches")
+
+    def save_skeleton(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the axes with radii, as .ply."""
+        self._save(path, "skeleton")
+
+    def save_cylinders(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the branches as cylinders, as .csv in the columns of TreeQSM."""
+        self._save(path, "cylinders")
+
+    def save_labels(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the points with their branches, as .ply."""
+        self._save(path, "labels")
+
+
+class DiagramResult(Result):
+    """A restricted Voronoi diagram: one cell for each seed."""
+
+    @property
+    def seeds(self) -> npt.NDArray[np.float64]:
+        """(n, 3) float64."""
+        return self._array("seeds")
+
+    @property
+    def masses(self) -> npt.NDArray[np.float64]:
+        """(n,) float64: the area of each cell; 0: it is empty."""
+        return self._array("masses")
+
+    @property
+    def centroids(self) -> npt.NDArray[np.float64]:
+        """(n, 3) float64; not a number for empty cells."""
+        return self._array("centroids")
+
+    @property
+    def energies(self) -> npt.NDArray[np.float64]:
+        """(n,) float64: the integral of the squared distance to the seed over its cell."""
+        return self._array("energies")
+
+    @property
+    def rdt(self) -> npt.NDArray[np.int64]:
+        """(k, 3) int64: the restricted Delaunay triangulation, each triple ascending, sorted."""
+        return self._array("rdt")
+
+    @property
+    def pairs(self) -> npt.NDArray[np.int64]:
+        """(p, 2) int64: each face of the input and cell that meet, sorted."""
+        return self._array("pairs")
+
+    @property
+    def polygons(self) -> "tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]":
+        """The cells cut up by the input's triangles: corners (c, 3); offsets (q + 1,), polygon k having the corners
+        offsets[k] to offsets[k + 1]; and the cell of each polygon (q,)."""
+        return self._array("polygon_vertices"), self._array("polygon_offsets"), self._array("polygon_cells")
+
+    def save(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the cells as coloured polygons, as .ply."""
+        self._save(path, "output")
+
+    def save_pairs(self, path: "str | os.PathLike[str]") -> None:
+        """Writes `pairs` as lines."""
+        self._save(path, "pairs")
+
+    def save_preview(self, path: "str | os.PathLike[str]") -> None:
+        """Draws a picture of the cells, as .png."""
+        self._save(path, "preview")

@@ -1,0 +1,107 @@
+#include "front.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/stopwatch.h"
+#include "job/outputs.h"
+
+namespace bisector::cli {
+
+Help::Help(std::string usage) : usage_(std::move(usage)) {
+  column_width(32);
+  label("REQUIRED", "(required)");
+  label("Positionals", "Arguments");
+}
+
+std::string Help::make_usage(const CLI::App*, std::string) const { return "\nUsage: " + usage_ + "\n\n"; }
+
+// One blank line between groups, where CLI11 leaves two.
+std::string Help::make_group(std::string name, bool is_positional, std::vector<const CLI::Option*> options) const {
+  const std::string group = CLI::Formatter::make_group(name, is_positional, options).substr(1);
+  return is_positional ? group + "\n" : group;
+}
+
+CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer) {
+  CLI::App* app = program.add_subcommand(name, about);
+  app->group("Commands")->footer(footer);
+  app->formatter(std::make_shared<Help>(usage));
+  app->get_help_ptr()->description("print this and exit")->group("Output");
+  return app;
+}
+
+void add_common_options(CLI::App* app, CommonOptions& options, const char* about) {
+  job::add_file(app, "--report", options.report, "FILE", about)->group("Output");
+  app->add_flag("--quiet", options.quiet, "print errors only")->group("Output");
+  app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
+}
+
+namespace {
+
+// In the order of the report's seconds: the first name is that of the whole run.
+void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary) {
+  const Stopwatch total;
+  const std::string& report_path = files.common.report;
+  const std::vector<job::OutputKind> kinds = job.outputs();
+  std::vector<job::Output> outputs;
+  for (const job::OutputKind& kind : kinds) outputs.push_back({files.outputs.at(kind.name), kind.extensions});
+  if (outputs.empty()) outputs.push_back({});  // the report does not replace the input either
+  outputs.push_back(job::report_output(report_path));
+  job::check_outputs(outputs, job.input_files());
+  const ThreadLimit limit(job.threads);
+  Console console(files.common.quiet, report_path == "-");
+  job::Journal& journal = console.journal();
+
+  journal.phase("reading " + job.input);
+  job.read(journal);
+  for (const job::OutputKind& kind : kinds)
+    if (const std::string& path = files.outputs.at(kind.name); !path.empty())
+      job.check_format(kind.name, path, journal);
+  job.compute(journal);
+  job::Json report;
+  if (!report_path.empty()) report = job.report(journal);
+
+  journal.phase("writing");
+  stop_watching_interrupts();
+  for (const job::OutputKind& kind : kinds) {
+    const Stopwatch writing;
+    if (const std::string& path = files.outputs.at(kind.name); !path.empty())
+      job.write(kind.name, path, journal.warnings());
+    job::add_seconds(job.seconds, kind.seconds, writing.seconds());
+  }
+  job.seconds["total"] = total.seconds();
+  if (!report_path.empty()) {
+    report["seconds"] = job.seconds;
+    job::write_report(report_path, report, journal.warnings());
+  }
+  print_summary(console, job, files);
+  std::vector<std::string> written;
+  for (const job::OutputKind& kind : kinds) written.push_back(files.outputs.at(kind.name));
+  written.push_back(report_path);
+  console.print_written(written);
+}
+
+}  // namespace
+
+Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandText& text, PrintSummary print_summary) {
+  const auto files = std::make_shared<JobFiles>();
+  CLI::App* app = add_command(program, job->command(), text.about, text.usage, text.footer);
+  const job::InputKind input = job->input_kind();
+  job::add_file(app, input.name, job->input, "FILE", input.help)->required();
+  for (const job::OutputKind& kind : job->outputs())
+    job::add_file(app, kind.option, files->outputs[kind.name], kind.type, kind.help)
+        ->required(kind.required)
+        ->group("Output");
+  job->add_options(app);
+  add_common_options(app, files->common, text.report_help);
+  const auto check_usage = [=] {
+    for (const auto& [name, path] : files->outputs)
+      if (!path.empty()) job->plan(name, path);
+    job->check_usage(job::Usage(*app));
+  };
+  return {app, check_usage, [=] { run(*job, *files, print_summary); }};
+}
+
+}  // namespace bisector::cli

@@ -1,0 +1,59 @@
+// The command line as a front end of jobs.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "console.h"
+#include "job/job.h"
+
+namespace bisector::cli {
+
+struct CommonOptions {
+  std::string report;  // file name, "-" for stdout, or empty
+  bool quiet = false;
+  bool verbose = false;
+};
+
+// Adds a subcommand with nothing but its help: `about` is one line, `footer` holds examples.
+CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer);
+
+// The help of the program or of a command, with its usage written out.
+class Help : public CLI::Formatter {
+ public:
+  explicit Help(std::string usage);
+  std::string make_usage(const CLI::App*, std::string) const override;
+  std::string make_group(std::string name, bool is_positional, std::vector<const CLI::Option*> options) const override;
+
+ private:
+  std::string usage_;
+};
+
+// --report with the help `about`, --quiet and --verbose.
+void add_common_options(CLI::App* app, CommonOptions& options, const char* about);
+
+// What the program says of a command.
+struct CommandText {
+  const char* about;  // one line
+  const char* usage;
+  const char* footer;       // examples
+  const char* report_help;  // of --report
+};
+
+// What a summary speaks of beside the job: the file that each output goes to, empty if it is not wanted.
+struct JobFiles {
+  std::map<std::string, std::string> outputs;  // by OutputKind::name
+  CommonOptions common;
+};
+
+using PrintSummary = std::function<void(Console& console, const job::Job& job, const JobFiles& files)>;
+
+// A command that reads, computes, writes and prints what a job says.
+Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandText& text, PrintSummary print_summary);
+
+}  // namespace bisector::cli

@@ -1,0 +1,106 @@
+#include "job/inputs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bisector/error.h"
+#include "bisector/io.h"
+#include "bisector/repair.h"
+#include "core/geometry.h"
+#include "job/messages.h"
+#include "mesh/tet_topology.h"
+#include "remesh/sizing.h"
+
+namespace bisector::job {
+namespace {
+
+// What is finer than its edges a mesh does not show. The triangles of a soup may lie upon each other, so that their
+// area says little.
+double default_alpha(const TriangleMesh& mesh, double edge) {
+  constexpr double kFinest = 1.0 / 500, kCoarsest = 1.0 / 20;  // in diagonals of the bounding box
+  const double diagonal = bounding_box(mesh.vertices).diagonal();
+  return std::clamp(edge, kFinest * diagonal, kCoarsest * diagonal);
+}
+
+void repeat_warnings(const GivenMesh& mesh, Journal& journal) {
+  for (const std::string& warning : mesh.warnings) journal.warn(warning);
+}
+
+}  // namespace
+
+std::shared_ptr<const TriangleMesh> read_surface(const std::string& path, const std::shared_ptr<const GivenMesh>& given,
+                                                 Journal& journal) {
+  if (!given) return std::make_shared<const TriangleMesh>(read_mesh(path, journal.context()));
+  repeat_warnings(*given, journal);
+  if (!given->surface) throw Error("the mesh has no faces; a surface is needed here");
+  return {given, &*given->surface};
+}
+
+Domain read_domain(const std::string& path, const std::shared_ptr<const GivenMesh>& given, bool marks,
+                   Journal& journal) {
+  if (given ? !given->tets : !is_tet_format(path)) return {read_surface(path, given, journal), nullptr};
+  Domain domain;
+  if (given) {
+    repeat_warnings(*given, journal);
+    domain.tets = {given, &*given->tets};
+  } else {
+    domain.tets = std::make_shared<const TetMesh>(read_tet_mesh(path, journal.context()));
+  }
+  const TetMesh& mesh = *domain.tets;
+  if (mesh.tets.empty()) return {std::make_shared<const TriangleMesh>(surface_of_marks(mesh)), nullptr};
+  if (marks) domain.surface = std::make_shared<const TriangleMesh>(boundary_surface(mesh));
+  else domain.surface = std::make_shared<const TriangleMesh>(TriangleMesh{mesh.vertices, boundary_facets(mesh.tets)});
+  return domain;
+}
+
+std::vector<Vec3> read_seeds(const std::string& path, const Given& given, std::size_t count) {
+  std::vector<Vec3> seeds = given.seeds ? *given.seeds : read_points(path);
+  if (count != 0 && count != seeds.size())
+    throw Error(fmt::format("{}: {}{}, but -n asks for {}; leave -n out", given.seeds ? "--seeds" : path,
+                            counted(seeds.size(), "seed", "seeds"), given.seeds ? "" : " in the file", count));
+  return seeds;
+}
+
+std::vector<double> read_density(const std::string& path, const std::string& attribute, const Given& given,
+                                 std::size_t vertices) {
+  if (given.density.empty()) {
+    if (given.mesh) throw Error("--density: a mesh in memory has no attributes by name; give the values instead");
+    return is_tet_format(path) ? read_tet_attribute(path, attribute) : read_vertex_attribute(path, attribute);
+  }
+  if (given.density.size() != vertices)
+    throw Error(fmt::format("--density: {} for {}; give one each", counted(given.density.size(), "value", "values"),
+                            counted(vertices, "vertex", "vertices")));
+  return given.density;
+}
+
+void leave_out_folds(const WrapOption& wrap, FeatureOptions& features) {
+  if (wrap.on && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
+}
+
+Json wrap_if_asked(const WrapOption& option, const TriangleMesh& mesh, std::size_t vertices, double edge_length,
+                   bool tetrahedra, Journal& journal, TriangleMesh& wrapped) {
+  if (!option.on) return nullptr;
+  journal.phase("wrapping");
+  const SizingTarget target{edge_length > 0 ? 0 : vertices, edge_length};
+  const double edge = compute_sizing(mesh, {}, target).unit_edge;
+  const double alpha = option.alpha > 0 ? option.alpha : default_alpha(mesh, edge);
+  // Both sides of a shell share the vertices, so its edges are longer than those of a mesh of the sheet.
+  const double thickness = !tetrahedra ? 0 : edge_length > 0 ? edge : std::sqrt(2.0) * edge;
+  WrapResult result = wrap(mesh, alpha, thickness, journal.context());
+  wrapped = std::move(result.mesh);
+  if (thickness > 0 && 2 * result.offset >= thickness)
+    journal.warn(fmt::format(
+        "--wrap: sheets with both sides outside became shells about an edge thick, {:.4g}, for tetrahedra to "
+        "fit into them, and all of the wrap lies half of that outside; a larger ALPHA may close them",
+        2 * result.offset));
+  if (!mesh.labels.empty()) journal.warn("--wrap: the input's face labels are lost, for the wrap has faces of its own");
+  return {{"alpha", alpha},
+          {"offset", result.offset},
+          {"vertices", wrapped.vertices.size()},
+          {"faces", wrapped.triangles.size()}};
+}
+
+}  // namespace bisector::job

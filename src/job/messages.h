@@ -1,0 +1,26 @@
+// Words of messages and summaries.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "bisector/error.h"
+#include "bisector/quality.h"
+
+namespace bisector::job {
+
+// Control characters become spaces.
+std::string one_line(std::string_view text);
+
+// "1 face", "2 faces".
+std::string counted(std::size_t n, const char* one, const char* many);
+
+// "manifold, closed, oriented, 1 component, Euler characteristic 2"
+std::string describe(const MeshTopology& topology);
+
+// An error of the library with the options that help.
+std::string with_advice(const Error& error);
+inline constexpr const char* kNoMemory = "not enough memory; ask for fewer vertices or use a larger machine";
+
+}  // namespace bisector::job

@@ -1,0 +1,58 @@
+#include "job/quality.h"
+
+#include <utility>
+
+#include "core/stopwatch.h"
+
+namespace bisector::job {
+
+Json measured_size_json(const Domain& domain) {
+  return domain.tets ? size_json(*domain.tets) : input_json(*domain.surface);
+}
+
+void QualityJob::add_options(CLI::App* app) {
+  add_file(app, "--reference", reference_file, "IN", "also measure the two-sided distance to this mesh")
+      ->group("Output");
+  add_threads(app, threads);
+}
+
+void QualityJob::read(Journal& journal) {
+  const Stopwatch reading;
+  mesh = read_domain(input, given.mesh, true, journal);
+  if (given.reference || !reference_file.empty())
+    reference = read_domain(reference_file, given.reference, true, journal);
+  seconds["io"] = reading.seconds();
+}
+
+void QualityJob::compute(Journal& journal) {
+  const Stopwatch measuring;
+  measures.quality = measure_quality(*mesh.surface);
+  if (mesh.tets) {
+    measures.tets = measure_tet_quality(*mesh.tets);
+    measures.tet_topology = analyse_tet_topology(*mesh.tets);
+  }
+  journal.phase("looking for self-intersections");
+  measures.self_intersections = count_self_intersections(*mesh.surface);
+  if (reference.surface) {
+    journal.phase("measuring the distance to " + (reference_file.empty() ? "the reference" : reference_file));
+    measures.distance = measure_distance(*mesh.surface, *reference.surface);
+  }
+  seconds["quality"] = measuring.seconds();
+}
+
+Json QualityJob::report(Journal&) {
+  Json report = start_report(command());
+  report["input"] = measured_size_json(mesh);
+  if (reference.surface) report["reference"] = measured_size_json(reference);
+  report["seconds"] = nullptr;
+  Json quality = quality_json(measures.quality);
+  if (mesh.tets) add_tets(quality, measures.tets);
+  quality["self_intersections"] = measures.self_intersections;
+  if (reference.surface) add_distance(quality, measures.distance);
+  report["quality"] = std::move(quality);
+  report["topology"] = topology_json(measures.quality.topology);
+  if (mesh.tets) add_tets(report["topology"], measures.tet_topology);
+  return report;
+}
+
+}  // namespace bisector::job

@@ -1,0 +1,277 @@
+#include "job/remesh.h"
+
+#include <fmt/format.h>
+
+#include "bisector/io.h"
+#include "bisector/preview.h"
+#include "core/geometry.h"
+#include "core/stopwatch.h"
+#include "job/inputs.h"
+#include "job/messages.h"
+#include "job/outputs.h"
+#include "job/words.h"
+
+namespace bisector::job {
+namespace {
+
+void require_sound(const RemeshResult& result) {
+  if (result.untiled > 0)
+    throw Error(fmt::format("the final diagram does not tile {} of the input; please report this as a bug",
+                            counted(result.untiled, "triangle", "triangles")));
+  if (result.mesh.triangles.empty())
+    throw Error("the seeds are too few to span a triangle of this surface; ask for more vertices");
+}
+
+void warn_of_features(Journal& journal, const RemeshResult& result) {
+  if (result.features.broken > 0)
+    journal.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices",
+                             result.features.broken,
+                             counted(result.features.curves, "feature curve", "feature curves")));
+  if (2 * result.features.seeds > result.mesh.vertices.size())
+    journal.warn(
+        fmt::format("features take {} of {}; for better triangles ask for more vertices, or for fewer features "
+                    "(--features)",
+                    result.features.seeds, counted(result.mesh.vertices.size(), "vertex", "vertices")));
+}
+
+void warn_of_topology(Journal& journal, const RemeshResult& result) {
+  if (result.topology_matches && result.mesh.vertices.size() > result.wanted + result.wanted / 100)
+    journal.warn(fmt::format("{} instead of {}: fewer did not give the input's topology and features",
+                             counted(result.mesh.vertices.size(), "vertex", "vertices"), result.wanted));
+  if (result.topology_matches) return;
+  journal.warn(
+      fmt::format("the output's topology ({}) is not the input's ({}); {}", describe(result.topology),
+                  describe(result.input_topology),
+                  result.input_topology.manifold ? "ask for more vertices" : "mend the input, or wrap it (--wrap)"));
+}
+
+Json faults_json(const RemeshResult& result) {
+  Json faults = Json::array();
+  for (const TopologyFault& fault : result.faults) {
+    Json vertices = Json::array();
+    for (Index v : fault.seeds) vertices.push_back(v == kNone ? Json(nullptr) : Json(v));
+    faults.push_back({{"vertices", vertices}, {"position", point_json(fault.position)}, {"what", fault.what}});
+  }
+  return faults;
+}
+
+Json weld_json(const WeldResult& welded) {
+  return {{"merged_vertices", welded.merged_vertices},
+          {"split_edges", welded.split_edges},
+          {"removed_triangles", welded.degenerate_triangles + welded.duplicate_triangles},
+          {"border_edges_before", welded.border_before},
+          {"border_edges_after", welded.border_after}};
+}
+
+Json remesh_seconds(const RemeshSeconds& seconds) {
+  Json json{{"total", seconds.total}};
+  json.update(seconds_json(seconds.diagrams));
+  json["lbfgs"] = seconds.lbfgs;
+  json["extract"] = seconds.extract;
+  json["prepare"] = seconds.prepare;
+  json["features"] = seconds.features;
+  json["topology"] = seconds.topology;
+  json["improve"] = seconds.improve;
+  json["fit"] = seconds.fit;
+  json["remesh"] = seconds.total;
+  return json;
+}
+
+}  // namespace
+
+std::vector<OutputKind> RemeshJob::outputs() const {
+  return {{"output", "-o", "FILE", "mesh to write", kMeshFormats, true},
+          {"preview", "--preview", "FILE.png", "draw a picture of the result", {".png"}, false, false, "preview"},
+          {"feature-output",
+           "--feature-output",
+           "FILE",
+           "write the result's feature edges, as lines of two vertex\n"
+           "numbers; .ply and .obj outputs hold them too",
+           {}}};
+}
+
+void RemeshJob::add_options(CLI::App* app) {
+  app->add_option("-n", options_.vertices, "vertices of the result, at least 4")
+      ->type_name("N")
+      ->check(whole_number(4, kMostSeeds))
+      ->group("Seeds");
+  add_file(app, "--seeds", seeds_, "FILE.xyz",
+           "start from these points (\"x y z\" lines) in one level;\n"
+           "-n is then not needed")
+      ->group("Seeds");
+  add_random_seed(app, options_.random_seed, "another number, another start; default 1")->group("Seeds");
+  add_edge_length(app, options_.edge_length, edge_length_relative_);
+  add_density(app, options_.sizing, attribute_,
+              "where triangles are smaller: uniform (default),\n"
+              "lfs[:EXP] (local feature size to the power -EXP,\n"
+              "default 2), curvature[:EXP] (the larger principal one,\n"
+              "default 1) or attribute:NAME (a vertex property of a\n"
+              "PLY file); edges are as long as density^(-1/4)");
+  app->add_option("--gradation", options_.sizing.gradation,
+                  "edge lengths change by at most so much per length;\n"
+                  "0: no bound; default 0.2. Not for uniform density")
+      ->type_name("G")
+      ->check(number_below(10))
+      ->group("Size");
+  add_edge_bounds(app, options_.sizing);
+  add_features(app, options_.features,
+               "sharp edges to keep: auto (default), none, or all with a\n"
+               "dihedral deviation of so many degrees. Borders and\n"
+               "non-manifold edges are always kept, edges between face\n"
+               "labels unless none");
+  add_words(app, "--detail", options_.detail, kDetailWords,
+            "what is finer than the edges: auto (smaller edges where\n"
+            "the vertices suffice, else merged; default), all (as many\n"
+            "vertices as it takes) or off")
+      ->group("Features");
+  add_feature_file(app, feature_file_);
+  add_weld(app, weld_);
+  add_wrap(app, wrap_);
+  add_words(app, "--topology", options_.topology, kTopologyWords,
+            "where the result's topology is not the input's:\n"
+            "enforce (mend it; default), check (warn) or off")
+      ->group("Optimisation");
+  add_words(app, "--energy", options_.energy, kEnergyWords,
+            "ccvt (seeds on the surface), rcvt (free) or auto (ccvt\n"
+            "unless the input is noise at this edge length; default)")
+      ->group("Optimisation");
+  app->add_option("--min-angle", options_.min_angle,
+                  "degrees that the last pass tries to get all angles\n"
+                  "above; 0: no such pass; default 40")
+      ->type_name("A")
+      ->check(number_below(60))
+      ->group("Optimisation");
+  app->add_flag("--fit", options_.fit,
+                "move the result's vertices off the surface, to where\n"
+                "its triangles are nearest to the input")
+      ->group("Optimisation");
+  add_iterations(app, options_.iterations, "at most so many per level; default 100");
+  add_tolerance(app, options_.tolerance,
+                "end a level when the energy falls by less than this\n"
+                "share per iteration; default 1e-6");
+  app->add_option("--levels", options_.levels,
+                  "coarse-to-fine levels, 1 to 8; default: as many as the\n"
+                  "count allows, at most 3")
+      ->type_name("N")
+      ->check(whole_number(1, 8))
+      ->group("Optimisation");
+  add_compute_options(app, options_.compute);
+  add_threads(app, threads);
+}
+
+void RemeshJob::check_usage(const Usage& usage) {
+  usage.check_number_of_vertices();
+  usage.check_wrap(attribute_);
+  if (usage.given("--seeds")) {
+    for (const char* option : {"--edge-min", "--edge-max"})
+      usage.refuse(option, "seeds from a file have their own number; leave one of the two out");
+    usage.refuse("--detail", "edges are as long as seeds from a file make them; leave one of the two out");
+    if (options_.levels > 1) throw CLI::ValidationError("--levels: seeds from a file imply one level");
+  }
+  const SizingOptions& sizing = options_.sizing;
+  usage.check_edge_bounds(sizing);
+  const double length = options_.edge_length;
+  if (length > 0 && (length < sizing.min_edge || (sizing.max_edge > 0 && length > sizing.max_edge)))
+    throw CLI::ValidationError("--edge-length is not between --edge-min and --edge-max");
+  if (sizing.kind == DensityKind::uniform) usage.check_uniform_density();
+  if (options_.energy == Energy::restricted && options_.min_angle > 0)
+    usage.refuse("--min-angle", "seeds have to be on the surface for that; leave out --energy rcvt");
+}
+
+// What the options say, with the files that they name.
+void RemeshJob::complete_options() {
+  if (!attribute_.empty()) options_.sizing.attribute = read_density(input, attribute_, given, surface->vertices.size());
+  if (!feature_file_.empty()) options_.features.given = read_feature_edges(feature_file_, *surface);
+  if (edge_length_relative_ > 0)
+    options_.edge_length = edge_length_relative_ * bounding_box(surface->vertices).diagonal();
+  if (weld_ >= 0) options_.weld = weld_;
+  leave_out_folds(wrap_, options_.features);
+  options_.threads = threads;
+  if (given.seeds || !seeds_.empty()) {
+    options_.seeds = read_seeds(seeds_, given, options_.vertices);
+    options_.vertices = options_.seeds.size();
+  }
+}
+
+void RemeshJob::read(Journal& journal) {
+  const Stopwatch reading;
+  surface = read_surface(input, given.mesh, journal);
+  io_ = reading.seconds();
+  complete_options();
+  wrapped_ = wrap_if_asked(wrap_, *surface, options_.vertices, options_.edge_length, false, journal, wrap_mesh_);
+}
+
+void RemeshJob::check_format(std::string_view output, const std::string& path, Journal& journal) const {
+  const std::string extension = extension_of(path);
+  if (output != "output" || remeshed_surface().labels.empty() || extension == ".ply" || extension == ".obj") return;
+  journal.warn(
+      fmt::format("{}: {} files hold no face labels, the input's are lost; write .ply or .obj", path, extension));
+}
+
+void RemeshJob::compute(Journal& journal) {
+  journal.phase("preparing");
+  result = remesh(remeshed_surface(), options_, journal.context());
+  require_sound(result);
+  warn_of_features(journal, result);
+  if (options_.topology != TopologyControl::off) warn_of_topology(journal, result);
+  seconds = remesh_seconds(result.seconds);
+  const Stopwatch measuring;
+  quality = measure_quality(result.mesh);
+  seconds["quality"] = measuring.seconds();
+  seconds["io"] = io_;
+}
+
+Json RemeshJob::report(Journal& journal) {
+  const Stopwatch measuring;
+  Json report = start_report(command());
+  report["device"] = device_json(result.device);
+  report["input"] = input_json(*surface);
+  report["output"] = output_json(result.mesh);
+  report["iterations"] = result.iterations;
+  report["evaluations"] = result.evaluations;
+  report["energy"] = result.energy;
+  report["gradient_norm"] = result.gradient_norm;
+  report["seconds"] = nullptr;
+  add_device(report, result.device, result.seconds.diagrams.device, result.device_work, result.evaluations);
+  report["certification"] = certification_json(result.certification);
+  report["quality"] = quality_json(quality);
+  journal.phase("measuring the distance to the input");
+  add_distance(report["quality"], measure_distance(result.mesh, *surface));
+  journal.phase("looking for self-intersections");
+  report["quality"]["self_intersections"] = count_self_intersections(result.mesh);
+  report["topology"] = topology_json(result.topology);
+  report["topology"]["matches_input"] = result.topology_matches;
+  report["topology"]["ball_property"] = result.ball_property;
+  report["topology"]["divided"] = result.divided;
+  report["topology"]["faults"] = faults_json(result);
+  report["features"] = features_json(result.features, result.mesh.feature_edges.size());
+  report["detail"] = detail_json(result.detail, result.features.curves);
+  report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length}};
+  report["noisy"] = result.noisy;
+  report["weld"] = weld_json(result.welded);
+  if (!wrapped_.is_null()) report["wrap"] = wrapped_;
+  if (options_.min_angle > 0 && options_.energy != Energy::restricted && !result.noisy)
+    report["improved"] = {{"made", result.improved.made},
+                          {"inserted", result.improved.inserted},
+                          {"removed", result.improved.removed},
+                          {"missed", result.improved.missed}};
+  if (options_.fit)
+    report["fit"] = {{"iterations", result.fitted.iterations},
+                     {"damped", result.fitted.damped},
+                     {"restored", result.fitted.restored}};
+  add_seconds(seconds, "quality", measuring.seconds());
+  return report;
+}
+
+void RemeshJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
+  if (output == "output") write_mesh(path, result.mesh);
+  else if (output == "preview") write_preview(path, result.mesh);
+  else write_feature_edges(path, result.mesh.feature_edges);
+}
+
+std::vector<ArrayView> RemeshJob::arrays() {
+  return {view("vertices", result.mesh.vertices), view("faces", result.mesh.triangles),
+          view("labels", result.mesh.labels), view("feature_edges", result.mesh.feature_edges)};
+}
+
+}  // namespace bisector::job

@@ -1,0 +1,47 @@
+// remesh: a high-quality triangle mesh of a surface.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bisector/quality.h"
+#include "bisector/remesh.h"
+#include "job/job.h"
+
+namespace bisector::job {
+
+class RemeshJob final : public Job {
+ public:
+  const char* command() const override { return "remesh"; }
+  InputKind input_kind() const override { return {"IN", "surface to remesh"}; }
+  std::vector<OutputKind> outputs() const override;
+  void add_options(CLI::App* app) override;
+  void check_usage(const Usage& usage) override;
+  std::vector<std::string> input_files() const override { return {input, seeds_, feature_file_}; }
+  void read(Journal& journal) override;
+  void check_format(std::string_view output, const std::string& path, Journal& journal) const override;
+  void compute(Journal& journal) override;
+  Json report(Journal& journal) override;
+  void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
+  std::vector<ArrayView> arrays() override;
+
+  std::shared_ptr<const TriangleMesh> surface;  // the input
+  RemeshResult result;
+  QualityReport quality;  // of the result
+
+ private:
+  void complete_options();
+  const TriangleMesh& remeshed_surface() const { return wrapped_.is_null() ? *surface : wrap_mesh_; }
+
+  std::string seeds_, feature_file_;
+  std::string attribute_;            // of the input's vertices, a density
+  double edge_length_relative_ = 0;  // of the input's diagonal; 0: not given
+  double weld_ = -1;                 // not given
+  WrapOption wrap_;
+  RemeshOptions options_;
+  TriangleMesh wrap_mesh_;
+  Json wrapped_;  // null: no wrap
+};
+
+}  // namespace bisector::job

@@ -1,0 +1,169 @@
+#include "job/rvd.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bisector/preview.h"
+#include "compute/compute.h"
+#include "core/stopwatch.h"
+#include "io/files.h"
+#include "job/cells.h"
+#include "job/inputs.h"
+#include "job/messages.h"
+#include "mesh/sampling.h"
+#include "voronoi/tiling.h"
+
+namespace bisector::job {
+namespace {
+
+Json cells_json(const CellMoments& moments, const std::vector<Vec3>& seeds) {
+  Json cells = Json::array();
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    const Moments& m = moments.cells[i];
+    const Json centroid = m.mass > 0 ? point_json(seeds[i] + (1 / m.mass) * m.first) : Json(nullptr);
+    cells.push_back({{"mass", m.mass}, {"centroid", centroid}, {"energy", m.second}});
+  }
+  return cells;
+}
+
+std::vector<Triangle> sorted_dual(const Dual& dual) {
+  std::vector<Triangle> triples = dual.triangles;
+  for (Triangle& t : triples) std::sort(t.begin(), t.end());
+  std::sort(triples.begin(), triples.end());
+  return triples;
+}
+
+// Face and cell, sorted, each once.
+std::vector<std::array<Index, 2>> face_pairs(const RestrictedPolygons& polygons, const TriangleMesh& mesh) {
+  std::vector<std::array<Index, 2>> pairs;
+  for (const auto& [triangle, cell] : polygons.pairs)
+    pairs.push_back({mesh.face_of_triangle.empty() ? triangle : mesh.face_of_triangle[triangle], cell});
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+}  // namespace
+
+std::vector<OutputKind> RvdJob::outputs() const {
+  return {{"output", "-o", "FILE.ply", "write the cells as coloured polygons", {".ply"}},
+          {"pairs",
+           "--pairs",
+           "FILE",
+           "write \"face seed\" lines, one for each face (counted\n"
+           "from 0 in the input) and cell that meet, sorted",
+           {}},
+          {"preview", "--preview", "FILE.png", "draw a picture of the cells", {".png"}}};
+}
+
+void RvdJob::add_options(CLI::App* app) {
+  add_file(app, "--seeds", seeds_file_, "FILE.xyz", "the seeds, as \"x y z\" lines")->group("Seeds");
+  app->add_option("-n", count_, "so many random seeds instead")
+      ->type_name("N")
+      ->check(whole_number(1, kMostSeeds))
+      ->group("Seeds");
+  add_random_seed(app, random_seed_, "another number, another start; default 1")->group("Seeds");
+  add_compute_options(app, compute_);
+  add_threads(app, threads);
+}
+
+void RvdJob::check_usage(const Usage& usage) {
+  const bool has_seeds = usage.given("--seeds");
+  if (!has_seeds && count_ == 0) throw CLI::ValidationError("which seeds? give --seeds FILE.xyz or -n N");
+  if (has_seeds && usage.given("--random-seed"))
+    throw CLI::ValidationError("--random-seed: seeds from a file are not random; leave one of the two out");
+}
+
+void RvdJob::read(Journal& journal) {
+  const Stopwatch reading;
+  surface = read_surface(input, given.mesh, journal);
+  if (given.seeds || !seeds_file_.empty()) {
+    seeds = read_seeds(seeds_file_, given, count_);
+  } else {
+    for (const SurfaceSample& sample : sample_surface(*surface, count_, random_seed_)) seeds.push_back(sample.point);
+  }
+  io_ = reading.seconds();
+}
+
+void RvdJob::compute(Journal& journal) {
+  journal.phase("computing the diagram");
+  const Surface domain(*surface);
+  const std::unique_ptr<Backend> backend = make_backend(domain, compute_, journal.context());
+  const Stopwatch computing;
+  evaluation = backend->evaluate(seeds, Want::polygons | Want::dual, diagram);
+  device = backend->description();
+  if (const std::size_t untiled = count_untiled(backend->surface(), diagram.polygons); untiled > 0)
+    throw Error(fmt::format("the diagram does not tile {} of the input; please report this as a bug",
+                            counted(untiled, "triangle", "triangles")));
+  const double computing_seconds = computing.seconds();
+  if (std::abs(diagram.moments.mass - domain.mass) > backend->mass_tolerance() * domain.mass)
+    journal.warn(fmt::format("the masses of the cells sum to {}, the area is {}", diagram.moments.mass, domain.mass));
+  const DiagramSeconds& phases = evaluation.seconds;
+  seconds.update(seconds_json(phases));
+  seconds["extract"] = computing_seconds - (phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
+  seconds["io"] = io_;
+}
+
+const PolygonMesh& RvdJob::cells() {
+  if (cells_.labels.empty()) cells_ = coloured_cells(diagram.polygons, seeds.size());
+  return cells_;
+}
+
+Json RvdJob::report(Journal&) {
+  Json report = start_report(command());
+  report["device"] = device_json(device);
+  report["input"] = input_json(*surface);
+  report["energy"] = diagram.moments.energy;
+  report["mass"] = diagram.moments.mass;
+  report["untiled"] = 0;  // a diagram that does not tile is not reported
+  report["seconds"] = nullptr;
+  add_device(report, device, evaluation.seconds.device, evaluation.device_work, 1);
+  report["certification"] = certification_json(evaluation.certification);
+  report["cells"] = cells_json(diagram.moments, seeds);
+  report["rdt"] = sorted_dual(diagram.dual);
+  return report;
+}
+
+void RvdJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
+  if (output == "output") return write_polygons(path, cells());
+  if (output == "pairs") {
+    fmt::memory_buffer text;
+    for (const auto& [face, cell] : face_pairs(diagram.polygons, *surface))
+      fmt::format_to(std::back_inserter(text), "{} {}\n", face, cell);
+    return write_file(path, fmt::to_string(text));
+  }
+  PreviewOptions picture;
+  picture.edges = false;
+  picture.outlines = seeds.size() <= 30'000;  // beyond, cells have too few pixels
+  picture.colours = cells().colours;
+  write_preview(path, cells().vertices, cells().polygons, picture);
+}
+
+std::vector<ArrayView> RvdJob::arrays() {
+  if (masses_.empty()) {
+    for (std::size_t i = 0; i < seeds.size(); ++i) {
+      const Moments& m = diagram.moments.cells[i];
+      constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+      masses_.push_back(m.mass);
+      energies_.push_back(m.second);
+      centroids_.push_back(m.mass > 0 ? seeds[i] + (1 / m.mass) * m.first : Vec3{kNan, kNan, kNan});
+    }
+    rdt_ = sorted_dual(diagram.dual);
+    pairs_ = face_pairs(diagram.polygons, *surface);
+    cell_offsets_.assign(cells().polygons.offsets.begin(), cells().polygons.offsets.end());
+  }
+  return {view("seeds", seeds),
+          view("masses", masses_),
+          view("centroids", centroids_),
+          view("energies", energies_),
+          view("rdt", rdt_),
+          view("pairs", pairs_),
+          view("polygon_vertices", cells().vertices),
+          view("polygon_offsets", cell_offsets_),
+          view("polygon_cells", cells().labels)};
+}
+
+}  // namespace bisector::job

@@ -1,0 +1,51 @@
+// rvd: one restricted Voronoi diagram.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bisector/device.h"
+#include "bisector/io.h"
+#include "job/job.h"
+#include "voronoi/diagram.h"
+
+namespace bisector::job {
+
+class RvdJob final : public Job {
+ public:
+  const char* command() const override { return "rvd"; }
+  InputKind input_kind() const override { return {"IN", "surface: .off, .obj, .ply or .stl"}; }
+  std::vector<OutputKind> outputs() const override;
+  void add_options(CLI::App* app) override;
+  void check_usage(const Usage& usage) override;
+  std::vector<std::string> input_files() const override { return {input, seeds_file_}; }
+  void read(Journal& journal) override;
+  void compute(Journal& journal) override;
+  Json report(Journal& journal) override;
+  void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
+  std::vector<ArrayView> arrays() override;
+
+  std::shared_ptr<const TriangleMesh> surface;  // the input
+  std::vector<Vec3> seeds;
+  BackendDescription device;  // that computed
+  EvaluationReport evaluation;
+  Diagram diagram;
+
+ private:
+  const PolygonMesh& cells();
+
+  std::string seeds_file_;
+  std::size_t count_ = 0;
+  std::uint64_t random_seed_ = 1;
+  ComputeOptions compute_;
+  PolygonMesh cells_;  // made when they are asked for
+  std::vector<std::array<Index, 2>> pairs_;
+  // For arrays().
+  std::vector<double> masses_, energies_;
+  std::vector<Vec3> centroids_;
+  std::vector<Triangle> rdt_;
+  std::vector<Index> cell_offsets_;
+};
+
+}  // namespace bisector::job

@@ -1,0 +1,290 @@
+#include "job/tet.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "bisector/io.h"
+#include "bisector/preview.h"
+#include "core/geometry.h"
+#include "core/stopwatch.h"
+#include "job/messages.h"
+#include "job/outputs.h"
+#include "job/words.h"
+#include "remesh/topology_control.h"
+
+namespace bisector::job {
+namespace {
+
+// Degrees; a mesh with a dihedral angle below this is warned of.
+constexpr double kPoorDihedral = 8;
+
+// Path and name in "FILE" or "FILE:NAME".
+std::pair<std::string, std::string> split_sizes(const std::string& word) {
+  const std::size_t colon = word.rfind(':');
+  std::error_code error;
+  if (colon == std::string::npos || colon + 1 == word.size() || std::filesystem::exists(word, error)) return {word, ""};
+  return {word.substr(0, colon), word.substr(colon + 1)};
+}
+
+SizeSamples read_sizes(const std::string& word) {
+  const auto [path, name] = split_sizes(word);
+  const TetMesh mesh = read_tet_mesh(path);
+  return {mesh.vertices, read_tet_attribute(path, name), mesh.tets};
+}
+
+TriangleMesh boundary_mesh(const TetMesh& mesh) {
+  TriangleMesh surface;
+  surface.vertices = mesh.vertices;
+  surface.triangles = mesh.boundary;
+  surface.feature_edges = mesh.feature_edges;
+  return surface;
+}
+
+Json improved_json(const TetImproveReport& improved) {
+  const auto shapes = [](const TetShapes& s) -> Json {
+    return {{"dihedral_min", s.dihedral_min},
+            {"dihedral_max", s.dihedral_max},
+            {"radius_ratio_min", s.radius_ratio_min},
+            {"radius_ratio_mean", s.radius_ratio_mean},
+            {"below_goal", s.below}};
+  };
+  return {{"rounds", improved.rounds},
+          {"edge_removals", improved.edge_removals},
+          {"face_removals", improved.face_removals},
+          {"contractions", improved.contractions},
+          {"insertions", improved.insertions},
+          {"moves", improved.moves},
+          {"before", shapes(improved.before)},
+          {"after", shapes(improved.after)}};
+}
+
+Json tet_seconds(const TetSeconds& seconds) {
+  Json json{{"total", seconds.total}};
+  json.update(seconds_json(seconds.diagrams));
+  json["lbfgs"] = seconds.lbfgs;
+  json["extract"] = seconds.extract;
+  json["background"] = seconds.background;
+  json["prepare"] = seconds.prepare;
+  json["boundary"] = seconds.boundary;
+  json["improve"] = seconds.improve;
+  json["tet"] = seconds.total;
+  return json;
+}
+
+void warn_of(Journal& journal, const TetOptions& options, const TetResult& result, const TetJob::Measures& measures) {
+  const FeatureResult& features = result.boundary.features;
+  if (features.broken > 0)
+    journal.warn(fmt::format("{} of {} are not chains of edges of the output; ask for more vertices", features.broken,
+                             counted(features.curves, "feature curve", "feature curves")));
+  if (!same_topology(measures.topology.boundary, result.input_topology))
+    journal.warn(fmt::format("the boundary's topology ({}) is not the input's ({}); ask for more vertices",
+                             describe(measures.topology.boundary), describe(result.input_topology)));
+  if (options.min_dihedral > kPoorDihedral && measures.tets.dihedral_min < kPoorDihedral)
+    journal.warn(
+        fmt::format("a dihedral angle is {:.2f} degrees only: the boundary has acute edges or parts thinner than its "
+                    "edges; ask for more vertices",
+                    measures.tets.dihedral_min));
+  const std::size_t count = result.mesh.vertices.size();
+  if (std::max(count, result.wanted) - std::min(count, result.wanted) > result.wanted / 20)
+    journal.warn(fmt::format("{} instead of {}: {}", counted(count, "vertex", "vertices"), result.wanted,
+                             count > result.wanted ? "the boundary's shape and good angles took as many"
+                                                   : "no more fitted inside the boundary"));
+}
+
+}  // namespace
+
+Json size_json(const Domain& domain) {
+  if (!domain.tets) return input_json(*domain.surface);
+  return {{"vertices", domain.tets->vertices.size()},
+          {"faces", domain.surface->triangles.size()},
+          {"tets", domain.tets->tets.size()}};
+}
+
+std::vector<OutputKind> TetJob::outputs() const {
+  return {{"output", "-o", "FILE", "mesh to write: .mesh, .msh or .vtu", kTetFormats, true},
+          {"boundary", "--boundary", "FILE", "also write the boundary's triangles: .off, .obj, .ply\nor .stl",
+           kMeshFormats},
+          {"preview",
+           "--preview",
+           "FILE.png",
+           "draw a picture of the result, cut open",
+           {".png"},
+           false,
+           false,
+           "preview"}};
+}
+
+void TetJob::add_options(CLI::App* app) {
+  app->add_option("-n", options_.vertices, "vertices of the result, about; at least 8")
+      ->type_name("N")
+      ->check(whole_number(8, kMostSeeds))
+      ->group("Seeds");
+  add_file(app, "--seeds", seeds_, "FILE.xyz",
+           "start from these points (\"x y z\" lines) inside the\n"
+           "solid; -n is then not needed")
+      ->group("Seeds");
+  add_random_seed(app, options_.random_seed, "another number, another start; default 1")->group("Seeds");
+  add_edge_length(app, options_.edge_length, edge_length_relative_);
+  add_density(app, options_.sizing.field, attribute_,
+              "where tetrahedra are smaller: uniform (default),\n"
+              "lfs[:EXP] or curvature[:EXP] of the boundary, with the\n"
+              "edge lengths that 'bisector remesh' has for them, or\n"
+              "attribute:NAME (of the input's vertices; edges are as\n"
+              "long as its power -1/5)");
+  add_file(app, "--sizes", sizes_, "FILE[:NAME]",
+           "edge lengths at the vertices of a mesh (.vtk, .vtu with\n"
+           "point data NAME; .mesh with a .sol beside it), instead\n"
+           "of a density; -n makes them a matter of proportion")
+      ->group("Size");
+  app->add_option("--gradation", options_.sizing.field.gradation,
+                  "edge lengths grow by at most so much per length into\n"
+                  "the solid; default 0.2. Not for uniform density")
+      ->type_name("G")
+      ->check(number_below(10))
+      ->group("Size");
+  add_edge_bounds(app, options_.sizing.field);
+  add_features(app, options_.features,
+               "sharp edges to keep: auto (default), none, or all with a\n"
+               "dihedral deviation of so many degrees. Edges between face\n"
+               "labels are kept unless none");
+  add_words(app, "--detail", options_.detail, kDetailWords,
+            "what is finer than the boundary's edges: auto (smaller\n"
+            "edges where the vertices suffice, else merged; default),\n"
+            "all (as many vertices as it takes) or off")
+      ->group("Features");
+  add_feature_file(app, feature_file_);
+  add_weld(app, weld_);
+  add_wrap(app, wrap_);
+  app->add_option("--min-angle", options_.min_angle,
+                  "degrees that all angles of the boundary's triangles\n"
+                  "should exceed; 0: as they are; default 40")
+      ->type_name("A")
+      ->check(number_below(60))
+      ->group("Optimisation");
+  app->add_option("--min-dihedral", options_.min_dihedral,
+                  "degrees that all dihedral angles should exceed; 0: keep\n"
+                  "slivers; default 30")
+      ->type_name("A")
+      ->check(number_below(55))
+      ->group("Optimisation");
+  add_iterations(app, options_.iterations, "steps, of which each phase may make a share; default 100");
+  add_tolerance(app, options_.tolerance,
+                "end a phase when the energy falls by less than this\n"
+                "share per iteration; default 1e-6");
+  add_compute_options(app, options_.compute);
+  add_threads(app, threads);
+}
+
+void TetJob::check_usage(const Usage& usage) {
+  usage.check_number_of_vertices();
+  usage.check_wrap(attribute_);
+  if (usage.given("--sizes")) usage.refuse("--density", "sizes come from --sizes; leave one of the two out");
+  const SizingOptions& sizing = options_.sizing.field;
+  if (usage.given("--gradation") && sizing.gradation == 0)
+    throw CLI::ValidationError("--gradation: sizes inside a solid grow from its boundary; it must not be 0");
+  usage.check_edge_bounds(sizing);
+  if (sizing.kind == DensityKind::uniform && !usage.given("--sizes")) usage.check_uniform_density();
+}
+
+std::vector<std::string> TetJob::input_files() const {
+  return {input, seeds_, feature_file_, split_sizes(sizes_).first};
+}
+
+void TetJob::complete_options() {
+  if (!attribute_.empty())
+    options_.sizing.field.attribute = read_density(input, attribute_, given, domain.surface->vertices.size());
+  if (!given.sizes.lengths.empty()) options_.sizing.sizes = given.sizes;
+  else if (!sizes_.empty()) options_.sizing.sizes = read_sizes(sizes_);
+  if (!feature_file_.empty()) options_.features.given = read_feature_edges(feature_file_, *domain.surface);
+  if (edge_length_relative_ > 0)
+    options_.edge_length = edge_length_relative_ * bounding_box(domain.surface->vertices).diagonal();
+  if (weld_ >= 0) options_.weld = weld_;
+  leave_out_folds(wrap_, options_.features);
+  options_.threads = threads;
+  if (given.seeds || !seeds_.empty()) {
+    options_.seeds = read_seeds(seeds_, given, options_.vertices);
+    options_.vertices = options_.seeds.size();
+  }
+}
+
+void TetJob::read(Journal& journal) {
+  const Stopwatch reading;
+  domain = read_domain(input, given.mesh, false, journal);
+  complete_options();
+  io_ = reading.seconds();
+  wrapped_ = wrap_if_asked(wrap_, *domain.surface, options_.vertices, options_.edge_length, true, journal, wrap_mesh_);
+}
+
+void TetJob::compute(Journal& journal) {
+  const Context context = journal.context();
+  result = !wrapped_.is_null() ? tetrahedralise(wrap_mesh_, options_, context)
+           : domain.tets       ? tetrahedralise(*domain.tets, options_, context)
+                               : tetrahedralise(*domain.surface, options_, context);
+  if (result.untiled > 0)
+    throw Error(fmt::format("the final diagram does not tile {} of the input; please report this as a bug",
+                            counted(result.untiled, "tetrahedron or triangle", "tetrahedra or triangles")));
+  seconds = tet_seconds(result.seconds);
+  const Stopwatch measuring;
+  measures.tets = measure_tet_quality(result.mesh);
+  measures.boundary = measure_quality(boundary_mesh(result.mesh));
+  measures.topology = analyse_tet_topology(result.mesh);
+  seconds["quality"] = measuring.seconds();
+  seconds["io"] = io_;
+  warn_of(journal, options_, result, measures);
+}
+
+Json TetJob::report(Journal& journal) {
+  const Stopwatch measuring;
+  Json report = start_report(command());
+  report["device"] = device_json(result.device);
+  report["input"] = size_json(domain);
+  report["output"] = size_json(result.mesh);
+  report["background"] = {{"tets", result.background_tets}};
+  report["iterations"] = result.iterations;
+  report["evaluations"] = result.evaluations;
+  report["energy"] = result.energy;
+  report["gradient_norm"] = result.gradient_norm;
+  report["seconds"] = nullptr;
+  add_device(report, result.device, result.seconds.diagrams.device, result.device_work, result.evaluations);
+  report["certification"] = certification_json(result.certification);
+  report["quality"] = quality_json(measures.boundary);
+  add_tets(report["quality"], measures.tets);
+  journal.phase("measuring the distance of the boundary to the input");
+  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), *domain.surface));
+  report["quality"]["volume_input"] = result.volume;
+  report["topology"] = topology_json(measures.topology.boundary);
+  add_tets(report["topology"], measures.topology);
+  report["topology"]["matches_input"] = same_topology(measures.topology.boundary, result.input_topology);
+  report["topology"]["ball_property"] = result.boundary.ball_property;
+  report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
+  report["detail"] = detail_json(result.detail, result.boundary.features.curves);
+  report["sizing"] = {
+      {"wanted", result.wanted}, {"edge_length", result.edge_length}, {"boundary_vertices", result.boundary_vertices}};
+  report["conform"] = {{"delaunay", result.delaunay},
+                       {"steiner_points", result.steiner_points},
+                       {"refused_sites", result.refused_sites}};
+  if (options_.min_dihedral > 0) report["improved"] = improved_json(result.improved);
+  if (!wrapped_.is_null()) report["wrap"] = wrapped_;
+  add_seconds(seconds, "quality", measuring.seconds());
+  return report;
+}
+
+void TetJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
+  if (output == "output") write_tet_mesh(path, result.mesh);
+  else if (output == "boundary") write_mesh(path, boundary_surface(result.mesh));
+  else write_tet_preview(path, result.mesh);
+}
+
+std::vector<ArrayView> TetJob::arrays() {
+  const TetMesh& mesh = result.mesh;
+  return {view("vertices", mesh.vertices),      view("tets", mesh.tets),
+          view("faces", mesh.boundary),         view("regions", mesh.regions),
+          view("labels", mesh.boundary_labels), view("feature_edges", mesh.feature_edges)};
+}
+
+}  // namespace bisector::job

@@ -1,0 +1,53 @@
+// tet: a high-quality tetrahedral mesh of a solid.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bisector/quality.h"
+#include "bisector/tetmesh.h"
+#include "job/inputs.h"
+#include "job/job.h"
+
+namespace bisector::job {
+
+class TetJob final : public Job {
+ public:
+  struct Measures {
+    TetQualityReport tets;
+    QualityReport boundary;
+    TetTopology topology;
+  };
+
+  const char* command() const override { return "tet"; }
+  InputKind input_kind() const override { return {"IN", "closed surface or tetrahedral mesh"}; }
+  std::vector<OutputKind> outputs() const override;
+  void add_options(CLI::App* app) override;
+  void check_usage(const Usage& usage) override;
+  std::vector<std::string> input_files() const override;
+  void read(Journal& journal) override;
+  void compute(Journal& journal) override;
+  Json report(Journal& journal) override;
+  void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
+  std::vector<ArrayView> arrays() override;
+
+  Domain domain;  // the input
+  TetResult result;
+  Measures measures;  // of the result
+
+ private:
+  void complete_options();
+
+  std::string seeds_, sizes_, feature_file_;
+  std::string attribute_;            // of the input's vertices, a density
+  double edge_length_relative_ = 0;  // of the input's diagonal; 0: not given
+  double weld_ = -1;                 // not given
+  WrapOption wrap_;
+  TetOptions options_;
+  TriangleMesh wrap_mesh_;
+  Json wrapped_;  // null: no wrap
+};
+
+Json size_json(const Domain& domain);
+
+}  // namespace bisector::job
