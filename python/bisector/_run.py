@@ -33,6 +33,7 @@ class Progress:
 
 ProgressCallback = Callable[[Progress], Any]
 
+_PATIENCE = 0.7  # seconds that a cancelled call is waited for
 _FOLDER = os.path.dirname(os.path.abspath(__file__)) + os.sep
 
 
@@ -48,7 +49,8 @@ def interruptible(work: Callable[[Any], T], progress: Optional[ProgressCallback]
     """What work(callbacks) gives, which runs in another thread.
 
     `progress` is called in the caller's thread. Whatever is raised here meanwhile, KeyboardInterrupt above all, cancels
-    the work and is raised once that has ended. Warnings come after the work.
+    the work and is raised once that has ended, or after a moment: a step of the library that cannot be broken off ends
+    by itself, and its thread then frees all that it holds. Warnings come after the work.
     """
     news: "queue.SimpleQueue[Optional[Progress]]" = queue.SimpleQueue()
     lines: "list[str]" = []
@@ -87,7 +89,7 @@ def interruptible(work: Callable[[Any], T], progress: Optional[ProgressCallback]
     except BaseException:
         call("cancel_request", cancel.value)
         if worker.is_alive():
-            worker.join()
+            worker.join(_PATIENCE)
         raise
     value, error = outcome.pop()
     for line in lines:
