@@ -81,11 +81,6 @@ def _open() -> ctypes.CDLL:
     try:
         return ctypes.CDLL(name)
     except OSError as error:
-        # The wheel has a C++ library for machines whose own is missing or older.
-        fallback = beside.parent / "fallback" / "libstdc++.so.6"
-        if "libstdc++" in str(error) and fallback.exists():
-            ctypes.CDLL(str(fallback), mode=ctypes.RTLD_GLOBAL)
-            return ctypes.CDLL(name)
         raise ImportError(
             f"Bisector's library cannot be loaded: {error}; install the wheel, or set BISECTOR_LIBRARY to the path of "
             f"{NAME}") from error

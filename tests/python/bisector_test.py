@@ -96,20 +96,21 @@ class SameAsTheProgram(unittest.TestCase):
         self.assertEqual(timeless(report), timeless(json.loads((self.folder / name).read_text())))
 
     def test_remesh(self):
-        self.program("remesh", PART, "-o", "a.ply", "-n", 500, "--features", 30.5, "--min-angle", 35, "--report", "a.json",
+        self.program("remesh", PART, "-o", "a.ply", "-n", 300, "--features", 30.5, "--min-angle", 35, "--detail", "off",
+                     "--iterations", 10, "--report", "a.json",
                      "--feature-output", "a.txt", "--preview", "a.png")
-        r = bs.remesh(PART, n=np.int32(500), features=np.float32(30.5), min_angle=35)
+        r = bs.remesh(PART, n=np.int32(300), features=np.float32(30.5), min_angle=35, detail="off", iterations=10)
         self.expect_same(r.save, "a.ply")
         self.expect_same(r.save_features, "a.txt")
         self.expect_same(r.save_preview, "a.png")
         self.expect_same_report(r.report, "a.json")
-        arrays = bs.remesh(read_off(PART), 500, features=30.5, min_angle=35, threads=1)
+        arrays = bs.remesh(read_off(PART), 300, features=30.5, min_angle=35, detail="off", iterations=10, threads=1)
         self.expect_same(arrays.save, "a.ply")
 
     def test_tetrahedralize(self):
-        self.program("tet", SMOOTH, "-o", "a.msh", "-n", 300, "--iterations", 20, "--report", "a.json", "--boundary",
+        self.program("tet", SMOOTH, "-o", "a.msh", "-n", 200, "--iterations", 8, "--report", "a.json", "--boundary",
                      "b.obj")
-        r = bs.tetrahedralize(SMOOTH, n=300, iterations=20)
+        r = bs.tetrahedralize(SMOOTH, n=200, iterations=8)
         self.expect_same(r.save, "a.msh")
         self.expect_same(r.save_boundary, "b.obj")
         self.expect_same_report(r.report, "a.json")
