@@ -80,6 +80,7 @@ static void test_run(const char* folder) {
   const char *report = NULL, *again = NULL;
   char path[4096];
   int warnings = 0;
+  EXPECT(bisector_options_set(options, "energy", "ccvt") == BISECTOR_OK); /* vertices on the surface */
   callbacks.user = &warnings;
   callbacks.warning = count_warning;
   EXPECT(bisector_run(options, mesh, &callbacks, &result) == BISECTOR_OK);
