@@ -164,7 +164,7 @@ BISECTOR_C_API bisector_status bisector_result_report(const bisector_result* res
                                                       const bisector_callbacks* callbacks, const char** json);
 /* Writes a file as the program does. `what` is "output" (-o), or another of the command's files: "preview",
  * "feature-output" (remesh), "boundary" (tet), "json", "polygons" (segment), "skeleton", "cylinders", "labels" (tree),
- * "pairs" (rvd). */
+ * "pairs" (rvd); or "report", as JSON, or as a page with 3D views if the name of the file ends in .html. */
 BISECTOR_C_API bisector_status bisector_result_save(const bisector_result* result, const char* what, const char* path,
                                                     const bisector_callbacks* callbacks);
 BISECTOR_C_API bisector_status bisector_result_free(bisector_result* result);

@@ -66,6 +66,10 @@ class Result:
             self._report = json.loads(interruptible(lambda callbacks: text("result_report", handle.value, callbacks)))
         return self._report
 
+    def save_report(self, path: "str | os.PathLike[str]") -> None:
+        """Writes `report` as JSON, or, if the name ends in .html, as a page with input and result in 3D views."""
+        self._save(path, "report")
+
     def _save(self, path: "str | os.PathLike[str]", what: str) -> None:
         handle, name = self._handle, path_bytes(path)
         interruptible(lambda callbacks: call("result_save", handle.value, what.encode(), name, callbacks))

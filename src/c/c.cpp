@@ -51,7 +51,8 @@ struct Result : Object {
   std::mutex mutex;  // of all below: what is asked for later is made by whoever asks first
   std::unique_ptr<Job> job;
   std::vector<std::string> warnings;  // of the run
-  std::string report;                 // empty: not made yet
+  Json report;                        // null: not made yet, as below
+  std::string report_text;
   std::vector<job::ArrayView> arrays;
 };
 
@@ -256,6 +257,39 @@ bisector_type type_of(job::ArrayView::Type type) {
   return BISECTOR_INT32;
 }
 
+// The report without the warnings of the run.
+const Json& report_of(Result& result, Journal& journal) {
+  if (!result.report.is_null()) return result.report;
+  Job& job = *result.job;
+  const ThreadLimit limit(job.threads);
+  result.report = job.report(journal);
+  result.report["seconds"] = job.seconds;
+  return result.report;
+}
+
+void save_report(Result& result, const char* path, Journal& journal) {
+  job::check_outputs({{path, {}}}, {});
+  const Json& report = report_of(result, journal);
+  journal.phase("writing " + std::string(path));
+  const ThreadLimit limit(result.job->threads);
+  job::write_report(path, report, result.warnings, job::is_page(path) ? result.job->scene("") : view::Scene{});
+}
+
+void save_output(Result& result, const char* what, const char* path, Journal& journal) {
+  Job& job = *result.job;
+  std::string known = "report";
+  for (const job::OutputKind& kind : job.outputs()) {
+    known += ", " + std::string(kind.name);
+    if (std::strcmp(kind.name, what) != 0) continue;
+    job::check_outputs({{path, kind.extensions}}, {});
+    journal.phase("writing " + std::string(path));
+    job.check_format(kind.name, path, journal);
+    return job.write(kind.name, path, result.warnings);
+  }
+  throw CLI::ValidationError("a result of " + std::string(job.command()) + " has no '" + what + "' to write; it has " +
+                             known);
+}
+
 Json describe(const std::string& command) {
   const std::unique_ptr<Job> job = job_of(command);
   Parser parser(*job);
@@ -453,15 +487,10 @@ bisector_status bisector_result_report(const bisector_result* result, const bise
     require(json, "json");
     const Callbacks called(callbacks);
     const std::lock_guard lock(object->mutex);
-    if (object->report.empty()) {
-      Job& job = *object->job;
-      const bisector::ThreadLimit limit(job.threads);
-      Journal journal(called.listener());
-      Json report = job.report(journal);
-      report["seconds"] = job.seconds;
-      object->report = job::report_text(std::move(report), object->warnings);
-    }
-    *json = object->report.c_str();
+    Journal journal(called.listener());
+    if (object->report_text.empty())
+      object->report_text = job::report_text(report_of(*object, journal), object->warnings);
+    *json = object->report_text.c_str();
   });
 }
 
@@ -473,20 +502,10 @@ bisector_status bisector_result_save(const bisector_result* result, const char* 
     require(path, "path");
     const Callbacks called(callbacks);
     const std::lock_guard lock(object->mutex);
-    Job& job = *object->job;
-    std::string known;
-    for (const job::OutputKind& kind : job.outputs()) {
-      known += (known.empty() ? "" : ", ") + std::string(kind.name);
-      if (std::strcmp(kind.name, what) != 0) continue;
-      if (!*path) throw bisector::Error("the name of the file to write is empty");
-      job::check_outputs({{path, kind.extensions}}, {});
-      Journal journal(called.listener());
-      journal.phase("writing " + std::string(path));
-      job.check_format(kind.name, path, journal);
-      return job.write(kind.name, path, object->warnings);
-    }
-    throw CLI::ValidationError("a result of " + std::string(job.command()) + " has no '" + what +
-                               "' to write; it has " + (known.empty() ? "no files" : known));
+    if (!*path) throw bisector::Error("the name of the file to write is empty");
+    Journal journal(called.listener());
+    if (std::strcmp(what, "report") == 0) save_report(*object, path, journal);
+    else save_output(*object, what, path, journal);
   });
 }
 

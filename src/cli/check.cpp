@@ -37,7 +37,8 @@ void add_options(CLI::App* app, CheckCommand& command) {
             "auto (both, where the device has double), single or double")
       ->group("Computation");
   add_threads(app, command.threads);
-  add_common_options(app, command.common, "write a JSON report with one row for each case; - for\nstdout");
+  add_common_options(app, command.common,
+                     "write a report with one row for each case: JSON, or a\npage if FILE ends in .html; - for stdout");
 }
 
 // The best GPU where the request leaves the choice open.

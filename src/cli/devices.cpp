@@ -25,7 +25,9 @@ struct DevicesCommand {
 };
 
 void add_options(CLI::App* app, DevicesCommand& command) {
-  add_file(app, "--report", command.report, "FILE", "write a JSON report; - for stdout")->group("Output");
+  add_file(app, "--report", command.report, "FILE",
+           "write a report: JSON, or a page if FILE ends in .html;\n- for stdout")
+      ->group("Output");
 }
 
 std::string gibibytes(double bytes) { return fmt::format("{:.1f} GiB", bytes / 0x1p30); }

@@ -61,7 +61,9 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
       job.check_format(kind.name, path, journal);
   job.compute(journal);
   job::Json report;
+  view::Scene scene;
   if (!report_path.empty()) report = job.report(journal);
+  if (job::is_page(report_path)) scene = job.scene(kinds.empty() ? "" : files.outputs.at(kinds.front().name));
 
   journal.phase("writing");
   stop_watching_interrupts();
@@ -74,7 +76,7 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
   job.seconds["total"] = total.seconds();
   if (!report_path.empty()) {
     report["seconds"] = job.seconds;
-    job::write_report(report_path, report, journal.warnings());
+    job::write_report(report_path, report, journal.warnings(), scene);
   }
   print_summary(console, job, files);
   std::vector<std::string> written;

@@ -109,7 +109,8 @@ Command add_quality(CLI::App& program) {
       {"Measure angles, topology and distance to another mesh.", "bisector quality MESH [--reference IN] [options]",
        "Example:\n"
        "  bisector quality out.obj --reference bunny.off",
-       "write a JSON report; - for stdout"},
+       "write a report: JSON, or a page with 3D views if FILE\n"
+       "ends in .html; - for stdout"},
       [](Console& console, const Job& job, const JobFiles& files) {
         print_summary(console, dynamic_cast<const QualityJob&>(job), files);
       });

@@ -50,8 +50,9 @@ Command add_remesh(CLI::App& program) {
        "  bisector remesh part.stl -o out.ply -n 5000 --report out.json --preview out.png\n"
        "  bisector remesh part.stl -o out.ply --edge-length 0.5 --features 30\n\n"
        "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written.",
-       "write a JSON report with quality, distance to the\n"
-       "input and timings; - for stdout"},
+       "write a report with quality, distance to the input and\n"
+       "timings: JSON, or a page with 3D views if FILE ends in\n"
+       ".html; - for stdout"},
       [](Console& console, const Job& job, const JobFiles& files) {
         print_summary(console, dynamic_cast<const RemeshJob&>(job), files);
       });

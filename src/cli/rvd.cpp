@@ -40,8 +40,9 @@ Command add_rvd(CLI::App& program) {
                   "Examples:\n"
                   "  bisector rvd bunny.off -n 500 -o cells.ply --preview cells.png\n"
                   "  bisector rvd bunny.off --seeds points.xyz --report -",
-                  "write a JSON report with all cells and the restricted\n"
-                  "Delaunay triangulation (rdt); - for stdout"},
+                  "write a report with all cells and the restricted\n"
+                  "Delaunay triangulation (rdt): JSON, or a page with 3D\n"
+                  "views if FILE ends in .html; - for stdout"},
                  [](Console& console, const Job& job, const JobFiles& files) {
                    print_summary(console, dynamic_cast<const RvdJob&>(job), files);
                  });

@@ -77,8 +77,9 @@ Command add_segment(CLI::App& program) {
                   ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C "
                   "stops the run; nothing is\n"
                   "written.",
-                  "write a JSON report with type, parameters and error of\n"
-                  "each region; - for stdout"},
+                  "write a report with type, parameters and error of each\n"
+                  "region: JSON, or a page with 3D views if FILE ends in\n"
+                  ".html; - for stdout"},
                  [](Console& console, const Job& job, const JobFiles& files) {
                    print_summary(console, dynamic_cast<const SegmentJob&>(job), files);
                  });

@@ -58,8 +58,9 @@ Command add_tet(CLI::App& program) {
        "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, "
        ".vtk, .vtu). Ctrl-C stops the run;\n"
        "nothing is written.",
-       "write a JSON report with quality, distance of the\n"
-       "boundary to the input and timings; - for stdout"},
+       "write a report with quality, distance of the boundary to\n"
+       "the input and timings: JSON, or a page with 3D views if\n"
+       "FILE ends in .html; - for stdout"},
       [](Console& console, const Job& job, const JobFiles& files) {
         print_summary(console, dynamic_cast<const TetJob&>(job), files);
       });

@@ -66,8 +66,9 @@ Command add_tree(CLI::App& program) {
                   "  bisector tree street.las -o trees.obj --scene --cylinders trees.csv\n\n"
                   "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
                   "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written.",
-                  "write a JSON report with branches, volume, distances of\n"
-                  "the points and timings; - for stdout"},
+                  "write a report with branches, volume, distances of the\n"
+                  "points and timings: JSON, or a page with 3D views if\n"
+                  "FILE ends in .html; - for stdout"},
                  [](Console& console, const Job& job, const JobFiles& files) {
                    print_summary(console, dynamic_cast<const TreeJob&>(job), files);
                  });

@@ -18,6 +18,7 @@
 #include "job/journal.h"
 #include "job/options.h"
 #include "job/report.h"
+#include "view/scene.h"
 
 namespace bisector::job {
 
@@ -65,20 +66,20 @@ struct ArrayView {
   std::size_t rows, columns;
 };
 
-inline ArrayView view(const char* name, const std::vector<Vec3>& rows) {
+inline ArrayView array_of(const char* name, const std::vector<Vec3>& rows) {
   return {name, ArrayView::Type::double_, rows.data(), rows.size(), 3};
 }
 template <std::size_t N>
-ArrayView view(const char* name, const std::vector<std::array<Index, N>>& rows) {
+ArrayView array_of(const char* name, const std::vector<std::array<Index, N>>& rows) {
   return {name, ArrayView::Type::uint32, rows.data(), rows.size(), N};
 }
-inline ArrayView view(const char* name, const std::vector<double>& rows) {
+inline ArrayView array_of(const char* name, const std::vector<double>& rows) {
   return {name, ArrayView::Type::double_, rows.data(), rows.size(), 1};
 }
-inline ArrayView view(const char* name, const std::vector<Index>& rows) {
+inline ArrayView array_of(const char* name, const std::vector<Index>& rows) {
   return {name, ArrayView::Type::uint32, rows.data(), rows.size(), 1};
 }
-inline ArrayView view(const char* name, const std::vector<std::int32_t>& rows) {
+inline ArrayView array_of(const char* name, const std::vector<std::int32_t>& rows) {
   return {name, ArrayView::Type::int32, rows.data(), rows.size(), 1};
 }
 
@@ -123,6 +124,8 @@ class Job {
   virtual Json report(Journal& journal) = 0;
   // Writes an output, one of those that outputs() names; `warnings` are those of the run.
   virtual void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) = 0;
+  // Input and result for the page of a report; `output`: the name of the file that holds the result, for its title.
+  virtual view::Scene scene(const std::string& output) = 0;
   // What the result consists of.
   virtual std::vector<ArrayView> arrays() { return {}; }
 

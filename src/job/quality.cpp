@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/stopwatch.h"
+#include "mesh/tet_topology.h"
 
 namespace bisector::job {
 
@@ -53,6 +54,25 @@ Json QualityJob::report(Journal&) {
   report["topology"] = topology_json(measures.quality.topology);
   if (mesh.tets) add_tets(report["topology"], measures.tet_topology);
   return report;
+}
+
+view::Scene QualityJob::scene(const std::string&) {
+  view::Scene scene;
+  std::vector<std::vector<std::int32_t>> labels, regions;
+  const auto add = [&](const std::string& title, const std::string& file, const Domain& domain) {
+    scene.models.push_back(domain.tets
+                               ? view::solid_model(title, file, *domain.tets, boundary_facets(domain.tets->tets))
+                               : view::surface_model(title, file, *domain.surface));
+    labels.push_back(domain.tets ? std::vector<std::int32_t>{} : domain.surface->labels);
+    regions.push_back(domain.tets ? domain.tets->regions : std::vector<std::int32_t>{});
+  };
+  if (reference.surface) add("Reference", reference_file, reference);
+  add("Mesh", input, mesh);
+  view::measure_shapes(scene);
+  if (reference.surface) view::measure_distances(scene);
+  view::add_labels(scene, {"label", "Face label", "", view::Element::triangle}, labels);
+  view::add_labels(scene, {"region", "Region", "", view::Element::tet}, regions);
+  return scene;
 }
 
 }  // namespace bisector::job

@@ -32,6 +32,7 @@ class QualityJob final : public Job {
   void read(Journal& journal) override;
   void compute(Journal& journal) override;
   Json report(Journal& journal) override;
+  view::Scene scene(const std::string& output) override;
   void write(std::string_view, const std::string&, const std::vector<std::string>&) override {}
 
   std::string reference_file;

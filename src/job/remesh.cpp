@@ -263,6 +263,15 @@ Json RemeshJob::report(Journal& journal) {
   return report;
 }
 
+view::Scene RemeshJob::scene(const std::string& output) {
+  view::Scene scene;
+  scene.models = {view::surface_model("Input", input, *surface), view::surface_model("Result", output, result.mesh)};
+  view::measure_shapes(scene);
+  view::measure_distances(scene);
+  view::add_labels(scene, {"label", "Face label", "", view::Element::triangle}, {surface->labels, result.mesh.labels});
+  return scene;
+}
+
 void RemeshJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
   if (output == "output") write_mesh(path, result.mesh);
   else if (output == "preview") write_preview(path, result.mesh);
@@ -270,8 +279,8 @@ void RemeshJob::write(std::string_view output, const std::string& path, const st
 }
 
 std::vector<ArrayView> RemeshJob::arrays() {
-  return {view("vertices", result.mesh.vertices), view("faces", result.mesh.triangles),
-          view("labels", result.mesh.labels), view("feature_edges", result.mesh.feature_edges)};
+  return {array_of("vertices", result.mesh.vertices), array_of("faces", result.mesh.triangles),
+          array_of("labels", result.mesh.labels), array_of("feature_edges", result.mesh.feature_edges)};
 }
 
 }  // namespace bisector::job

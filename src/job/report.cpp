@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <utility>
 
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "io/files.h"
+#include "job/outputs.h"
+#include "view/page.h"
 
 namespace bisector::job {
 namespace {
@@ -36,6 +39,13 @@ void append(std::string& out, const Json& value, std::size_t indent) {
     separator = ",\n";
   }
   out += '\n' + std::string(indent, ' ') + (rows ? ']' : '}');
+}
+
+std::string page_title(const Json& report, const view::Scene& scene) {
+  std::string title = "bisector " + report["command"].get<std::string>();
+  if (scene.models.empty()) return title;
+  title += ": " + std::filesystem::path(scene.models.front().file).filename().string();
+  return title;
 }
 
 }  // namespace
@@ -198,8 +208,13 @@ std::string report_text(Json report, const std::vector<std::string>& warnings) {
   return text + '\n';
 }
 
-void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings) {
+bool is_page(const std::string& report_path) { return extension_of(report_path) == ".html"; }
+
+void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings,
+                  const view::Scene& scene) {
+  const std::string title = is_page(path) ? page_title(report, scene) : "";
   const std::string text = report_text(std::move(report), warnings);
+  if (is_page(path)) return write_file(path, view::report_page(title, text, scene));
   if (path != "-") return write_file(path, text);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
     throw Error("the report cannot be written to stdout; check where it is redirected to");

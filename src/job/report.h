@@ -1,4 +1,4 @@
-// JSON reports of runs. Their keys are a stable contract.
+// Reports of runs: JSON, or a page that shows it. Their keys are a stable contract.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,6 +10,7 @@
 #include "core/geometry.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"
+#include "view/scene.h"
 
 namespace bisector::job {
 
@@ -43,7 +44,10 @@ void add_seconds(Json& seconds, const char* key, double value);
 
 // The report with the run's warnings, as text.
 std::string report_text(Json report, const std::vector<std::string>& warnings);
+// Whether a report goes to an HTML page, which shows a scene, too.
+bool is_page(const std::string& report_path);
 // Writes that to a file, or to stdout if the path is "-". Throws Error.
-void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings);
+void write_report(const std::string& path, Json report, const std::vector<std::string>& warnings,
+                  const view::Scene& scene = {});
 
 }  // namespace bisector::job

@@ -127,6 +127,31 @@ Json RvdJob::report(Journal&) {
   return report;
 }
 
+// The cells in the place of the input, cut up as they are, and the dual.
+view::Scene RvdJob::scene(const std::string&) {
+  view::Scene scene;
+  scene.models = {{"Dual", "", seeds, diagram.dual.triangles}};
+  view::measure_shapes(scene);
+
+  view::Model divided{"Cells", input, cells().vertices};
+  divided.edges = false;
+  view::Measure groups{"cell", "Cell", "", view::Element::triangle};
+  for (std::size_t i = 0; i < seeds.size(); ++i) groups.names.push_back(fmt::to_string(i));
+  groups.colours.resize(seeds.size());
+  std::vector<double> cell_of;
+  for (std::size_t k = 0; k < cells().polygons.rows(); ++k) {
+    const Index* const corner = cells().polygons.begin(k);
+    groups.colours[cells().labels[k]] = cells().colours[k];
+    for (std::size_t i = 2; i < cells().polygons.size(k); ++i) {
+      divided.triangles.push_back({corner[0], corner[i - 1], corner[i]});
+      cell_of.push_back(cells().labels[k]);
+    }
+  }
+  scene.models.insert(scene.models.begin(), std::move(divided));
+  view::add_groups(scene, 0, groups, std::move(cell_of));
+  return scene;
+}
+
 void RvdJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
   if (output == "output") return write_polygons(path, cells());
   if (output == "pairs") {
@@ -155,15 +180,15 @@ std::vector<ArrayView> RvdJob::arrays() {
     pairs_ = face_pairs(diagram.polygons, *surface);
     cell_offsets_.assign(cells().polygons.offsets.begin(), cells().polygons.offsets.end());
   }
-  return {view("seeds", seeds),
-          view("masses", masses_),
-          view("centroids", centroids_),
-          view("energies", energies_),
-          view("rdt", rdt_),
-          view("pairs", pairs_),
-          view("polygon_vertices", cells().vertices),
-          view("polygon_offsets", cell_offsets_),
-          view("polygon_cells", cells().labels)};
+  return {array_of("seeds", seeds),
+          array_of("masses", masses_),
+          array_of("centroids", centroids_),
+          array_of("energies", energies_),
+          array_of("rdt", rdt_),
+          array_of("pairs", pairs_),
+          array_of("polygon_vertices", cells().vertices),
+          array_of("polygon_offsets", cell_offsets_),
+          array_of("polygon_cells", cells().labels)};
 }
 
 }  // namespace bisector::job

@@ -23,6 +23,7 @@ class RvdJob final : public Job {
   void read(Journal& journal) override;
   void compute(Journal& journal) override;
   Json report(Journal& journal) override;
+  view::Scene scene(const std::string& output) override;
   void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
   std::vector<ArrayView> arrays() override;
 

@@ -281,6 +281,22 @@ Json SegmentJob::report(Journal& journal) {
   return report;
 }
 
+view::Scene SegmentJob::scene(const std::string& output) {
+  view::Measure region{"region", "Region", "", view::Element::triangle};
+  for (std::string name : region_names(result)) {
+    std::replace(name.begin(), name.end(), '_', ' ');
+    region.names.push_back(fmt::format("{} {}", region.names.size(), name));
+  }
+  region.colours = colours_;
+  view::Scene scene;
+  scene.models = {view::surface_model("Input", input, *surface), view::surface_model("Regions", output, mesh)};
+  scene.models[1].edges = false;
+  view::add_groups(scene, 1, region, {mesh.labels.begin(), mesh.labels.end()});
+  view::measure_shapes(scene);
+  if (!result.projected.empty()) view::measure_distances(scene);
+  return scene;
+}
+
 void SegmentJob::write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) {
   if (output == "output") return write_regions(path, mesh, result, colours_);
   if (output == "json") return write_report(path, trims_json(input, mesh, result, borders()), warnings);
@@ -298,15 +314,15 @@ void SegmentJob::write(std::string_view output, const std::string& path, const s
 }
 
 std::vector<ArrayView> SegmentJob::arrays() {
-  std::vector<ArrayView> views{view("vertices", mesh.vertices), view("faces", mesh.triangles),
-                               view("labels", mesh.labels), view("feature_edges", mesh.feature_edges)};
+  std::vector<ArrayView> views{array_of("vertices", mesh.vertices), array_of("faces", mesh.triangles),
+                               array_of("labels", mesh.labels), array_of("feature_edges", mesh.feature_edges)};
   if (!polygons) return views;
   const Csr<Index>& rows = polygons->polygons;
   polygon_offsets_.assign(rows.offsets.begin(), rows.offsets.end());
-  views.push_back(view("polygon_vertices", polygons->vertices));
-  views.push_back(view("polygon_offsets", polygon_offsets_));
-  views.push_back(view("polygon_corners", rows.values));
-  views.push_back(view("polygon_labels", polygons->labels));
+  views.push_back(array_of("polygon_vertices", polygons->vertices));
+  views.push_back(array_of("polygon_offsets", polygon_offsets_));
+  views.push_back(array_of("polygon_corners", rows.values));
+  views.push_back(array_of("polygon_labels", polygons->labels));
   return views;
 }
 

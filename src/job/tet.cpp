@@ -274,6 +274,19 @@ Json TetJob::report(Journal& journal) {
   return report;
 }
 
+view::Scene TetJob::scene(const std::string& output) {
+  view::Scene scene;
+  scene.models = {domain.tets ? view::solid_model("Input", input, *domain.tets, domain.surface->triangles)
+                              : view::surface_model("Input", input, *domain.surface),
+                  view::solid_model("Result", output, result.mesh, result.mesh.boundary)};
+  view::measure_shapes(scene);
+  view::measure_distances(scene);
+  std::vector<std::int32_t> regions;
+  if (domain.tets) regions = domain.tets->regions;
+  view::add_labels(scene, {"region", "Region", "", view::Element::tet}, {regions, result.mesh.regions});
+  return scene;
+}
+
 void TetJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
   if (output == "output") write_tet_mesh(path, result.mesh);
   else if (output == "boundary") write_mesh(path, boundary_surface(result.mesh));
@@ -282,9 +295,9 @@ void TetJob::write(std::string_view output, const std::string& path, const std::
 
 std::vector<ArrayView> TetJob::arrays() {
   const TetMesh& mesh = result.mesh;
-  return {view("vertices", mesh.vertices),      view("tets", mesh.tets),
-          view("faces", mesh.boundary),         view("regions", mesh.regions),
-          view("labels", mesh.boundary_labels), view("feature_edges", mesh.feature_edges)};
+  return {array_of("vertices", mesh.vertices),      array_of("tets", mesh.tets),
+          array_of("faces", mesh.boundary),         array_of("regions", mesh.regions),
+          array_of("labels", mesh.boundary_labels), array_of("feature_edges", mesh.feature_edges)};
 }
 
 }  // namespace bisector::job

@@ -272,6 +272,33 @@ Json TreeJob::report(Journal&) {
   return report;
 }
 
+view::Scene TreeJob::scene(const std::string& output) {
+  view::Measure branch{"branch", "Branch", "", view::Element::triangle};
+  view::Measure order{"order", "Order of the branch", "", view::Element::triangle};
+  int orders = 0;
+  for (std::size_t b = 0; b < result.branches.size(); ++b) {
+    branch.names.push_back(fmt::to_string(b));
+    orders = std::max(orders, result.branches[b].order + 1);
+  }
+  for (int k = 0; k < orders; ++k) order.names.push_back(k == 0 ? "0, trunks" : fmt::to_string(k));
+  view::Scene scene;
+  scene.models = {{"Scan", input, cloud.points}, view::surface_model("Branches", output, mesh)};
+  const auto add = [&](std::size_t model, std::size_t n, const auto& branch_of) {
+    std::vector<double> branches(n, std::numeric_limits<double>::quiet_NaN()), orders_of = branches;
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto b = static_cast<Index>(branch_of(i));
+      if (b == kNone) continue;
+      branches[i] = b;
+      orders_of[i] = result.branches[b].order;
+    }
+    view::add_groups(scene, model, order, std::move(orders_of));
+    view::add_groups(scene, model, branch, std::move(branches));
+  };
+  add(0, cloud.points.size(), [&](std::size_t i) { return result.branch[i]; });
+  add(1, mesh.labels.size(), [&](std::size_t i) { return mesh.labels[i]; });
+  return scene;
+}
+
 void TreeJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
   if (output == "output") write_tree(path, result, mesh, unit());
   else if (output == "skeleton") write_skeleton(path, result);
@@ -291,10 +318,10 @@ std::vector<ArrayView> TreeJob::arrays() {
     }
     for (const Index branch : result.branch) point_branches_.push_back(number(branch));
   }
-  return {view("vertices", mesh.vertices),       view("faces", mesh.triangles),
-          view("labels", mesh.labels),           view("nodes", node_positions_),
-          view("node_radii", node_radii_),       view("node_parents", node_parents_),
-          view("node_branches", node_branches_), view("point_branches", point_branches_)};
+  return {array_of("vertices", mesh.vertices),       array_of("faces", mesh.triangles),
+          array_of("labels", mesh.labels),           array_of("nodes", node_positions_),
+          array_of("node_radii", node_radii_),       array_of("node_parents", node_parents_),
+          array_of("node_branches", node_branches_), array_of("point_branches", point_branches_)};
 }
 
 }  // namespace bisector::job

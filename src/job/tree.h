@@ -33,6 +33,7 @@ class TreeJob final : public Job {
   void check_format(std::string_view output, const std::string& path, Journal& journal) const override;
   void compute(Journal& journal) override;
   Json report(Journal& journal) override;
+  view::Scene scene(const std::string& output) override;
   void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
   std::vector<ArrayView> arrays() override;
 

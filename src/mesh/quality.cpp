@@ -11,31 +11,13 @@
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
+#include "mesh/triangle_quality.h"
 
 namespace bisector {
 
 namespace {
 
 constexpr std::size_t kAtOnce = 4096;  // items of a chunk of a sum
-
-struct TriangleShape {
-  double q = 0;
-  std::array<double, 3> theta{0, 0, 180};  // at each corner, degrees; these are those of triangles without area
-};
-
-TriangleShape measure_shape(const std::array<Vec3, 3>& p, double area) {
-  TriangleShape shape;
-  if (!(area > 0)) return shape;
-  double half_perimeter = 0, longest = 0;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 u = p[(k + 1) % 3] - p[k], v = p[(k + 2) % 3] - p[k];
-    shape.theta[k] = std::atan2(2 * area, dot(u, v)) * kDegreesPerRadian;
-    half_perimeter += 0.5 * norm(u);
-    longest = std::max(longest, norm(u));
-  }
-  shape.q = 6 / std::numbers::sqrt3 * (area / half_perimeter) / longest;
-  return shape;
-}
 
 std::vector<std::array<Index, 2>> sorted_features(const TriangleMesh& mesh) {
   std::vector<std::array<Index, 2>> edges = mesh.feature_edges;
@@ -56,9 +38,7 @@ struct TriangleSums {
   }
 
   void add(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& features, const Triangle& t) {
-    const std::array<Vec3, 3> p{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
-    const double area = triangle_area(p[0], p[1], p[2]);
-    const TriangleShape shape = measure_shape(p, area);
+    const TriangleShape shape = measure_triangle(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
     const auto [smallest, largest] = std::minmax_element(shape.theta.begin(), shape.theta.end());
     report.q_min = std::min(report.q_min, shape.q);
     report.theta_min = std::min(report.theta_min, *smallest);
@@ -74,13 +54,13 @@ struct TriangleSums {
       report.theta_max_free = std::max(report.theta_max_free, shape.theta[k]);
     }
     free_below_30 += free_angle_below_30;
-    if (!(area > 0)) {
+    if (!(shape.area > 0)) {
       ++report.zero_area;
       return;
     }
     report.q_ave += shape.q;
     report.theta_min_ave += *smallest;
-    report.area += area;
+    report.area += shape.area;
   }
 
   void add(const TriangleSums& other) {
@@ -148,15 +128,7 @@ void measure_edges(const TriangleMesh& mesh, const EdgeTable& table, QualityRepo
   report.edge_max = lengths.most;
   report.edge_ave = lengths.sum / static_cast<double>(table.edges.size());
 
-  std::vector<Index> neighbours(mesh.vertices.size(), 0);
-  std::vector<char> border(mesh.vertices.size(), 0);
-  parallel_chunks(table.edges.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e)
-      for (const Index v : table.edges[e]) {
-        std::atomic_ref(neighbours[v]).fetch_add(1, std::memory_order_relaxed);
-        if (table.half_edges.size(e) == 1) std::atomic_ref(border[v]).store(1, std::memory_order_relaxed);
-      }
-  });
+  const auto [neighbours, border] = count_neighbours(table, mesh.vertices.size());
   std::size_t interior = 0, regular = 0;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (neighbours[v] == 0 || border[v]) continue;
@@ -167,6 +139,35 @@ void measure_edges(const TriangleMesh& mesh, const EdgeTable& table, QualityRepo
 }
 
 }  // namespace
+
+TriangleShape measure_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const std::array<Vec3, 3> p{a, b, c};
+  TriangleShape shape;
+  shape.area = triangle_area(a, b, c);
+  if (!(shape.area > 0)) return shape;
+  double half_perimeter = 0, longest = 0;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 u = p[(k + 1) % 3] - p[k], v = p[(k + 2) % 3] - p[k];
+    shape.theta[k] = std::atan2(2 * shape.area, dot(u, v)) * kDegreesPerRadian;
+    half_perimeter += 0.5 * norm(u);
+    longest = std::max(longest, norm(u));
+  }
+  shape.q = 6 / std::numbers::sqrt3 * (shape.area / half_perimeter) / longest;
+  return shape;
+}
+
+Valences count_neighbours(const EdgeTable& table, std::size_t vertex_count) {
+  Valences valences{std::vector<Index>(vertex_count, 0), std::vector<char>(vertex_count, 0)};
+  auto& [neighbours, border] = valences;
+  parallel_chunks(table.edges.size(), kAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e)
+      for (const Index v : table.edges[e]) {
+        std::atomic_ref(neighbours[v]).fetch_add(1, std::memory_order_relaxed);
+        if (table.half_edges.size(e) == 1) std::atomic_ref(border[v]).store(1, std::memory_order_relaxed);
+      }
+  });
+  return valences;
+}
 
 QualityReport measure_quality(const TriangleMesh& mesh) {
   QualityReport report;

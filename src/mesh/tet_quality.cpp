@@ -16,27 +16,6 @@ namespace {
 // Both ends of each edge of a tetrahedron, and the two other corners.
 constexpr int kEdges[6][4] = {{0, 1, 2, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 2, 0}, {2, 3, 0, 1}};
 
-struct TetShape {
-  int sign = 0;  // of the volume, exact
-  double volume = 0;
-  double radius_ratio = 0;
-  std::array<double, 6> dihedral{};    // degrees
-  double smallest = 0, largest = 180;  // dihedral angles; these are those of tetrahedra without a positive volume
-};
-
-TetShape measure_shape(const std::array<Vec3, 4>& p) {
-  TetShape shape;
-  shape.sign = orientation(p[0], p[1], p[2], p[3]);
-  shape.volume = rounded_six_volume(p[0], p[1], p[2], p[3]) / 6;
-  if (shape.sign <= 0) return shape;
-  shape.dihedral = dihedral_angles(p[0], p[1], p[2], p[3]);
-  const auto [smallest, largest] = std::minmax_element(shape.dihedral.begin(), shape.dihedral.end());
-  shape.smallest = *smallest;
-  shape.largest = *largest;
-  shape.radius_ratio = radius_ratio(p[0], p[1], p[2], p[3]);
-  return shape;
-}
-
 void measure_edges(const TetMesh& mesh, TetQualityReport& report) {
   std::vector<std::array<Index, 2>> edges;
   edges.reserve(6 * mesh.tets.size());
@@ -79,6 +58,19 @@ double radius_ratio(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) 
   return centre > 0 ? 6 * (volume / surface) * (std::abs(volume) / centre) : 0;
 }
 
+TetShape measure_tet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  TetShape shape;
+  shape.sign = orientation(a, b, c, d);
+  shape.volume = rounded_six_volume(a, b, c, d) / 6;
+  if (shape.sign <= 0) return shape;
+  shape.dihedral = dihedral_angles(a, b, c, d);
+  const auto [smallest, largest] = std::minmax_element(shape.dihedral.begin(), shape.dihedral.end());
+  shape.smallest = *smallest;
+  shape.largest = *largest;
+  shape.radius_ratio = radius_ratio(a, b, c, d);
+  return shape;
+}
+
 TetQualityReport measure_tet_quality(const TetMesh& mesh) {
   TetQualityReport report;
   const std::size_t n = mesh.tets.size();
@@ -86,7 +78,7 @@ TetQualityReport measure_tet_quality(const TetMesh& mesh) {
   std::vector<TetShape> shapes(n);
   parallel_each(n, [&](std::size_t i) {
     const Tetrahedron& t = mesh.tets[i];
-    shapes[i] = measure_shape({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]]});
+    shapes[i] = measure_tet(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]], mesh.vertices[t[3]]);
   });
   report.dihedral_min = 180;
   report.radius_ratio_min = report.volume_min = std::numeric_limits<double>::infinity();

@@ -113,6 +113,7 @@ static void test_run(const char* folder) {
   EXPECT(bisector_result_save(result, "output", "out.xyz", NULL) == BISECTOR_FAILED && says(".ply"));
   EXPECT(bisector_result_save(result, "skeleton", path, NULL) == BISECTOR_USAGE && says("feature-output"));
   EXPECT(bisector_result_save(result, "output", "", NULL) == BISECTOR_FAILED);
+  EXPECT(bisector_result_save(result, "report", "no/such/folder/report.html", NULL) == BISECTOR_FAILED);
 
   EXPECT(bisector_mesh_free(mesh) == BISECTOR_OK);
   EXPECT(bisector_options_free(options) == BISECTOR_OK);

@@ -104,6 +104,10 @@ class SameAsTheProgram(unittest.TestCase):
         self.expect_same(r.save_features, "a.txt")
         self.expect_same(r.save_preview, "a.png")
         self.expect_same_report(r.report, "a.json")
+        r.save_report(self.folder / "r.json")
+        self.assertEqual(json.loads((self.folder / "r.json").read_text()), r.report)
+        r.save_report(self.folder / "r.html")
+        self.assertTrue((self.folder / "r.html").read_text().startswith("<!DOCTYPE html>"))
         arrays = bs.remesh(read_off(PART), 300, features=30.5, min_angle=35, detail="off", iterations=10, threads=1)
         self.expect_same(arrays.save, "a.ply")
 
