@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "bisector/context.h"
 #include "bisector/export.h"
 #include "bisector/mesh.h"
 
@@ -46,11 +47,13 @@ struct QualityReport {
 BISECTOR_API QualityReport measure_quality(const TriangleMesh& mesh);
 
 // Pairs of triangles that intersect other than in a shared vertex or edge (exact predicates). Vertices at the same
-// point count as one; triangles without area are ignored; two that fold onto each other at their edge do count.
-BISECTOR_API std::size_t count_self_intersections(const TriangleMesh& mesh);
+// point count as one; triangles without area are ignored; two that fold onto each other at their edge do count. Throws
+// Cancelled.
+BISECTOR_API std::size_t count_self_intersections(const TriangleMesh& mesh, const Context& context = {});
 
 // The same pairs, lower index first, ascending.
-BISECTOR_API std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh);
+BISECTOR_API std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh,
+                                                                       const Context& context = {});
 
 // --- distances between surfaces ---
 
@@ -63,9 +66,12 @@ struct DistanceReport {
 };
 
 // Area-uniform stratified samples plus the vertices of each side; reproducible from `random_seed`, for any thread
-// count. Throws Error if a mesh has no area.
+// count. Throws Error if a mesh has no area, and Cancelled.
 BISECTOR_API DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference,
-                                             std::size_t samples = 200'000, std::uint64_t random_seed = 1);
+                                             std::size_t samples = 200'000, std::uint64_t random_seed = 1,
+                                             const Context& context = {});
+BISECTOR_API DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference,
+                                             const Context& context);
 
 using FeatureEdges = std::vector<std::array<Index, 2>>;
 

@@ -33,10 +33,10 @@ void QualityJob::compute(Journal& journal) {
     measures.tet_topology = analyse_tet_topology(*mesh.tets);
   }
   journal.phase("looking for self-intersections");
-  measures.self_intersections = count_self_intersections(*mesh.surface);
+  measures.self_intersections = count_self_intersections(*mesh.surface, journal.context());
   if (reference.surface) {
     journal.phase("measuring the distance to " + (reference_file.empty() ? "the reference" : reference_file));
-    measures.distance = measure_distance(*mesh.surface, *reference.surface);
+    measures.distance = measure_distance(*mesh.surface, *reference.surface, journal.context());
   }
   seconds["quality"] = measuring.seconds();
 }

@@ -236,9 +236,9 @@ Json RemeshJob::report(Journal& journal) {
   report["certification"] = certification_json(result.certification);
   report["quality"] = quality_json(quality);
   journal.phase("measuring the distance to the input");
-  add_distance(report["quality"], measure_distance(result.mesh, *surface));
+  add_distance(report["quality"], measure_distance(result.mesh, *surface, journal.context()));
   journal.phase("looking for self-intersections");
-  report["quality"]["self_intersections"] = count_self_intersections(result.mesh);
+  report["quality"]["self_intersections"] = count_self_intersections(result.mesh, journal.context());
   report["topology"] = topology_json(result.topology);
   report["topology"]["matches_input"] = result.topology_matches;
   report["topology"]["ball_property"] = result.ball_property;

@@ -272,7 +272,7 @@ Json SegmentJob::report(Journal& journal) {
   if (!result.projected.empty()) {
     journal.phase("measuring the distance to the input");
     Json quality = quality_json(measure_quality(mesh));
-    add_distance(quality, measure_distance(mesh, *surface));
+    add_distance(quality, measure_distance(mesh, *surface, journal.context()));
     report["quality"] = std::move(quality);
   }
   if (polygons) report["polygons"] = polygons_json(*polygons);

@@ -255,7 +255,7 @@ Json TetJob::report(Journal& journal) {
   report["quality"] = quality_json(measures.boundary);
   add_tets(report["quality"], measures.tets);
   journal.phase("measuring the distance of the boundary to the input");
-  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), *domain.surface));
+  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), *domain.surface, journal.context()));
   report["quality"]["volume_input"] = result.volume;
   report["topology"] = topology_json(measures.topology.boundary);
   add_tets(report["topology"], measures.topology);

@@ -41,7 +41,7 @@ std::optional<IgesUnit> unit_of(double metres) {
 }
 
 TreeJob::Measures measure(const std::vector<Vec3>& points, const TreeOptions& options, const TreeResult& tree,
-                          const TriangleMesh& mesh) {
+                          const TriangleMesh& mesh, const Context& context) {
   TreeJob::Measures measures;
   std::vector<BranchSurface> surfaces;
   for (const TreeBranch& b : tree.branches) {
@@ -66,7 +66,7 @@ TreeJob::Measures measure(const std::vector<Vec3>& points, const TreeOptions& op
     measures.height = 0;
     for (const ScannedTree& t : tree.trees) measures.height = std::max(measures.height, t.height);
   }
-  measures.coverage = cover_points(above, surfaces, mesh);
+  measures.coverage = cover_points(above, surfaces, mesh, context);
   measures.bare = bare_area(mesh, above, 0.02 * measures.height);
   return measures;
 }
@@ -222,12 +222,12 @@ void TreeJob::compute(Journal& journal) {
   if (options_.tip_radius == 0 && cloud.unit > 0) options_.tip_radius = kTipMetres / cloud.unit;
   result = reconstruct_tree(cloud.points, options_, journal.context());
   const Stopwatch meshing;
-  mesh = tree_mesh(result);
+  mesh = tree_mesh(result, journal.context());
   seconds = tree_seconds(result.seconds);
   seconds["mesh"] = meshing.seconds();
   journal.phase("measuring the distance of the points");
   const Stopwatch measuring;
-  measures = measure(cloud.points, options_, result, mesh);
+  measures = measure(cloud.points, options_, result, mesh, journal.context());
   seconds["quality"] = measuring.seconds();
   seconds["io"] = io_;
   warn_of_points(journal, result, measures);

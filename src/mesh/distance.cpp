@@ -64,10 +64,12 @@ struct OneSided {
   double mean = 0, rms = 0, max = 0;
 };
 
-OneSided measure_one_side(const Surface& from, const Surface& to, std::size_t samples, std::uint64_t random_seed) {
+OneSided measure_one_side(const Surface& from, const Surface& to, std::size_t samples, std::uint64_t random_seed,
+                          const Context& context) {
   const std::size_t vertices = from.vertices().size();
   std::vector<double> squared(samples + vertices);
   parallel_each(squared.size(), [&](std::size_t i) {
+    context.check();
     squared[i] = to.squared_distance(i < samples ? from.sample(i, samples, random_seed) : from.vertices()[i - samples]);
   });
   OneSided side;
@@ -83,10 +85,12 @@ OneSided measure_one_side(const Surface& from, const Surface& to, std::size_t sa
 }  // namespace
 
 DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference, std::size_t samples,
-                                std::uint64_t random_seed) {
-  const Surface ours(mesh, "mesh"), theirs(reference, "reference");
-  const OneSided to = measure_one_side(ours, theirs, samples, random_seed);
-  const OneSided from = measure_one_side(theirs, ours, samples, random_seed);
+                                std::uint64_t random_seed, const Context& context) {
+  const Surface ours(mesh, "mesh");
+  context.check();
+  const Surface theirs(reference, "reference");
+  const OneSided to = measure_one_side(ours, theirs, samples, random_seed, context);
+  const OneSided from = measure_one_side(theirs, ours, samples, random_seed, context);
   const double percent = 100 / bounding_box(theirs.vertices()).diagonal();
   DistanceReport report;
   report.mean = percent * std::max(to.mean, from.mean);
@@ -96,6 +100,10 @@ DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& re
   report.rms_from_reference = percent * from.rms;
   report.samples = samples;
   return report;
+}
+
+DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference, const Context& context) {
+  return measure_distance(mesh, reference, 200'000, 1, context);
 }
 
 }  // namespace bisector

@@ -79,7 +79,7 @@ bool intersect_beyond_shared(const std::vector<Vec3>& vertices, Triangle s, Tria
 
 // Calls visit(pair) for every pair of welded triangles that intersect.
 template <class Visit>
-void visit_intersections(const TriangleMesh& welded, const Visit& visit) {
+void visit_intersections(const TriangleMesh& welded, const Context& context, const Visit& visit) {
   std::vector<TriangleBox> boxes;
   boxes.reserve(welded.triangles.size());
   for (std::size_t i = 0; i < welded.triangles.size(); ++i) {
@@ -96,6 +96,7 @@ void visit_intersections(const TriangleMesh& welded, const Visit& visit) {
   const auto test_candidates = [&] {
     intersect.resize(candidates.size());
     parallel_each(candidates.size(), [&](std::size_t i) {
+      context.check();
       const auto [s, t] = candidates[i];
       intersect[i] = intersect_beyond_shared(welded.vertices, welded.triangles[s], welded.triangles[t]);
     });
@@ -103,6 +104,7 @@ void visit_intersections(const TriangleMesh& welded, const Visit& visit) {
       if (intersect[i]) visit(candidates[i]);
     candidates.clear();
   };
+  context.check();
   constexpr std::size_t kBatch = std::size_t{1} << 20;  // bounds the memory however many boxes overlap
   CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
     candidates.push_back({a.info(), b.info()});
@@ -113,16 +115,16 @@ void visit_intersections(const TriangleMesh& welded, const Visit& visit) {
 
 }  // namespace
 
-std::size_t count_self_intersections(const TriangleMesh& mesh) {
+std::size_t count_self_intersections(const TriangleMesh& mesh, const Context& context) {
   std::size_t count = 0;
-  visit_intersections(merge_equal_points(mesh), [&](const Pair&) { ++count; });
+  visit_intersections(merge_equal_points(mesh), context, [&](const Pair&) { ++count; });
   return count;
 }
 
-std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh) {
+std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh, const Context& context) {
   const TriangleMesh welded = merge_equal_points(mesh);
   std::vector<std::array<Index, 2>> pairs;
-  visit_intersections(welded, [&](const Pair& pair) {
+  visit_intersections(welded, context, [&](const Pair& pair) {
     const auto [low, high] = std::minmax(pair[0], pair[1]);
     pairs.push_back({welded.face_of_triangle[low], welded.face_of_triangle[high]});
   });

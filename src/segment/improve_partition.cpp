@@ -132,6 +132,7 @@ void PartitionEditor::improve_division(const Partition& partition, Index region,
   std::vector<Proxy> proxies(division.proxies.begin(), division.proxies.end());
   std::array<Index, 2> seeds = division.seeds;
   for (int k = 0; k < steps && seeds[0] != seeds[1]; ++k) {
+    lloyd_.context().check();
     for (const Index t : partition.triangles[region]) trial.labels[t] = kNone;
     trial.flooding.fill(proxies, {{seeds[0], 0}, {seeds[1], 1}}, trial.labels, trial.distances, trial.evaluations);
     std::array<std::vector<Index>, 2> parts;
@@ -285,6 +286,7 @@ std::vector<PartitionEditor::Removal> PartitionEditor::removals(const Partition&
   parallel_each(
       unknown.size(),
       [&](std::size_t k) {
+        lloyd_.context().check();
         const auto [a, b] = unknown[k];
         Trial& trial = trials_.local();
         trial.evaluations = 0;

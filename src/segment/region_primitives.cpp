@@ -439,14 +439,15 @@ void simplify(const SegmentDomain& domain, SegmentSurfaces surfaces, Index r, La
 }  // namespace
 
 std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std::vector<Index>& labels,
-                                         std::size_t count, const std::vector<Proxy>& proxies,
-                                         SegmentSurfaces surfaces) {
+                                         std::size_t count, const std::vector<Proxy>& proxies, SegmentSurfaces surfaces,
+                                         const Context& context) {
   const Csr<Index> triangles = items_of_labels<Index>(labels, count);
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
   std::vector<Primitive> primitives(count);
   parallel_each(
       count,
       [&](std::size_t r) {
+        context.check();
         primitives[r] = primitive_of(domain, triangles.begin(r), triangles.end(r), depths, proxies[r], surfaces);
       },
       1);
@@ -454,10 +455,13 @@ std::vector<Primitive> region_primitives(const SegmentDomain& domain, const std:
 }
 
 void simplify_primitives(const SegmentDomain& domain, SegmentSurfaces surfaces, std::vector<Index>& labels,
-                         std::vector<Primitive>& primitives, std::size_t& evaluations) {
+                         std::vector<Primitive>& primitives, std::size_t& evaluations, const Context& context) {
   if (surfaces == SegmentSurfaces::planes) return;
   Labelling labelling(domain, std::move(labels), primitives, evaluations);
-  for (Index r = 0; r < primitives.size(); ++r) simplify(domain, surfaces, r, labelling, primitives[r]);
+  for (Index r = 0; r < primitives.size(); ++r) {
+    context.check();
+    simplify(domain, surfaces, r, labelling, primitives[r]);
+  }
   labels = std::move(labelling.labels);
 }
 
@@ -491,12 +495,13 @@ void take_proxies(const SegmentDomain& domain, const std::vector<Index>& labels,
 }
 
 void refine_primitives(const SegmentDomain& domain, const std::vector<Index>& labels,
-                       std::vector<Primitive>& primitives) {
+                       std::vector<Primitive>& primitives, const Context& context) {
   const Csr<Index> triangles = items_of_labels<Index>(labels, primitives.size());
   const std::vector<std::uint8_t> depths = vertex_depths(domain, labels);
   parallel_each(
       primitives.size(),
       [&](std::size_t r) {
+        context.check();
         const RegionSurface region(domain, triangles.begin(r), triangles.end(r), depths);
         primitives[r] = region.refined(region.measured(primitives[r]));
       },

@@ -267,7 +267,8 @@ void polish_borders(const SegmentDomain& domain, const std::vector<Proxy>& proxi
 // root mean square distance stays within `most`; borders go on from where the last weight left them. Returns the last
 // weight, 0 if even the least raised the distance too far.
 double smooth_within(const SegmentDomain& domain, const SegmentOptions& options, const std::vector<Proxy>& proxies,
-                     double most, std::vector<Index>& labels, std::vector<Primitive>& primitives) {
+                     double most, std::vector<Index>& labels, std::vector<Primitive>& primitives,
+                     const Context& context) {
   const auto distance = [&](Index t, Index r) { return distance_to(domain, t, proxies[r]); };
   const std::vector<double> weights = border_weights(domain, region_noise(domain, labels, proxies));
   const std::vector<Primitive> unsmoothed = primitives;
@@ -278,8 +279,8 @@ double smooth_within(const SegmentDomain& domain, const SegmentOptions& options,
     for (const double w : weights) smoothing.weights.push_back(weight * w);
     std::vector<Index> smoothed = labels;
     std::vector<Primitive> refined = unsmoothed;
-    smooth_borders(domain.graph, domain.triangles, distance, smoothing, smoothed);
-    refine_primitives(domain, smoothed, refined);
+    smooth_borders(domain.graph, domain.triangles, distance, smoothing, smoothed, context);
+    refine_primitives(domain, smoothed, refined, context);
     if (std::sqrt(mean_square(domain, smoothed, proxies_of(refined))) > most + kNegligible) return false;
     labels = std::move(smoothed);
     primitives = std::move(refined);
@@ -361,13 +362,13 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
   Stopwatch clock;
   Classified result;
   result.primitives =
-      region_primitives(domain, partition.labels, partition.count(), partition.proxies, options.surfaces);
+      region_primitives(domain, partition.labels, partition.count(), partition.proxies, options.surfaces, context);
   result.labels = partition.labels;
   if (at_any_cost) take_proxies(domain, result.labels, partition.proxies, most * most * domain.area, result.primitives);
   polish_borders(domain, proxies_of(result.primitives), result.labels, lloyd.counts.evaluations);
   if (!at_any_cost) {
-    simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations);
-    refine_primitives(domain, result.labels, result.primitives);
+    simplify_primitives(domain, options.surfaces, result.labels, result.primitives, lloyd.counts.evaluations, context);
+    refine_primitives(domain, result.labels, result.primitives, context);
   }
   const std::vector<Proxy> proxies = proxies_of(result.primitives);
   seconds.classify += clock.lap();
@@ -376,7 +377,7 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
   if (options.smooth > 0) {
     report(context, "smoothing borders", 0.95);
     const double limit = std::max(result.rms_before, std::min(kMostGrowth * result.rms_before, most));
-    result.smooth = smooth_within(domain, options, proxies, limit, result.labels, result.primitives);
+    result.smooth = smooth_within(domain, options, proxies, limit, result.labels, result.primitives, context);
     result.border_after = border_length(domain.graph, result.labels);
   }
   sort_regions(domain, result.labels, result.primitives);

@@ -104,7 +104,7 @@ class BorderSmoother {
     measure_energy();
   }
 
-  SmoothBordersResult run() {
+  SmoothBordersResult run(const Context& context) {
     SmoothBordersResult result;
     // Regions are tried again where they or one beside them changed since.
     const std::size_t regions = topology_.regions();
@@ -116,6 +116,7 @@ class BorderSmoother {
         std::size_t latest = changed[region];
         for (const Index other : meets_[region]) latest = std::max(latest, changed[other]);
         if (latest <= tried[region]) continue;
+        context.check();
         tried[region] = now;
         const Outcome outcome = improve(region);
         result.refused += outcome == Outcome::refused;
@@ -478,7 +479,8 @@ class BorderSmoother {
 
 SmoothBordersResult smooth_borders(const DualGraph& graph, const std::vector<Triangle>& triangles,
                                    const std::function<double(Index, Index)>& distance,
-                                   const SmoothBordersOptions& options, std::vector<Index>& labels) {
+                                   const SmoothBordersOptions& options, std::vector<Index>& labels,
+                                   const Context& context) {
   for (const Index label : labels)
     if (label >= options.weights.size())
       throw Error("there are " + std::to_string(options.weights.size()) + " weights of borders, but a region " +
@@ -486,7 +488,7 @@ SmoothBordersResult smooth_borders(const DualGraph& graph, const std::vector<Tri
   for (const double weight : options.weights)
     if (!(weight >= 0) || !std::isfinite(weight))
       throw Error("a weight of the borders' length is " + std::to_string(weight) + "; it has to be a number from 0 on");
-  return BorderSmoother(graph, triangles, distance, options, labels).run();
+  return BorderSmoother(graph, triangles, distance, options, labels).run(context);
 }
 
 }  // namespace bisector

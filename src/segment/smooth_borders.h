@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "bisector/context.h"
 #include "core/geometry.h"
 #include "segment/dual_graph.h"
 
@@ -28,9 +29,10 @@ struct SmoothBordersResult {
 // `distance(t, r)` is triangle t's squared distance to region r's proxy, times its area. Of a cut that would take a
 // region apart, empty it, or change its Euler characteristic, its borders' number of loops or which regions it meets,
 // the triangles that do so stay where they are, or parts of it are made, or nothing. Regions have to be connected.
-// Throws Error for weights that are negative or not finite, or are not one for each region.
+// Throws Error for weights that are negative or not finite, or are not one for each region, and Cancelled.
 SmoothBordersResult smooth_borders(const DualGraph& graph, const std::vector<Triangle>& triangles,
                                    const std::function<double(Index, Index)>& distance,
-                                   const SmoothBordersOptions& options, std::vector<Index>& labels);
+                                   const SmoothBordersOptions& options, std::vector<Index>& labels,
+                                   const Context& context = {});
 
 }  // namespace bisector

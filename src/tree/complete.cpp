@@ -82,7 +82,7 @@ Completion complete_limbs(const std::vector<Vec3>& points, const CompletionOptio
     result.pipe = fill_radii(limbs, options.tip_radius, kSlenderness);
     if (round + 1 == kRounds) break;
     radius = radii_at(points, result.limb_of, limbs);
-    refit_limbs(points, tolerance, noise, limbs);
+    refit_limbs(points, tolerance, noise, limbs, context);
   }
   for (std::size_t i = 0; i < wood.size(); ++i) result.leaf.push_back(!wood[i] && result.limb_of[i] == kNone);
   return result;

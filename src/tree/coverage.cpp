@@ -60,12 +60,14 @@ double share(const std::vector<PointCoverage>& points, const Condition& conditio
 }  // namespace
 
 std::vector<PointCoverage> cover_points(const std::vector<Vec3>& points, const std::vector<BranchSurface>& surfaces,
-                                        const TriangleMesh& mesh) {
+                                        const TriangleMesh& mesh, const Context& context) {
   check_labels(mesh, surfaces.size());
+  context.check();
   const NearestOnMesh nearest(mesh);
   const std::vector<Vec3> axes = sample_axes(surfaces);
   std::vector<PointCoverage> covered(points.size());
   parallel_each(points.size(), [&](std::size_t p) {
+    context.check();
     const NearestPoint foot = nearest.nearest(points[p]);
     const auto branch = static_cast<std::size_t>(mesh.labels[foot.triangle]);
     covered[p] = {norm(foot.point - points[p]), static_cast<Index>(branch),

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "bisector/context.h"
 #include "bisector/tree.h"
 #include "core/geometry.h"
 
@@ -16,9 +17,9 @@ struct PointCoverage {
 
 // Of each point. `mesh` holds the triangles of `surfaces` (branch_mesh), `labels` telling which each belongs to. Exact
 // for the mesh; the radius is that at the axis point nearest to the foot, within 1 % of the axis' parameter. Throws
-// Error for a mesh without area and labels that are not one per triangle or no surface's.
+// Error for a mesh without area and labels that are not one per triangle or no surface's, and Cancelled.
 std::vector<PointCoverage> cover_points(const std::vector<Vec3>& points, const std::vector<BranchSurface>& surfaces,
-                                        const TriangleMesh& mesh);
+                                        const TriangleMesh& mesh, const Context& context = {});
 
 // The share of points, in [0, 1], that are within a distance (in the points' unit), or within so many radii of their
 // branch; 0 if there are no points.

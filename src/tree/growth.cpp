@@ -19,16 +19,17 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kLeastGain = 2;  // points that a branch explains
-constexpr double kGap = 3;             // steps longer than so many tolerances, or median steps, cross a gap
-constexpr double kLeaf = 2;            // what a step to a leaf costs, in that of a step to wood
-constexpr double kTurn = 2;            // what a step across a gap costs more at a right angle, in its own cost
-constexpr double kMostGaps = 0.5;      // of a branch's length
-constexpr double kLeastLength = 2;     // of it, in tolerances
-constexpr double kSimilar = 0.8;       // of the longest way's length: among ways so long the straightest goes on
-constexpr double kDirection = 4;       // length that tells the direction of a way, in tolerances
-constexpr double kStep = 1;            // between points of an axis, in tolerances
-constexpr double kStiffness = 2;       // of an axis' second differences, beside the pull of the points on the way
+constexpr std::size_t kCheckEvery = 1024;  // points between two checks for cancellation
+constexpr std::size_t kLeastGain = 2;      // points that a branch explains
+constexpr double kGap = 3;                 // steps longer than so many tolerances, or median steps, cross a gap
+constexpr double kLeaf = 2;                // what a step to a leaf costs, in that of a step to wood
+constexpr double kTurn = 2;                // what a step across a gap costs more at a right angle, in its own cost
+constexpr double kMostGaps = 0.5;          // of a branch's length
+constexpr double kLeastLength = 2;         // of it, in tolerances
+constexpr double kSimilar = 0.8;           // of the longest way's length: among ways so long the straightest goes on
+constexpr double kDirection = 4;           // length that tells the direction of a way, in tolerances
+constexpr double kStep = 1;                // between points of an axis, in tolerances
+constexpr double kStiffness = 2;           // of an axis' second differences, beside the pull of the points on the way
 
 double squared(double x) { return x * x; }
 
@@ -47,14 +48,15 @@ class Growth {
       : points_(points), options_(options), tolerance_(options.tolerance), limbs_(limbs),
         limb_of_(limb_of), set_{points}, tree_(3, set_) {}
 
-  void find_ways() {
+  void find_ways(const Context& context) {
     const Csr<Index> graph = ways_graph(points_);
+    context.check();
     std::vector<double> shortest(points_.size(), std::numeric_limits<double>::infinity());
     for (std::size_t i = 0; i < graph.rows(); ++i)
       for (const Index* j = graph.begin(i); j != graph.end(i); ++j)
         shortest[i] = std::min(shortest[i], norm(points_[*j] - points_[i]));
     gap_ = kGap * std::max(tolerance_, quantile(std::move(shortest), 0.5));
-    walk(graph, find_sources());
+    walk(graph, find_sources(), context);
     choose_next();
   }
 
@@ -73,7 +75,7 @@ class Growth {
     });
     on_limb_ = limb_of_;
     for (std::size_t k = 0; k < starts.size(); ++k) {
-      if (k % 1024 == 0) context.check();
+      if (k % kCheckEvery == 0) context.check();
       if (starts[k].first < kLeastLength * tolerance_) break;
       try_branch(starts[k].second);
     }
@@ -101,7 +103,7 @@ class Growth {
   }
 
   // Dijkstra's algorithm, where a step across a gap costs more the more it turns off the way that leads to it.
-  void walk(const Csr<Index>& graph, const std::vector<Index>& sources) {
+  void walk(const Csr<Index>& graph, const std::vector<Index>& sources, const Context& context) {
     using Entry = std::tuple<double, Index, Index>;  // cost, point, the one before
     std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
     for (const Index s : sources) queue.emplace(0.0, s, s);
@@ -112,6 +114,7 @@ class Growth {
       if (ways_.previous[i] != kNone) continue;
       ways_.previous[i] = from;
       ways_.order.push_back(i);
+      if (ways_.order.size() % kCheckEvery == 0) context.check();
       const Vec3 direction = direction_at(i);
       for (const Index* j = graph.begin(i); j != graph.end(i); ++j) {
         if (ways_.previous[*j] != kNone || group_of(*j) != group_of(i)) continue;
@@ -313,7 +316,7 @@ class Growth {
 void grow_limbs(const std::vector<Vec3>& points, const GrowthOptions& options, std::vector<Limb>& limbs,
                 std::vector<Index>& limb_of, const Context& context) {
   Growth growth(points, options, limbs, limb_of);
-  growth.find_ways();
+  growth.find_ways(context);
   growth.grow(context);
 }
 

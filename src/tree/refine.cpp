@@ -46,8 +46,8 @@ constexpr double kUnfitted = 1e-3;  // weight of a radius that does not rest on 
 class Refinement {
  public:
   Refinement(const std::vector<Vec3>& points, const Csr<Index>& neighbours, std::vector<Limb> limbs,
-             const RefineOptions& options)
-      : points_(points), neighbours_(neighbours), limbs_(std::move(limbs)), options_(options),
+             const RefineOptions& options, const Context& context)
+      : points_(points), neighbours_(neighbours), limbs_(std::move(limbs)), options_(options), context_(context),
         merged_(limbs_.size(), 0), support_(limbs_.size()), deviation_(limbs_.size(), 0) {}
 
   void fit_all() {
@@ -349,6 +349,7 @@ class Refinement {
   }
 
   void fit(std::size_t b) {
+    context_.check();
     Limb& limb = limbs_[b];
     std::vector<Vec3> own;
     own.reserve(limb.points.size());
@@ -471,6 +472,7 @@ class Refinement {
   const Csr<Index>& neighbours_;
   std::vector<Limb> limbs_;
   const RefineOptions& options_;
+  const Context& context_;
   std::vector<char> merged_;
   std::vector<std::vector<double>> support_;
   std::vector<double> deviation_;
@@ -480,7 +482,7 @@ class Refinement {
 
 std::vector<Limb> refine_limbs(const std::vector<Vec3>& points, const Csr<Index>& neighbours, std::vector<Limb> limbs,
                                const RefineOptions& options, const Context& context) {
-  Refinement refinement(points, neighbours, std::move(limbs), options);
+  Refinement refinement(points, neighbours, std::move(limbs), options, context);
   for (int pass = 0; pass < options.passes; ++pass) {
     context.check();
     refinement.fit_all();

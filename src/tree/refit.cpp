@@ -172,7 +172,8 @@ void confirm_radii(const std::vector<Vec3>& points, double noise, const std::vec
       limbs.size(), [&](std::size_t b) { confirm(points, noise, expected[b], limbs[b]); }, 1);
 }
 
-void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs) {
+void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs,
+                 const Context& context) {
   std::vector<std::vector<Index>> members = share_out(points, tolerance, limbs);
   std::vector<double> hidden(limbs.size(), 0);
   for (std::size_t b = 0; b < limbs.size(); ++b)
@@ -183,6 +184,7 @@ void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise
   parallel_each(
       limbs.size(),
       [&](std::size_t b) {
+        context.check();
         limbs[b].points = std::move(members[b]);
         refit(points, noise, hidden[b], limbs[b]);
       },

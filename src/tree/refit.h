@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "bisector/context.h"
 #include "core/geometry.h"
 #include "tree/limb.h"
 
@@ -16,7 +17,8 @@ void confirm_radii(const std::vector<Vec3>& points, double noise, const std::vec
 
 // Fits a tube to the points near each limb, and takes it from the base up to the last place where its radius rests on
 // points. Radii must be there, as a measure of how far points of a limb may be.
-void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs);
+void refit_limbs(const std::vector<Vec3>& points, double tolerance, double noise, std::vector<Limb>& limbs,
+                 const Context& context);
 
 // Where no points carry the radius axes bend no more sharply than their radius, for ways along single points wind
 // within the branch. Children start on their parent's axis again.

@@ -268,10 +268,11 @@ void describe_branches(const std::vector<Limb>& limbs, TreeResult& result) {
   }
 }
 
-void loft(const std::vector<Limb>& limbs, TreeResult& result) {
+void loft(const std::vector<Limb>& limbs, TreeResult& result, const Context& context) {
   parallel_each(
       limbs.size(),
       [&](std::size_t b) {
+        context.check();
         const double tolerance = kAxisTolerance * upper_median(limbs[b].radii);
         result.branches[b].surface = loft_branch(limbs[b].axis, limbs[b].radii, tolerance);
       },
@@ -354,7 +355,7 @@ TreeResult reconstruct(const std::vector<Vec3>& points, const TreeOptions& optio
   }
   if (foot.scene) plant_trunks(*foot.scene, scan.unit, limbs);
   describe_branches(limbs, result);
-  loft(limbs, result);
+  loft(limbs, result, context);
   result.noise = scan.unit * noise;
   result.cluster.assign(points.size(), kNone);
   result.branch.assign(points.size(), kNone);
@@ -523,12 +524,13 @@ TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& 
   return result;
 }
 
-TriangleMesh tree_mesh(const TreeResult& tree, double tolerance) {
+TriangleMesh tree_mesh(const TreeResult& tree, double tolerance, const Context& context) {
   if (!(tolerance > 0)) throw Error(fmt::format("the tolerance is {}; give a positive number", tolerance));
   std::vector<TriangleMesh> parts(tree.branches.size());
   parallel_each(
       parts.size(),
       [&](std::size_t b) {
+        context.check();
         const TreeBranch& branch = tree.branches[b];
         parts[b] = branch_mesh(branch.surface, tolerance * std::max(branch.tip_radius, kLeastTip * branch.base_radius));
       },
@@ -544,5 +546,7 @@ TriangleMesh tree_mesh(const TreeResult& tree, double tolerance) {
   }
   return mesh;
 }
+
+TriangleMesh tree_mesh(const TreeResult& tree, const Context& context) { return tree_mesh(tree, 0.05, context); }
 
 }  // namespace bisector
