@@ -116,6 +116,28 @@ def _from_pyvista(mesh: Any) -> Arrays:
     return arrays
 
 
+def _from_grid(mesh: Any) -> Arrays:
+    """Of a pyvista.UnstructuredGrid the triangles, quadrangles and tetrahedra."""
+    vertices = points(mesh.points, "points")
+    kinds = np.asarray(mesh.celltypes)
+    known = {5: 3, 9: 4, 10: 4}  # VTK's numbers of cell types: corners
+    other = set(kinds.tolist()) - set(known)
+    if other:
+        raise Error(f"cells of VTK's types {sorted(other)} are not read; convert them to triangles or tetrahedra")
+    starts, stream = np.asarray(mesh.offset, dtype=np.int64)[:-1], np.asarray(mesh.cell_connectivity, dtype=np.int64)
+    tets = kinds == 10
+    arrays = Arrays(vertices)
+    if tets.any():
+        arrays.tets = stream[starts[tets][:, None] + np.arange(4)]
+    if not tets.all():
+        degrees = np.array([known[kind] for kind in kinds[~tets].tolist()], dtype=np.int64)
+        arrays.offsets = np.concatenate([[0], np.cumsum(degrees)]).astype(np.int64)
+        arrays.faces = np.concatenate([stream[s:s + d] for s, d in zip(starts[~tets], degrees)])
+    if tets.any() and "region" in mesh.cell_data:
+        arrays.regions = indices(np.asarray(mesh.cell_data["region"])[tets], 0, "cell_data['region']")
+    return arrays
+
+
 # Names of numbers of cells, as readers of files know them.
 _MARKS = ("label", "region", "medit:ref", "gmsh:physical", "gmsh:geometrical")
 
@@ -168,6 +190,8 @@ def arrays_of(mesh: Any) -> Arrays:
         return _from_meshio(mesh)
     if hasattr(mesh, "points") and hasattr(mesh, "faces") and hasattr(mesh, "n_cells"):
         return _from_pyvista(mesh)
+    if hasattr(mesh, "points") and hasattr(mesh, "celltypes"):
+        return _from_grid(mesh)
     if hasattr(mesh, "vertices") and hasattr(mesh, "tets"):
         return Arrays(points(mesh.vertices, "vertices"), tets=indices(mesh.tets, 4, "tets"))
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):

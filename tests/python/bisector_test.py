@@ -2,6 +2,7 @@
 import contextlib
 import filecmp
 import gc
+import importlib
 import inspect
 import json
 import os
@@ -9,12 +10,14 @@ import pathlib
 import re
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
 import types
 import unittest
 import warnings
+from unittest import mock
 
 import numpy as np
 
@@ -244,6 +247,40 @@ class Arrays(unittest.TestCase):
         mixed = types.SimpleNamespace(points=vertices, n_cells=len(faces), cell_data={},
                                       faces=np.hstack([np.full((len(faces), 1), 4), faces]).reshape(-1))
         self.assertTrue(bs.remesh(mixed, n=60).report["topology"]["closed"])
+
+    def test_grids_of_pyvista(self):
+        box, squares = cube()
+        t = bs.tetrahedralize((box, triangle_fan(squares)), n=60, iterations=3)
+        kinds = np.concatenate([np.full(len(t.tets), 10), np.full(len(t.faces), 5)])
+        stream = np.concatenate([t.tets.reshape(-1), t.faces.reshape(-1)])
+        grid = types.SimpleNamespace(points=t.vertices, celltypes=kinds, cell_data={}, cell_connectivity=stream,
+                                     offset=np.concatenate([[0], np.cumsum(np.where(kinds == 10, 4, 3))]))
+        self.assertEqual(bs.quality(grid)["quality"], bs.quality(t)["quality"])
+        grid.celltypes = kinds + 2
+        with self.assertRaisesRegex(bs.Error, "types .7, 12."):
+            bs.quality(grid)
+
+    def test_accessor_of_pyvista(self):
+        """Beside a stand-in for PyVista, which has what the accessor needs."""
+        class Data(types.SimpleNamespace):
+            def __init__(self, points, faces):
+                super().__init__(points=points, faces=faces, n_cells=len(faces) // 4, cell_data={})
+
+        stand_in = types.ModuleType("pyvista")
+        stand_in.PolyData, stand_in.UnstructuredGrid = Data, type("UnstructuredGrid", (), {})
+        registered = []
+        stand_in.register_dataset_accessor = lambda name, kind: lambda accessor: registered.append(
+            (name, kind, accessor))
+        with mock.patch.dict(sys.modules, {"pyvista": stand_in}):
+            accessor = importlib.import_module("bisector._pyvista").Accessor
+            self.assertEqual(registered, [("bisector", Data, accessor),
+                                          ("bisector", stand_in.UnstructuredGrid, accessor)])
+            box, faces = cube()
+            given = Data(box, np.hstack([np.full((len(faces), 1), 4), faces]).reshape(-1))
+            made = accessor(given).remesh(60)
+            self.assertTrue(np.array_equal(made.points, bs.remesh((box, faces), n=60).vertices))
+            self.assertTrue(accessor(made).quality()["topology"]["closed"])
+            self.assertEqual(len(set(accessor(given).segment(6).cell_data["label"])), 6)
 
     def test_packages(self):
         r = bs.remesh(cube(), n=60)
