@@ -26,7 +26,7 @@ def _view(handle: Handle, name: str) -> npt.NDArray[Any]:
     if array.rows == 0:
         return np.zeros(shape, dtype)
     buffer = (ctypes.c_char * (array.rows * array.columns * dtype.itemsize)).from_address(array.data)
-    buffer._owner = handle  # type: ignore[attr-defined]
+    buffer._owner = handle
     view = np.frombuffer(buffer, dtype=dtype).reshape(shape)
     view.flags.writeable = False
     return view

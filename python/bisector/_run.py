@@ -65,7 +65,7 @@ def interruptible(work: Callable[[Any], T], progress: Optional[ProgressCallback]
     def on_warning(_user: Any, line: bytes) -> None:
         lines.append(with_keywords(line.decode("utf-8", "replace")))
 
-    callbacks = Callbacks(ctypes.sizeof(Callbacks), None, ProgressFunction(on_progress if progress else 0),
+    callbacks = Callbacks(ctypes.sizeof(Callbacks), None, ProgressFunction(on_progress) if progress else ProgressFunction(0),
                           WarningFunction(on_warning), cancel.value)
 
     def body() -> None:
