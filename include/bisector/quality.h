@@ -65,10 +65,12 @@ struct DistanceReport {
   std::size_t samples = 0;  // on each side
 };
 
+inline constexpr std::size_t kDistanceSamples = 200'000;
+
 // Area-uniform stratified samples plus the vertices of each side; reproducible from `random_seed`, for any thread
 // count. Throws Error if a mesh has no area, and Cancelled.
 BISECTOR_API DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference,
-                                             std::size_t samples = 200'000, std::uint64_t random_seed = 1,
+                                             std::size_t samples = kDistanceSamples, std::uint64_t random_seed = 1,
                                              const Context& context = {});
 BISECTOR_API DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference,
                                              const Context& context);

@@ -151,9 +151,12 @@ struct TreeResult {
 BISECTOR_API TreeResult reconstruct_tree(const std::vector<Vec3>& points, const TreeOptions& options = {},
                                          const Context& context = {});
 
+inline constexpr double kTreeTolerance = 0.05;
+
 // The surfaces of all branches; a triangle's label is its branch. Each branch is closed; children reach into their
 // parents. `tolerance` is the largest chord error in radii of the branch. Throws Cancelled.
-BISECTOR_API TriangleMesh tree_mesh(const TreeResult& tree, double tolerance = 0.05, const Context& context = {});
+BISECTOR_API TriangleMesh tree_mesh(const TreeResult& tree, double tolerance = kTreeTolerance,
+                                    const Context& context = {});
 BISECTOR_API TriangleMesh tree_mesh(const TreeResult& tree, const Context& context);
 
 enum class IgesUnit { millimetre, centimetre, metre, inch, foot };  // of the coordinates

@@ -133,6 +133,8 @@ def _from_grid(mesh: Any) -> Arrays:
         degrees = np.array([known[kind] for kind in kinds[~tets].tolist()], dtype=np.int64)
         arrays.offsets = np.concatenate([[0], np.cumsum(degrees)]).astype(np.int64)
         arrays.faces = np.concatenate([stream[s:s + d] for s, d in zip(starts[~tets], degrees)])
+    if not tets.all() and "label" in mesh.cell_data:
+        arrays.labels = indices(np.asarray(mesh.cell_data["label"])[~tets], 0, "cell_data['label']")
     if tets.any() and "region" in mesh.cell_data:
         arrays.regions = indices(np.asarray(mesh.cell_data["region"])[tets], 0, "cell_data['region']")
     return arrays

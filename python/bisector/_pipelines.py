@@ -36,7 +36,7 @@ def _options(command: str, values: "dict[str, Any]", seeds: Any = None, density:
         call("options_density", options.value, array.ctypes.data, len(array))
     else:
         values = {**values, "density": density}
-    set_options(options, values)
+    set_options(options, command, values)
     return options
 
 
@@ -139,7 +139,7 @@ def tetrahedralize(
     options = _options(
         "tet", _words(given, "mesh", "seeds", "density", "sizes", "labels", "feature_edges", "progress"), seeds, density)
     if sizes is not None and _is_word(sizes):
-        set_options(options, {"sizes": sizes})
+        set_options(options, "tet", {"sizes": sizes})
     elif sizes is not None:
         places, lengths, tets = _sizes(mesh, sizes)
         call("options_sizes", options.value, places.ctypes.data, lengths.ctypes.data, len(lengths),

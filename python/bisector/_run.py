@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import functools
+import json
 import operator
 import os
 import queue
@@ -14,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, Callable, Optional, TypeVar
 
 from ._errors import BisectorWarning, Error, with_keywords
-from ._library import Callbacks, Handle, ProgressFunction, WarningFunction, call
+from ._library import Callbacks, Handle, ProgressFunction, WarningFunction, call, text
 
 T = TypeVar("T")
 
@@ -120,14 +122,19 @@ def word(name: str, value: Any) -> Optional[str]:
         raise Error(f"{name}: a {type(value).__name__} is neither a word nor a number") from None
 
 
-def set_options(options: Handle, values: "dict[str, Any]") -> None:
+@functools.lru_cache(maxsize=None)
+def _switches(command: str) -> "frozenset[str]":
+    options = json.loads(text("describe", command.encode()))
+    return frozenset(option["name"].replace("-", "_") for option in options if option["is_switch"])
+
+
+def set_options(options: Handle, command: str, values: "dict[str, Any]") -> None:
     """Sets those that are not None; False leaves a switch off."""
     for name, value in values.items():
-        if value is None or (value is False and name in ("fit", "project", "regularize", "scene", "polygons",
-                                                         "triangulate", "wrap")):
+        if value is None or (value is False and name in _switches(command)):
             continue
-        text = word(name, value)
-        encoded = None if text is None else os.fsencode(text)
+        given = word(name, value)
+        encoded = None if given is None else os.fsencode(given)
         if encoded is not None and b"\0" in encoded:
             raise Error(f"{name}: a value has no null characters")
         call("options_set", options.value, name.replace("_", "-").encode(), encoded)

@@ -40,7 +40,6 @@ void add_common_options(CLI::App* app, CommonOptions& options, const char* about
 
 namespace {
 
-// In the order of the report's seconds: the first name is that of the whole run.
 void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary) {
   const Stopwatch total;
   const std::string& report_path = files.common.report;

@@ -56,4 +56,13 @@ using PrintSummary = std::function<void(Console& console, const job::Job& job, c
 // A command that reads, computes, writes and prints what a job says.
 Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandText& text, PrintSummary print_summary);
 
+template <class AnyJob>
+Command add_job(CLI::App& program, const CommandText& text,
+                void (*print_summary)(Console& console, const AnyJob& job, const JobFiles& files)) {
+  const auto job = std::make_shared<AnyJob>();
+  return add_job(program, job, text, [=](Console& console, const job::Job&, const JobFiles& files) {
+    print_summary(console, *job, files);
+  });
+}
+
 }  // namespace bisector::cli

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <functional>
-#include <memory>
 #include <string>
 
 #include "front.h"
@@ -105,15 +104,13 @@ void print_summary(Console& console, const QualityJob& job, const JobFiles& file
 
 Command add_quality(CLI::App& program) {
   return add_job(
-      program, std::make_shared<QualityJob>(),
+      program,
       {"Measure angles, topology and distance to another mesh.", "bisector quality MESH [--reference IN] [options]",
        "Example:\n"
        "  bisector quality out.obj --reference bunny.off",
        "write a report: JSON, or a page with 3D views if FILE\n"
        "ends in .html; - for stdout"},
-      [](Console& console, const Job& job, const JobFiles& files) {
-        print_summary(console, dynamic_cast<const QualityJob&>(job), files);
-      });
+      print_summary);
 }
 
 }  // namespace bisector::cli

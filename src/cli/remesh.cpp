@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "front.h"
 #include "job/messages.h"
 #include "summary.h"
@@ -43,7 +41,7 @@ void print_summary(Console& console, const RemeshJob& job, const JobFiles& files
 
 Command add_remesh(CLI::App& program) {
   return add_job(
-      program, std::make_shared<RemeshJob>(),
+      program,
       {"Make a high-quality triangle mesh of a surface.", "bisector remesh IN -o OUT -n N|--edge-length L [options]",
        "Examples:\n"
        "  bisector remesh bunny.off -o out.obj -n 10000\n"
@@ -53,9 +51,7 @@ Command add_remesh(CLI::App& program) {
        "write a report with quality, distance to the input and\n"
        "timings: JSON, or a page with 3D views if FILE ends in\n"
        ".html; - for stdout"},
-      [](Console& console, const Job& job, const JobFiles& files) {
-        print_summary(console, dynamic_cast<const RemeshJob&>(job), files);
-      });
+      print_summary);
 }
 
 }  // namespace bisector::cli

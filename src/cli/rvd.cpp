@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 
 #include "front.h"
 #include "job/messages.h"
@@ -34,7 +33,7 @@ void print_summary(Console& console, const RvdJob& job, const JobFiles& files) {
 }  // namespace
 
 Command add_rvd(CLI::App& program) {
-  return add_job(program, std::make_shared<RvdJob>(),
+  return add_job(program,
                  {"Compute one restricted Voronoi diagram of a surface.",
                   "bisector rvd IN --seeds FILE.xyz|-n N [-o CELLS.ply] [options]",
                   "Examples:\n"
@@ -43,9 +42,7 @@ Command add_rvd(CLI::App& program) {
                   "write a report with all cells and the restricted\n"
                   "Delaunay triangulation (rdt): JSON, or a page with 3D\n"
                   "views if FILE ends in .html; - for stdout"},
-                 [](Console& console, const Job& job, const JobFiles& files) {
-                   print_summary(console, dynamic_cast<const RvdJob&>(job), files);
-                 });
+                 print_summary);
 }
 
 }  // namespace bisector::cli

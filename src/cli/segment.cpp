@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <map>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -66,7 +65,7 @@ void print_summary(Console& console, const SegmentJob& job, const JobFiles& file
 }  // namespace
 
 Command add_segment(CLI::App& program) {
-  return add_job(program, std::make_shared<SegmentJob>(),
+  return add_job(program,
                  {"Divide a surface into planes, quadrics and tori.",
                   "bisector segment IN -o OUT [--proxies N|--error E] [options]",
                   "Examples:\n"
@@ -80,9 +79,7 @@ Command add_segment(CLI::App& program) {
                   "write a report with type, parameters and error of each\n"
                   "region: JSON, or a page with 3D views if FILE ends in\n"
                   ".html; - for stdout"},
-                 [](Console& console, const Job& job, const JobFiles& files) {
-                   print_summary(console, dynamic_cast<const SegmentJob&>(job), files);
-                 });
+                 print_summary);
 }
 
 }  // namespace bisector::cli

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "front.h"
 #include "job/messages.h"
 #include "remesh/topology_control.h"
@@ -49,7 +47,7 @@ void print_summary(Console& console, const TetJob& job, const JobFiles& files) {
 
 Command add_tet(CLI::App& program) {
   return add_job(
-      program, std::make_shared<TetJob>(),
+      program,
       {"Make a high-quality tetrahedral mesh of a solid.", "bisector tet IN -o OUT -n N|--edge-length L [options]",
        "Examples:\n"
        "  bisector tet bunny.off -o out.msh -n 10000\n"
@@ -61,9 +59,7 @@ Command add_tet(CLI::App& program) {
        "write a report with quality, distance of the boundary to\n"
        "the input and timings: JSON, or a page with 3D views if\n"
        "FILE ends in .html; - for stdout"},
-      [](Console& console, const Job& job, const JobFiles& files) {
-        print_summary(console, dynamic_cast<const TetJob&>(job), files);
-      });
+      print_summary);
 }
 
 }  // namespace bisector::cli

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -58,7 +57,7 @@ void print_summary(Console& console, const TreeJob& job, const JobFiles& files) 
 }  // namespace
 
 Command add_tree(CLI::App& program) {
-  return add_job(program, std::make_shared<TreeJob>(),
+  return add_job(program,
                  {"Reconstruct the branches of a tree from a laser scan.", "bisector tree POINTS -o OUT [options]",
                   "Examples:\n"
                   "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
@@ -69,9 +68,7 @@ Command add_tree(CLI::App& program) {
                   "write a report with branches, volume, distances of the\n"
                   "points and timings: JSON, or a page with 3D views if\n"
                   "FILE ends in .html; - for stdout"},
-                 [](Console& console, const Job& job, const JobFiles& files) {
-                   print_summary(console, dynamic_cast<const TreeJob&>(job), files);
-                 });
+                 print_summary);
 }
 
 }  // namespace bisector::cli

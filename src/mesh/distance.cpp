@@ -103,7 +103,7 @@ DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& re
 }
 
 DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference, const Context& context) {
-  return measure_distance(mesh, reference, 200'000, 1, context);
+  return measure_distance(mesh, reference, kDistanceSamples, 1, context);
 }
 
 }  // namespace bisector

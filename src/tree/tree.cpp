@@ -547,6 +547,8 @@ TriangleMesh tree_mesh(const TreeResult& tree, double tolerance, const Context& 
   return mesh;
 }
 
-TriangleMesh tree_mesh(const TreeResult& tree, const Context& context) { return tree_mesh(tree, 0.05, context); }
+TriangleMesh tree_mesh(const TreeResult& tree, const Context& context) {
+  return tree_mesh(tree, kTreeTolerance, context);
+}
 
 }  // namespace bisector

@@ -22,7 +22,7 @@ from unittest import mock
 import numpy as np
 
 import bisector as bs
-from bisector import _library
+from bisector import _library, _meshes
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("BISECTOR_PROGRAM")
@@ -256,6 +256,11 @@ class Arrays(unittest.TestCase):
         grid = types.SimpleNamespace(points=t.vertices, celltypes=kinds, cell_data={}, cell_connectivity=stream,
                                      offset=np.concatenate([[0], np.cumsum(np.where(kinds == 10, 4, 3))]))
         self.assertEqual(bs.quality(grid)["quality"], bs.quality(t)["quality"])
+        marks = np.arange(len(kinds))
+        grid.cell_data = {"region": marks, "label": marks}
+        arrays = _meshes.arrays_of(grid)
+        self.assertTrue(np.array_equal(arrays.regions, marks[:len(t.tets)]))
+        self.assertTrue(np.array_equal(arrays.labels, marks[len(t.tets):]))
         grid.celltypes = kinds + 2
         with self.assertRaisesRegex(bs.Error, "types .7, 12."):
             bs.quality(grid)
@@ -315,6 +320,7 @@ class Errors(unittest.TestCase):
         self.expect("topology", PART, n=50, topology="mend")
         self.expect("is not a number", PART, n=50, tolerance=float("nan"))
         self.expect("neither a word nor a number", PART, n=[5])
+        self.expect("whole number", PART, n=False)
         self.expect("finite", (vertices * np.nan, faces), n=50)
         self.expect("out of range", (vertices, faces + 1000), n=50)
         self.expect("out of range", (vertices, faces - 1000), n=50)
