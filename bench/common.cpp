@@ -97,7 +97,8 @@ void add_device_options(CLI::App& app, DeviceOptions& options) {
 }
 
 void add_device(CLI::App& app, DeviceRequest& device) {
-  job::add_parsed(&app, "--device", device, parse_device, "cpu, vulkan, vulkan:INDEX or vulkan:UUID");
+  job::add_parsed(&app, "--device", device, parse_device, "cpu, vulkan, vulkan:INDEX or vulkan:UUID",
+                  {"cpu", "vulkan", "vulkan:"});
 }
 
 std::unique_ptr<Backend> make_device_backend(const Surface& surface, const DeviceOptions& options,

@@ -171,7 +171,8 @@ void run(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   CLI::App app{"Measures what a device can do at most: bandwidths, the time of a submission, rates of arithmetic."};
-  job::add_parsed(&app, "--device", options.device, parse_device, "vulkan (default), vulkan:INDEX or vulkan:UUID");
+  job::add_parsed(&app, "--device", options.device, parse_device, "vulkan (default), vulkan:INDEX or vulkan:UUID",
+                  {"vulkan", "vulkan:"});
   app.add_option("--size", options.mebibytes, "MiB of a buffer, at most an eighth of the memory; default 1024")
       ->check(CLI::Range(1, 16384));
   app.add_option("--json", options.json, "also write the table to this file");

@@ -156,14 +156,20 @@ void run(const CheckCommand& command) {
 
 Command add_check(CLI::App& program) {
   const auto command = std::make_shared<CheckCommand>();
-  CLI::App* app = add_command(program, "check", "Compare a device's diagrams with the CPU's.",
-                              "bisector check [--device DEVICE] [options]",
-                              "Examples:\n"
-                              "  bisector check\n"
-                              "  bisector check --device vulkan:1 --precision single --report check.json\n\n"
-                              "Prints one line for each case, and exits with 1 if any does not agree.");
+  const CommandText text{
+      "Compare a device's diagrams with the CPU's.",
+      "bisector check [--device DEVICE] [options]",
+      "Computes restricted Voronoi diagrams of small generated surfaces and clipped ones of small solids, with random, "
+      "optimised, clustered and gridded seeds and seeds at the vertices, on a device and on the CPU, and compares "
+      "them. "
+      "It takes seconds on a GPU.",
+      {{"bisector check", "Check the best GPU."},
+       {"bisector check --device vulkan:1 --precision single --report check.json",
+        "Check one device in single precision, and write a report."}},
+      "Prints one line for each case, and exits with 1 if any does not agree."};
+  CLI::App* app = add_command(program, "check", text);
   add_options(app, *command);
-  return {app, {}, [=] { run(*command); }};
+  return {app, text, {}, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

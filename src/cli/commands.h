@@ -4,12 +4,29 @@
 #include <CLI/CLI.hpp>
 
 #include <functional>
+#include <vector>
 
 namespace bisector::cli {
+
+// A command line, and what it does.
+struct Example {
+  const char* line;
+  const char* about;
+};
+
+// What is said of a command. Help has all but `description` and what examples do, the manual page has all.
+struct CommandText {
+  const char* about;  // one line
+  const char* usage;
+  const char* description;  // paragraphs, a line each
+  std::vector<Example> examples;
+  const char* notes = "";  // below the examples
+};
 
 // A subcommand whose options have been added to the program.
 struct Command {
   CLI::App* app;
+  CommandText text;
   // What options ask of each other; may be empty. Throws CLI::ValidationError.
   std::function<void()> check_usage;
   // Reads the input, calls the library, and writes and prints the result. Throws Error and Cancelled; then no output

@@ -8,6 +8,7 @@
 #include <csignal>
 
 #include "job/messages.h"
+#include "program.h"
 
 namespace bisector::cli {
 namespace {

@@ -13,12 +13,6 @@
 
 namespace bisector::cli {
 
-// Exit codes, part of the program's contract.
-inline constexpr int kSuccess = 0;
-inline constexpr int kFailure = 1;        // bad input or a failed run
-inline constexpr int kUsage = 2;          // bad usage
-inline constexpr int kInterrupted = 130;  // Ctrl-C or SIGTERM: nothing was written
-
 // From here on Ctrl-C and SIGTERM set the flag that is returned; a second one ends the program at once.
 const std::atomic<bool>& watch_interrupts();
 // From here on they are ignored, so that outputs are written together. Throws Cancelled if one came before.

@@ -26,7 +26,7 @@ struct DevicesCommand {
 
 void add_options(CLI::App* app, DevicesCommand& command) {
   add_file(app, "--report", command.report, "FILE",
-           "write a report: JSON, or a page if FILE ends in .html;\n- for stdout")
+           "write a report: JSON, or a page if FILE ends in .html;\n- for stdout", kReportFormats)
       ->group("Output");
 }
 
@@ -66,10 +66,19 @@ void run(const DevicesCommand& command) {
 
 Command add_devices(CLI::App& program) {
   const auto command = std::make_shared<DevicesCommand>();
-  CLI::App* app = add_command(program, "devices", "List what Bisector can compute on here.",
-                              "bisector devices [--report FILE]", "Example:\n  bisector devices");
+  const CommandText text{
+      "List what Bisector can compute on here.",
+      "bisector devices [--report FILE]",
+      "Lists the CPU, then each Vulkan device: the index and UUID by which --device takes it, name, kind, driver, "
+      "Vulkan "
+      "version, memory, the optional features that are used, and why it cannot be used if so. Where there is none it "
+      "says why.\n"
+      "Vulkan is looked for when the program runs; nothing else needs it. A GPU needs its driver, NVIDIA's or Mesa's, "
+      "and the Vulkan loader.",
+      {{"bisector devices", "List the devices."}}};
+  CLI::App* app = add_command(program, "devices", text);
   add_options(app, *command);
-  return {app, {}, [=] { run(*command); }};
+  return {app, text, {}, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -24,16 +24,19 @@ std::string Help::make_group(std::string name, bool is_positional, std::vector<c
   return is_positional ? group + "\n" : group;
 }
 
-CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer) {
-  CLI::App* app = program.add_subcommand(name, about);
+CLI::App* add_command(CLI::App& program, const char* name, const CommandText& text) {
+  CLI::App* app = program.add_subcommand(name, text.about);
+  std::string footer = text.examples.size() == 1 ? "Example:" : "Examples:";
+  for (const Example& example : text.examples) footer += std::string("\n  ") + example.line;
+  if (*text.notes) footer += std::string("\n\n") + text.notes;
   app->group("Commands")->footer(footer);
-  app->formatter(std::make_shared<Help>(usage));
+  app->formatter(std::make_shared<Help>(text.usage));
   app->get_help_ptr()->description("print this and exit")->group("Output");
   return app;
 }
 
 void add_common_options(CLI::App* app, CommonOptions& options, const char* about) {
-  job::add_file(app, "--report", options.report, "FILE", about)->group("Output");
+  job::add_file(app, "--report", options.report, "FILE", about, job::kReportFormats)->group("Output");
   app->add_flag("--quiet", options.quiet, "print errors only")->group("Output");
   app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
 }
@@ -86,23 +89,24 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
 
 }  // namespace
 
-Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandText& text, PrintSummary print_summary) {
+Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandText& text, const char* report_help,
+                PrintSummary print_summary) {
   const auto files = std::make_shared<JobFiles>();
-  CLI::App* app = add_command(program, job->command(), text.about, text.usage, text.footer);
+  CLI::App* app = add_command(program, job->command(), text);
   const job::InputKind input = job->input_kind();
-  job::add_file(app, input.name, job->input, "FILE", input.help)->required();
+  job::add_file(app, input.name, job->input, "FILE", input.help, input.extensions)->required();
   for (const job::OutputKind& kind : job->outputs())
-    job::add_file(app, kind.option, files->outputs[kind.name], kind.type, kind.help)
+    job::add_file(app, kind.option, files->outputs[kind.name], kind.type, kind.help, kind.extensions)
         ->required(kind.required)
         ->group("Output");
   job->add_options(app);
-  add_common_options(app, files->common, text.report_help);
+  add_common_options(app, files->common, report_help);
   const auto check_usage = [=] {
     for (const auto& [name, path] : files->outputs)
       if (!path.empty()) job->plan(name, path);
     job->check_usage(job::Usage(*app));
   };
-  return {app, check_usage, [=] { run(*job, *files, print_summary); }};
+  return {app, text, check_usage, [=] { run(*job, *files, print_summary); }};
 }
 
 }  // namespace bisector::cli

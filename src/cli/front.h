@@ -20,8 +20,8 @@ struct CommonOptions {
   bool verbose = false;
 };
 
-// Adds a subcommand with nothing but its help: `about` is one line, `footer` holds examples.
-CLI::App* add_command(CLI::App& program, const char* name, const char* about, const char* usage, const char* footer);
+// Adds a subcommand with nothing but its help.
+CLI::App* add_command(CLI::App& program, const char* name, const CommandText& text);
 
 // The help of the program or of a command, with its usage written out.
 class Help : public CLI::Formatter {
@@ -37,14 +37,6 @@ class Help : public CLI::Formatter {
 // --report with the help `about`, --quiet and --verbose.
 void add_common_options(CLI::App* app, CommonOptions& options, const char* about);
 
-// What the program says of a command.
-struct CommandText {
-  const char* about;  // one line
-  const char* usage;
-  const char* footer;       // examples
-  const char* report_help;  // of --report
-};
-
 // What a summary speaks of beside the job: the file that each output goes to, empty if it is not wanted.
 struct JobFiles {
   std::map<std::string, std::string> outputs;  // by OutputKind::name
@@ -53,14 +45,15 @@ struct JobFiles {
 
 using PrintSummary = std::function<void(Console& console, const job::Job& job, const JobFiles& files)>;
 
-// A command that reads, computes, writes and prints what a job says.
-Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandText& text, PrintSummary print_summary);
+// A command that reads, computes, writes and prints what a job says. `report_help` is that of --report.
+Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandText& text, const char* report_help,
+                PrintSummary print_summary);
 
 template <class AnyJob>
-Command add_job(CLI::App& program, const CommandText& text,
+Command add_job(CLI::App& program, const CommandText& text, const char* report_help,
                 void (*print_summary)(Console& console, const AnyJob& job, const JobFiles& files)) {
   const auto job = std::make_shared<AnyJob>();
-  return add_job(program, job, text, [=](Console& console, const job::Job&, const JobFiles& files) {
+  return add_job(program, job, text, report_help, [=](Console& console, const job::Job&, const JobFiles& files) {
     print_summary(console, *job, files);
   });
 }

@@ -5,16 +5,14 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
-#include <memory>
 #include <new>
 #include <string>
 #include <vector>
 
 #include "bisector/error.h"
-#include "commands.h"
 #include "console.h"
-#include "front.h"
 #include "job/messages.h"
+#include "program.h"
 
 namespace {
 
@@ -47,42 +45,23 @@ int run_guarded(const std::function<void()>& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App program{
-      "Bisector makes high-quality triangle meshes of surfaces and tetrahedral meshes of solids by optimising "
-      "certified\n"
-      "Voronoi diagrams, and reconstructs trees from laser scans."};
-  program.name("bisector");
-  program.formatter(std::make_shared<Help>("bisector COMMAND ..."));
-  program.footer(
-      "Start with:\n"
-      "  bisector remesh IN.off -o OUT.obj -n 10000     remesh with 10,000 vertices\n"
-      "  bisector tet IN.off -o OUT.msh -n 10000        fill it with tetrahedra\n"
-      "  bisector segment IN.off -o OUT.ply             find its planes, cylinders, ...\n"
-      "  bisector tree SCAN.xyz -o OUT.obj              reconstruct a tree from a laser scan\n"
-      "  bisector quality OUT.obj --reference IN.off    see how good the result is\n"
-      "  bisector remesh --help                         all options of a command\n\n"
-      "Exit codes: 0 success, 1 bad input or a failed run, 2 bad usage, 130 cancelled. If not 0, nothing is written.");
-  program.set_version_flag("--version", std::string("bisector ") + BISECTOR_VERSION, "print the version and exit");
-  program.get_help_ptr()->description("print this and exit");
-  program.require_subcommand(0, 1);
-
-  const std::vector<Command> commands{add_remesh(program),  add_rvd(program),  add_tet(program),
-                                      add_segment(program), add_tree(program), add_quality(program),
-                                      add_devices(program), add_check(program)};
+  Program program = make_program();
+  CLI::App& app = *program.app;
+  const std::vector<Command>& commands = program.commands;
   const auto chosen = [&]() -> const Command* {
     const auto found = std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.app->parsed(); });
     return found == commands.end() ? nullptr : &*found;
   };
 
   try {
-    program.parse(argc, argv);
+    app.parse(argc, argv);
     if (chosen() && chosen()->check_usage) chosen()->check_usage();
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return program.exit(error);
+    if (error.get_exit_code() == 0) return app.exit(error);
     return fail_usage(error.what(), chosen() ? chosen()->app : nullptr);
   }
   if (!chosen()) {
-    std::fputs(program.help().c_str(), stdout);
+    std::fputs(app.help().c_str(), stdout);
     return fail_usage("no command given", nullptr);
   }
 

@@ -103,14 +103,17 @@ void print_summary(Console& console, const QualityJob& job, const JobFiles& file
 }  // namespace
 
 Command add_quality(CLI::App& program) {
-  return add_job(
-      program,
-      {"Measure angles, topology and distance to another mesh.", "bisector quality MESH [--reference IN] [options]",
-       "Example:\n"
-       "  bisector quality out.obj --reference bunny.off",
-       "write a report: JSON, or a page with 3D views if FILE\n"
-       "ends in .html; - for stdout"},
-      print_summary);
+  return add_job(program,
+                 {"Measure angles, topology and distance to another mesh.",
+                  "bisector quality MESH [--reference IN] [options]",
+                  "Prints the quality of triangles, their angles and edge lengths, valences, topology and "
+                  "self-intersections, and of tetrahedra their dihedral angles, radius ratios and volumes. Of "
+                  "tetrahedra the boundary is measured like a surface, and distances are those of the boundaries.",
+                  {{"bisector quality out.obj --reference bunny.off",
+                    "Measure a mesh, and its distance to what it was made of."}}},
+                 "write a report: JSON, or a page with 3D views if FILE\n"
+                 "ends in .html; - for stdout",
+                 print_summary);
 }
 
 }  // namespace bisector::cli

@@ -42,15 +42,23 @@ void print_summary(Console& console, const RemeshJob& job, const JobFiles& files
 Command add_remesh(CLI::App& program) {
   return add_job(
       program,
-      {"Make a high-quality triangle mesh of a surface.", "bisector remesh IN -o OUT -n N|--edge-length L [options]",
-       "Examples:\n"
-       "  bisector remesh bunny.off -o out.obj -n 10000\n"
-       "  bisector remesh part.stl -o out.ply -n 5000 --report out.json --preview out.png\n"
-       "  bisector remesh part.stl -o out.ply --edge-length 0.5 --features 30\n\n"
-       "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written.",
-       "write a report with quality, distance to the input and\n"
-       "timings: JSON, or a page with 3D views if FILE ends in\n"
-       ".html; - for stdout"},
+      {"Make a high-quality triangle mesh of a surface.",
+       "bisector remesh IN -o OUT -n N|--edge-length L [options]",
+       "The vertices of the result are the seeds of a centroidal Voronoi tessellation of the surface, so its triangles "
+       "are close to equilateral and evenly sized, or sized by a density. Sharp edges, borders and borders between "
+       "face labels are kept as chains of edges, and the topology is the input's.\n"
+       "The input may be what scanners and CAD systems leave: cracks that rounding made are closed, and soups, open "
+       "sheets and surfaces that cross themselves become a closed manifold with --wrap.\n"
+       "The result has the number of vertices asked for, but for those that features and topology add.",
+       {{"bisector remesh bunny.off -o out.obj -n 10000", "Remesh with 10,000 vertices."},
+        {"bisector remesh part.stl -o out.ply -n 5000 --report out.json --preview out.png",
+         "Remesh a CAD part, write figures on its quality and draw a picture."},
+        {"bisector remesh part.stl -o out.ply --edge-length 0.5 --features 30",
+         "Make edges half a unit long, and keep all edges that are sharper than 30 degrees."}},
+       "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written."},
+      "write a report with quality, distance to the input and\n"
+      "timings: JSON, or a page with 3D views if FILE ends in\n"
+      ".html; - for stdout",
       print_summary);
 }
 

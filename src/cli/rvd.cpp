@@ -36,12 +36,17 @@ Command add_rvd(CLI::App& program) {
   return add_job(program,
                  {"Compute one restricted Voronoi diagram of a surface.",
                   "bisector rvd IN --seeds FILE.xyz|-n N [-o CELLS.ply] [options]",
-                  "Examples:\n"
-                  "  bisector rvd bunny.off -n 500 -o cells.ply --preview cells.png\n"
-                  "  bisector rvd bunny.off --seeds points.xyz --report -",
-                  "write a report with all cells and the restricted\n"
-                  "Delaunay triangulation (rdt): JSON, or a page with 3D\n"
-                  "views if FILE ends in .html; - for stdout"},
+                  "The surface is divided among the seeds by nearness, without optimising them. The report has the "
+                  "mass, centroid and energy of each cell and the restricted Delaunay triangulation.\n"
+                  "Ties are decided by the seeds' order, so that the diagram is a function of mesh and seeds alone; "
+                  "that its cells tile the surface is checked.",
+                  {{"bisector rvd bunny.off -n 500 -o cells.ply --preview cells.png",
+                    "Write and draw the cells of 500 random seeds."},
+                   {"bisector rvd bunny.off --seeds points.xyz --report -",
+                    "Print the cells' figures and the dual of given seeds as JSON."}}},
+                 "write a report with all cells and the restricted\n"
+                 "Delaunay triangulation (rdt): JSON, or a page with 3D\n"
+                 "views if FILE ends in .html; - for stdout",
                  print_summary);
 }
 

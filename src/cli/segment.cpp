@@ -65,21 +65,28 @@ void print_summary(Console& console, const SegmentJob& job, const JobFiles& file
 }  // namespace
 
 Command add_segment(CLI::App& program) {
-  return add_job(program,
-                 {"Divide a surface into planes, quadrics and tori.",
-                  "bisector segment IN -o OUT [--proxies N|--error E] [options]",
-                  "Examples:\n"
-                  "  bisector segment part.stl -o regions.ply --proxies 22 --preview regions.png\n"
-                  "  bisector segment part.stl -o regions.obj --error 0.05 --report regions.json\n"
-                  "  bisector segment part.stl -o regions.ply --proxies 22 --regularize\n"
-                  "  bisector segment bunny.off -o regions.ply --proxies 28\n\n"
-                  ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C "
-                  "stops the run; nothing is\n"
-                  "written.",
-                  "write a report with type, parameters and error of each\n"
-                  "region: JSON, or a page with 3D views if FILE ends in\n"
-                  ".html; - for stdout"},
-                 print_summary);
+  return add_job(
+      program,
+      {"Divide a surface into planes, quadrics and tori.",
+       "bisector segment IN -o OUT [--proxies N|--error E] [options]",
+       "Each region is connected and close to one surface, whose type and parameters the report tells: a plane, a "
+       "sphere, a cylinder, a cone, a torus or another quadric. Borders between regions are smoothed.\n"
+       "With --json the surfaces are written with the loops that trim them, of which bisector-step makes faces for CAD "
+       "systems. With --polygons planar regions become the polygons of a coarse mesh.",
+       {{"bisector segment part.stl -o regions.ply --proxies 22 --preview regions.png",
+         "Find 22 regions, and draw a picture of them."},
+        {"bisector segment part.stl -o regions.obj --error 0.05 --report regions.json",
+         "Find as few regions as keep the distance below 0.05 % of the diagonal."},
+        {"bisector segment part.stl -o regions.ply --proxies 22 --regularize",
+         "Let surfaces share axes, planes, radii and angles where the data allow."},
+        {"bisector segment bunny.off -o regions.ply --proxies 28", "Divide a scan into 28 regions."}},
+       ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C stops the run; nothing "
+       "is\n"
+       "written."},
+      "write a report with type, parameters and error of each\n"
+      "region: JSON, or a page with 3D views if FILE ends in\n"
+      ".html; - for stdout",
+      print_summary);
 }
 
 }  // namespace bisector::cli

@@ -48,17 +48,24 @@ void print_summary(Console& console, const TetJob& job, const JobFiles& files) {
 Command add_tet(CLI::App& program) {
   return add_job(
       program,
-      {"Make a high-quality tetrahedral mesh of a solid.", "bisector tet IN -o OUT -n N|--edge-length L [options]",
-       "Examples:\n"
-       "  bisector tet bunny.off -o out.msh -n 10000\n"
-       "  bisector tet part.stl -o out.vtu --edge-length 0.5 --report out.json\n"
-       "  bisector tet coarse.mesh -o fine.mesh -n 50000 --sizes sizes.vtu:h\n\n"
-       "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, "
-       ".vtk, .vtu). Ctrl-C stops the run;\n"
-       "nothing is written.",
-       "write a report with quality, distance of the boundary to\n"
-       "the input and timings: JSON, or a page with 3D views if\n"
-       "FILE ends in .html; - for stdout"},
+      {"Make a high-quality tetrahedral mesh of a solid.",
+       "bisector tet IN -o OUT -n N|--edge-length L [options]",
+       "The vertices are the seeds of a centroidal Voronoi tessellation of the solid, with a boundary like that which "
+       "bisector remesh makes; slivers are then removed, so that dihedral angles are at least 30 degrees as a rule.\n"
+       "A surface must be closed, manifold and free of self-intersections; others can be wrapped with --wrap. It may "
+       "have several parts, beside or inside each other; a part inside an odd number of others is a cavity. Surfaces "
+       "are filled by TetGen in a process of its own, bisector-tetgen.",
+       {{"bisector tet bunny.off -o out.msh -n 10000", "Fill a surface with tetrahedra of about 10,000 vertices."},
+        {"bisector tet part.stl -o out.vtu --edge-length 0.5 --report out.json",
+         "Make edges half a unit long, and write figures on angles and volumes."},
+        {"bisector tet coarse.mesh -o fine.mesh -n 50000 --sizes sizes.vtu:h",
+         "Mesh a solid anew, with the edge lengths h that another mesh has."}},
+       "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, .vtk, .vtu). Ctrl-C stops "
+       "the run;\n"
+       "nothing is written."},
+      "write a report with quality, distance of the boundary to\n"
+      "the input and timings: JSON, or a page with 3D views if\n"
+      "FILE ends in .html; - for stdout",
       print_summary);
 }
 

@@ -57,18 +57,26 @@ void print_summary(Console& console, const TreeJob& job, const JobFiles& files) 
 }  // namespace
 
 Command add_tree(CLI::App& program) {
-  return add_job(program,
-                 {"Reconstruct the branches of a tree from a laser scan.", "bisector tree POINTS -o OUT [options]",
-                  "Examples:\n"
-                  "  bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png\n"
-                  "  bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply\n"
-                  "  bisector tree street.las -o trees.obj --scene --cylinders trees.csv\n\n"
-                  "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
-                  "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written.",
-                  "write a report with branches, volume, distances of the\n"
-                  "points and timings: JSON, or a page with 3D views if\n"
-                  "FILE ends in .html; - for stdout"},
-                 print_summary);
+  return add_job(
+      program,
+      {"Reconstruct the branches of a tree from a laser scan.",
+       "bisector tree POINTS -o OUT [options]",
+       "The skeleton follows the shortest paths along the points; radii are fitted to the points around it, and follow "
+       "the pipe model where there are too few. Each branch is a closed surface whose root reaches to its parent's "
+       "axis, as triangles or as a B-spline surface. The report has lengths, radii, orders and volumes.\n"
+       "With --scene ground and walls are left out and several trees are told from each other.",
+       {{"bisector tree scan.xyz -o tree.obj --report tree.json --preview tree.png",
+         "Make triangles with a group for each branch, a report and a picture."},
+        {"bisector tree scan.ply -o tree.igs --unit mm --skeleton skeleton.ply",
+         "Make B-spline surfaces of a scan in millimetres, and write the branches' axes."},
+        {"bisector tree street.las -o trees.obj --scene --cylinders trees.csv",
+         "Tell the trees of a street from each other, and write their branches as cylinders."}},
+       "POINTS is .las (not compressed), .ply, .pcd, .pts or, with any other name, lines\n"
+       "\"x y z\"; z is up. Ctrl-C stops the run; nothing is written."},
+      "write a report with branches, volume, distances of the\n"
+      "points and timings: JSON, or a page with 3D views if\n"
+      "FILE ends in .html; - for stdout",
+      print_summary);
 }
 
 }  // namespace bisector::cli

@@ -43,6 +43,7 @@ struct Given {
 struct InputKind {
   const char* name;
   const char* help;
+  std::vector<std::string> extensions = {};  // the formats that can be read; empty: any name
 };
 
 // A file that a run can write.

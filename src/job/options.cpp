@@ -103,12 +103,17 @@ CLI::Validator number_above_zero() {
       "");
 }
 
-CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const char* type, const char* help) {
-  return app->add_option(name, path, help)->type_name(type)->check(not_empty());
+CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const char* type, const char* help,
+                      std::vector<std::string> extensions) {
+  return app->add_option(name, path, help)
+      ->type_name(type)
+      ->check(with_values(not_empty(), {{}, true, std::move(extensions)}));
 }
 
 CLI::Option* add_device(CLI::App* app, DeviceRequest& device, const char* help) {
-  return add_parsed(app, "--device", device, parse_device, help)->type_name("DEVICE")->group("Computation");
+  return add_parsed(app, "--device", device, parse_device, help, {"auto", "cpu", "vulkan", "vulkan:"})
+      ->type_name("DEVICE")
+      ->group("Computation");
 }
 
 void add_compute_options(CLI::App* app, ComputeOptions& options) {
@@ -155,7 +160,7 @@ void add_edge_bounds(CLI::App* app, SizingOptions& sizing) {
       ->type_name("L")
       ->check(number_above_zero())
       ->group("Size");
-  app->add_option("--edge-max", sizing.max_edge, "and no longer")
+  app->add_option("--edge-max", sizing.max_edge, "edges aimed at are no longer")
       ->type_name("L")
       ->check(number_above_zero())
       ->group("Size");
@@ -181,12 +186,13 @@ void add_density(CLI::App* app, SizingOptions& sizing, std::string& attribute, c
   };
   app->add_option_function<std::string>("--density", set, help)
       ->type_name("WORD")
-      ->check(parsed_by(parse_density))
+      ->check(with_values(parsed_by(parse_density),
+                          {{"uniform", "lfs", "lfs:", "curvature", "curvature:", "attribute:"}, false, {}}))
       ->group("Size");
 }
 
 void add_features(CLI::App* app, FeatureOptions& features, const char* help) {
-  add_parsed(app, "--features", features, parse_features, help)->group("Features");
+  add_parsed(app, "--features", features, parse_features, help, {"auto", "none"})->group("Features");
 }
 
 void add_feature_file(CLI::App* app, std::string& path) {

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "bisector/device.h"
 #include "bisector/features.h"
@@ -27,7 +28,9 @@ CLI::Validator number_above_zero();
 
 // --- Options of several commands ---
 
-CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const char* type, const char* help);
+// `extensions`: of the files that the option takes, with the dot; empty: any name.
+CLI::Option* add_file(CLI::App* app, const char* name, std::string& path, const char* type, const char* help,
+                      std::vector<std::string> extensions = {});
 CLI::Option* add_device(CLI::App* app, DeviceRequest& device, const char* help);
 void add_compute_options(CLI::App* app, ComputeOptions& options);
 void add_threads(CLI::App* app, unsigned& threads);

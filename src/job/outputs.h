@@ -20,9 +20,12 @@ inline Output report_output(const std::string& path) { return {path == "-" ? "" 
 // an output other than the first would replace an input.
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
-inline const std::vector<std::string> kMeshFormats{".off", ".obj", ".ply", ".stl"};
+inline const std::vector<std::string> kMeshFormats{".off", ".obj", ".ply", ".stl"};  // read, too
 inline const std::vector<std::string> kPolygonFormats{".obj", ".ply", ".off"};
 inline const std::vector<std::string> kTreeFormats{".obj", ".ply", ".off", ".stl", ".igs", ".iges"};
 inline const std::vector<std::string> kTetFormats{".mesh", ".msh", ".vtu"};
+inline const std::vector<std::string> kReportFormats{".json", ".html"};
+// What is read where a surface or tetrahedra will do.
+inline const std::vector<std::string> kDomainFormats{".off", ".obj", ".ply", ".stl", ".mesh", ".msh", ".vtk", ".vtu"};
 
 }  // namespace bisector::job

@@ -7,6 +7,7 @@
 #include "bisector/quality.h"
 #include "job/inputs.h"
 #include "job/job.h"
+#include "job/outputs.h"
 
 namespace bisector::job {
 
@@ -24,7 +25,8 @@ class QualityJob final : public Job {
   InputKind input_kind() const override {
     return {"MESH",
             "surface to measure: .off, .obj, .ply or .stl; or\n"
-            "tetrahedra: .mesh, .msh, .vtk or .vtu"};
+            "tetrahedra: .mesh, .msh, .vtk or .vtu",
+            kDomainFormats};
   }
   std::vector<OutputKind> outputs() const override { return {}; }
   void add_options(CLI::App* app) override;

@@ -8,13 +8,14 @@
 #include "bisector/quality.h"
 #include "bisector/remesh.h"
 #include "job/job.h"
+#include "job/outputs.h"
 
 namespace bisector::job {
 
 class RemeshJob final : public Job {
  public:
   const char* command() const override { return "remesh"; }
-  InputKind input_kind() const override { return {"IN", "surface to remesh"}; }
+  InputKind input_kind() const override { return {"IN", "surface to remesh", kMeshFormats}; }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;

@@ -8,6 +8,7 @@
 #include "bisector/device.h"
 #include "bisector/io.h"
 #include "job/job.h"
+#include "job/outputs.h"
 #include "voronoi/diagram.h"
 
 namespace bisector::job {
@@ -15,7 +16,7 @@ namespace bisector::job {
 class RvdJob final : public Job {
  public:
   const char* command() const override { return "rvd"; }
-  InputKind input_kind() const override { return {"IN", "surface: .off, .obj, .ply or .stl"}; }
+  InputKind input_kind() const override { return {"IN", "surface: .off, .obj, .ply or .stl", kMeshFormats}; }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;

@@ -11,13 +11,14 @@
 #include "bisector/region_borders.h"
 #include "bisector/segment.h"
 #include "job/job.h"
+#include "job/outputs.h"
 
 namespace bisector::job {
 
 class SegmentJob final : public Job {
  public:
   const char* command() const override { return "segment"; }
-  InputKind input_kind() const override { return {"IN", "surface: .off, .obj, .ply or .stl"}; }
+  InputKind input_kind() const override { return {"IN", "surface: .off, .obj, .ply or .stl", kMeshFormats}; }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;

@@ -8,6 +8,7 @@
 #include "bisector/tetmesh.h"
 #include "job/inputs.h"
 #include "job/job.h"
+#include "job/outputs.h"
 
 namespace bisector::job {
 
@@ -20,7 +21,7 @@ class TetJob final : public Job {
   };
 
   const char* command() const override { return "tet"; }
-  InputKind input_kind() const override { return {"IN", "closed surface or tetrahedral mesh"}; }
+  InputKind input_kind() const override { return {"IN", "closed surface or tetrahedral mesh", kDomainFormats}; }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;

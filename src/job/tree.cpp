@@ -146,7 +146,8 @@ void TreeJob::add_options(CLI::App* app) {
       ->group("Output");
   add_parsed(app, "--ground", ground_, parse_ground,
              "leave out points with z below Z; auto: the ground is\n"
-             "found, sloping or not, and left out with low plants")
+             "found, sloping or not, and left out with low plants",
+             {"auto"})
       ->type_name("Z|auto")
       ->group("Scan");
   app->add_flag("--scene", options_.scene,

@@ -28,6 +28,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <ostream>
 #include <sstream>
 #include <string>
@@ -35,17 +36,14 @@
 
 #include "bisector/error.h"
 #include "io/files.h"
+#include "step/command_line.h"
 #include "step/shell.h"
 #include "step/trims.h"
 
 namespace {
 
 using namespace bisector;
-
-struct Options {
-  std::string input, output, unit = "mm";
-  double tolerance = 0;
-};
+using namespace bisector::step;
 
 bool is_iges(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
@@ -56,24 +54,10 @@ bool is_iges(const std::string& path) {
   throw Error(fmt::format("{}: unknown format '{}'; use .step, .stp, .iges or .igs", path, extension));
 }
 
-struct Unit {
-  const char* word;
-  const char* name;  // OpenCASCADE's
-  double millimetres;
-};
-constexpr Unit kUnits[] = {
-    {"mm", "MM", 1}, {"cm", "CM", 10}, {"m", "M", 1000}, {"in", "INCH", 25.4}, {"ft", "FT", 304.8}};
-
 const Unit& unit_of(const std::string& word) {
   for (const Unit& unit : kUnits)
     if (word == unit.word) return unit;
   throw Error(fmt::format("the unit {} is unknown", word));
-}
-
-std::vector<std::string> unit_words() {
-  std::vector<std::string> words;
-  for (const Unit& unit : kUnits) words.emplace_back(unit.word);
-  return words;
 }
 
 // Coordinates are written as they are, with the name of their unit: OpenCASCADE, which takes shapes to be in
@@ -132,21 +116,12 @@ void run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The surfaces of a segmentation as STEP or IGES, each trimmed by the borders of its region.");
   Options options;
-  app.add_option("REGIONS", options.input, "what bisector segment --json wrote")->required();
-  app.add_option("-o", options.output, "file to write: .step, .stp, .iges or .igs")->required();
-  app.add_option("--tolerance", options.tolerance,
-                 "edges are so near to the surfaces beside them, in the\n"
-                 "mesh's unit; default: as near as the regions are")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--unit", options.unit, "of the coordinates; they are not converted")
-      ->check(CLI::IsMember(unit_words()))
-      ->capture_default_str();
+  const std::unique_ptr<CLI::App> app = make_command_line(options);
   try {
-    app.parse(argc, argv);
+    app->parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return app->exit(error) == 0 ? 0 : 2;
   }
   Message::DefaultMessenger()->RemovePrinters(STANDARD_TYPE(Message_PrinterOStream));
   try {

@@ -346,13 +346,18 @@ std::size_t drop_unused(std::vector<Vec3>& vertices, std::vector<Tetrahedron>& t
 std::string find_tetgen() {
   if (const char* given = std::getenv("BISECTOR_TETGEN"); given && *given) return given;
   std::error_code error;
-  const auto runs = [](const fs::path& path) { return !path.empty() && ::access(path.c_str(), X_OK) == 0; };
-  // Beside the shared library that this is part of, or else beside the program.
+  const auto runs = [](const fs::path& path) { return ::access(path.c_str(), X_OK) == 0; };
+  std::vector<fs::path> folders;  // of the shared library that this is part of, and of the program
   Dl_info here{};
   if (::dladdr(reinterpret_cast<const void*>(&find_tetgen), &here) != 0 && here.dli_fname[0] == '/')
-    if (const fs::path beside = fs::path(here.dli_fname).parent_path() / "bisector-tetgen"; runs(beside)) return beside;
+    folders.push_back(fs::path(here.dli_fname).parent_path());
   const fs::path own = fs::read_symlink("/proc/self/exe", error);
-  if (!error && runs(own.parent_path() / "bisector-tetgen")) return own.parent_path() / "bisector-tetgen";
+  if (!error) folders.push_back(own.parent_path());
+  // Beside them; above the tests of a build; in bin/ beside lib/ and beside lib/x86_64-linux-gnu/.
+  for (const fs::path& folder : folders)
+    for (const char* place : {"", "..", "../bin", "../../bin"})
+      if (const fs::path program = (folder / place / "bisector-tetgen").lexically_normal(); runs(program))
+        return program;
   return runs(BISECTOR_TETGEN_PROGRAM) ? BISECTOR_TETGEN_PROGRAM : "";
 }
 

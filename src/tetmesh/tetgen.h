@@ -23,8 +23,8 @@ struct TetgenResult {
   std::size_t zero_volume = 0;  // tetrahedra whose corners are exactly coplanar
 };
 
-// Where the child program is: $BISECTOR_TETGEN, else `bisector-tetgen` beside the running executable, else where the
-// build put it; empty if it is nowhere.
+// Where the child program is: $BISECTOR_TETGEN, else `bisector-tetgen` beside the library or the running executable or
+// in the bin/ of either's prefix, else where the build installs it; empty if it is nowhere.
 std::string find_tetgen();
 
 // Tetrahedra inside a closed surface, as check_surface gives it, whose boundary facets are exactly the surface's

@@ -1,0 +1,34 @@
+// The command line of the program, with all of its commands: for the program itself and for its manual.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <memory>
+#include <vector>
+
+#include "commands.h"
+
+namespace bisector::cli {
+
+// Exit codes, part of the program's contract.
+inline constexpr int kSuccess = 0;
+inline constexpr int kFailure = 1;
+inline constexpr int kUsage = 2;
+inline constexpr int kInterrupted = 130;
+
+struct ExitCode {
+  int code;
+  const char* meaning;
+};
+inline constexpr ExitCode kExitCodes[] = {
+    {kSuccess, "success"}, {kFailure, "bad input or a failed run"}, {kUsage, "bad usage"}, {kInterrupted, "cancelled"}};
+
+struct Program {
+  std::unique_ptr<CLI::App> app;
+  CommandText text;
+  std::vector<Command> commands;  // in the order of the help
+};
+
+Program make_program();
+
+}  // namespace bisector::cli
