@@ -99,6 +99,11 @@ BISECTOR_C_API bisector_status bisector_options_sizes(bisector_options* options,
                                                       const double* lengths, size_t count, const int64_t* tets,
                                                       size_t tet_count);
 BISECTOR_C_API bisector_status bisector_options_reference(bisector_options* options, const bisector_mesh* mesh);
+/* Vertices and faces of the mesh that stay as they are (`remesh`), by index. */
+BISECTOR_C_API bisector_status bisector_options_keep_vertices(bisector_options* options, const int64_t* indices,
+                                                              size_t count);
+BISECTOR_C_API bisector_status bisector_options_keep_faces(bisector_options* options, const int64_t* indices,
+                                                           size_t count);
 BISECTOR_C_API bisector_status bisector_options_free(bisector_options* options);
 /* All options of a command as a JSON array of {name, type, help, group, is_switch}. The text is this thread's, valid
  * until its next call of this function or of bisector_devices(). */
@@ -147,7 +152,8 @@ typedef struct bisector_array {
 } bisector_array;
 
 /* An array of a result, by name:
- *   remesh   vertices (n, 3), faces (m, 3), labels (m, or none), feature_edges (k, 2)
+ *   remesh   vertices (n, 3), faces (m, 3), labels (m, or none), feature_edges (k, 2), kept (n, or none:
+ *            the mesh's vertex that each is, or 0xffffffff)
  *   tet      vertices, tets (t, 4), regions (t, or none), faces of the boundary, their labels, feature_edges
  *   segment  vertices, faces, labels (the region of each face), feature_edges; with the option `polygons`
  *            polygon_vertices, polygon_corners, polygon_offsets, polygon_labels

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -63,6 +64,10 @@ BISECTOR_API std::vector<double> read_vertex_attribute(const std::string& path, 
 // ignored. Ascending, each edge once and with the lower vertex first. Throws Error, naming the line, for what is not an
 // edge of the mesh.
 BISECTOR_API std::vector<std::array<Index, 2>> read_feature_edges(const std::string& path, const TriangleMesh& mesh);
+
+// Reads indices of a mesh's elements, counted from 0, any number in a line; '#' starts a comment. Ascending, each once.
+// Throws Error, naming the line, for what is not below `count`; `what` is an element, as "vertex", for the message.
+BISECTOR_API std::vector<Index> read_indices(const std::string& path, std::size_t count, const std::string& what);
 
 // Writes what read_feature_edges reads. Throws Error.
 BISECTOR_API void write_feature_edges(const std::string& path, const std::vector<std::array<Index, 2>>& edges);

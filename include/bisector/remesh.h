@@ -65,6 +65,12 @@ struct RemeshOptions {
   double edge_length = 0;
   std::vector<Vec3> seeds;  // start from these, in one level; topology control may add as many as it takes
 
+  // Vertices, edges and triangles of the input that are those of the result, bit for bit. Kept triangles count among
+  // the vertices asked for; edges are as long around what is kept as there.
+  std::vector<Index> keep_vertices;
+  std::vector<std::array<Index, 2>> keep_edges;
+  std::vector<Index> keep_triangles;
+
   SizingOptions sizing;
   FeatureOptions features;
   DetailMode detail = DetailMode::budget;
@@ -135,12 +141,14 @@ struct RemeshResult {
   // The restricted Delaunay triangulation of the seeds that own a cell. Its feature_edges are the edges along the
   // input's features; labels are those of the input's triangles in which its dual vertices lie.
   TriangleMesh mesh;
-  std::vector<SeedPlace> places;  // of mesh's vertices
-  MeshTopology topology;          // of mesh
-  MeshTopology input_topology;    // after welding and orienting
-  bool topology_matches = false;  // manifold, oriented, closed and of Euler characteristic and components as the input
-  bool ball_property = false;     // of the final diagram, without stray parts of cells
-  std::size_t divided = 0;        // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
+  std::vector<SeedPlace> places;   // of mesh's vertices
+  std::vector<Index> kept;         // of each of mesh's vertices, the input's that it is, or kNone; empty: none is kept
+  std::size_t kept_triangles = 0;  // the last ones of mesh, in the input's order
+  MeshTopology topology;           // of mesh
+  MeshTopology input_topology;     // after welding and orienting
+  bool topology_matches = false;   // manifold, oriented, closed and of Euler characteristic and components as the input
+  bool ball_property = false;      // of the final diagram, without stray parts of cells
+  std::size_t divided = 0;         // vertices beside their cell's first, where sheets cross or nearly touch (sheets.h)
   std::vector<TopologyFault> faults;  // where it fails; indices are those of mesh's vertices, kNone if none
   FeatureResult features;
   DetailResult detail;

@@ -59,6 +59,8 @@ _SIGNATURES: "dict[str, list[Any]]" = {
     "options_seeds": [c_void_p, c_void_p, c_size_t],
     "options_density": [c_void_p, c_void_p, c_size_t],
     "options_sizes": [c_void_p, c_void_p, c_void_p, c_size_t, c_void_p, c_size_t],
+    "options_keep_vertices": [c_void_p, c_void_p, c_size_t],
+    "options_keep_faces": [c_void_p, c_void_p, c_size_t],
     "options_reference": [c_void_p, c_void_p],
     "options_free": [c_void_p],
     "describe": [c_char_p, POINTER(c_char_p)],

@@ -64,6 +64,8 @@ def remesh(
     features: Union[str, Number, None] = None,
     detail: Optional[str] = None,
     feature_file: Optional[Path] = None,
+    keep_vertices: Any = None,
+    keep_faces: Any = None,
     weld: Optional[Number] = None,
     wrap: Union[bool, Number, None] = None,
     topology: Optional[str] = None,
@@ -87,14 +89,20 @@ def remesh(
     Lengths are in its unit. `seeds` is an (n, 3) array of points to start from, or a file of them; `density` a word
     ("lfs", "curvature:2", "attribute:NAME") or one positive value for each vertex, edges being as long as its power
     -1/4. `labels` is (m,), a number for each face of a mesh in memory, and `feature_edges` (k, 2), edges of it to keep.
+    `keep_vertices` and `keep_faces` are indices of what stays as it is, or files of them.
 
     `progress` is called with a Progress now and then. Ctrl-C, or an exception in `progress`, ends the run within about
     a second. Raises Error for bad input and options, DeviceError if the device asked for is missing or fails, and
     MemoryError; warns with BisectorWarning.
     """
     given = locals()
-    options = _options("remesh", _words(given, "mesh", "seeds", "density", "labels", "feature_edges", "progress"),
-                       seeds, density)
+    words = _words(given, "mesh", "seeds", "density", "labels", "feature_edges", "progress")
+    arrays = {name: words.pop(name) for name in ("keep_vertices", "keep_faces")
+              if words[name] is not None and not _is_word(words[name])}
+    options = _options("remesh", words, seeds, density)
+    for name, kept in arrays.items():
+        array = _meshes.indices(kept, 0, name)
+        call(f"options_{name}", options.value, array.ctypes.data, len(array))
     return RemeshResult(_run(options, _meshes.mesh_handle(mesh, labels, feature_edges), progress))
 
 

@@ -138,6 +138,12 @@ class RemeshResult(SurfaceResult):
     """A remeshed surface; labels are those of the input at the same place."""
 
     @property
+    def kept(self) -> npt.NDArray[np.int64]:
+        """(n,) the vertex of the input that each is, by keep_vertices or keep_faces, or -1; empty if nothing is kept."""
+        of_input = self._array("kept")
+        return np.where(of_input == 0xffffffff, -1, of_input)
+
+    @property
     def feature_edges(self) -> npt.NDArray[np.int64]:
         """(k, 2) int64: the edges along the input's features, the lower vertex first."""
         return self._array("feature_edges")

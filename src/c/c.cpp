@@ -410,6 +410,24 @@ bisector_status bisector_options_reference(bisector_options* options, const bise
   });
 }
 
+bisector_status bisector_options_keep_vertices(bisector_options* options, const int64_t* indices, size_t count) {
+  return guarded([&] {
+    const std::shared_ptr<Options> object = options_of(options);
+    auto kept = indices_of("--keep-vertices", indices, count);
+    const std::lock_guard lock(object->mutex);
+    object->given.keep_vertices = std::move(kept);
+  });
+}
+
+bisector_status bisector_options_keep_faces(bisector_options* options, const int64_t* indices, size_t count) {
+  return guarded([&] {
+    const std::shared_ptr<Options> object = options_of(options);
+    auto kept = indices_of("--keep-faces", indices, count);
+    const std::lock_guard lock(object->mutex);
+    object->given.keep_faces = std::move(kept);
+  });
+}
+
 bisector_status bisector_options_free(bisector_options* options) {
   return guarded([&] { Handles::all().remove<Options>(options, "options"); });
 }

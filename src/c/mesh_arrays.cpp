@@ -96,6 +96,17 @@ std::vector<Tetrahedron> tets_of(const char* what, const std::int64_t* tets, std
   return rows_of<4>(what, tets, count, vertices);
 }
 
+std::vector<Index> indices_of(const char* what, const std::int64_t* indices, std::size_t count) {
+  require(indices, count, what);
+  std::vector<Index> result;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (indices[i] < 0 || indices[i] >= kNone)
+      throw Error(fmt::format("{}: {} is no index; mend or remove it", what, indices[i]));
+    result.push_back(static_cast<Index>(indices[i]));
+  }
+  return result;
+}
+
 std::shared_ptr<const job::GivenMesh> mesh_of(const bisector_mesh_arrays& arrays) {
   require(arrays.faces, arrays.face_count, "faces");
   const std::size_t n = arrays.vertex_count;

@@ -16,5 +16,6 @@ namespace bisector::c {
 std::shared_ptr<const job::GivenMesh> mesh_of(const bisector_mesh_arrays& arrays);
 std::vector<Vec3> points_of(const char* what, const double* points, std::size_t count);
 std::vector<Tetrahedron> tets_of(const char* what, const std::int64_t* tets, std::size_t count, std::size_t vertices);
+std::vector<Index> indices_of(const char* what, const std::int64_t* indices, std::size_t count);
 
 }  // namespace bisector::c

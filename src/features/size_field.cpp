@@ -87,6 +87,19 @@ std::vector<double> SizeField::at(const std::vector<Vec3>& points, std::vector<I
   return h;
 }
 
+namespace {
+
+std::vector<double> less_than(double most, std::vector<double> lengths) {
+  for (double& h : lengths) h = most - h;
+  return lengths;
+}
+
+}  // namespace
+
+SizeFloor::SizeFloor(const std::vector<Vec3>& points, const std::vector<double>& lengths, double gradation)
+    : longest_(*std::max_element(lengths.begin(), lengths.end())),
+      below_(points, less_than(longest_, lengths), gradation) {}
+
 std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths,
                                     double gradation) {
   if (points.empty()) return {};

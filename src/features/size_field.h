@@ -41,6 +41,19 @@ class SizeField {
   std::vector<std::vector<Node>> levels_;  // boxes over the points, with the least length in each
 };
 
+// h(x) = max over k of h_k - gradation |x - p_k|, the smallest field that is at least h_k at p_k and obeys the same
+// bound: 0 or less far from all points.
+class SizeFloor {
+ public:
+  SizeFloor(const std::vector<Vec3>& points, const std::vector<double>& lengths, double gradation);
+
+  double operator()(const Vec3& x) const { return longest_ - below_(x); }
+
+ private:
+  double longest_;
+  SizeField below_;  // the longest length less h
+};
+
 // The field's values at its own points.
 std::vector<double> limit_gradation(const std::vector<Vec3>& points, const std::vector<double>& lengths,
                                     double gradation);

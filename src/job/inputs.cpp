@@ -76,6 +76,17 @@ std::vector<double> read_density(const std::string& path, const std::string& att
   return given.density;
 }
 
+std::vector<Index> read_kept(const std::string& path, const std::vector<Index>& given, std::size_t count,
+                             const char* what, const char* option) {
+  if (!path.empty()) return read_indices(path, count, what);
+  std::vector<Index> kept = given;
+  std::sort(kept.begin(), kept.end());
+  kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
+  if (!kept.empty() && kept.back() >= count)
+    throw Error(fmt::format("{}: there is no {} {}, the mesh has {}; leave it out", option, what, kept.back(), count));
+  return kept;
+}
+
 void leave_out_folds(const WrapOption& wrap, FeatureOptions& features) {
   if (wrap.on && features.mode == FeatureMode::automatic) features.mode = FeatureMode::none;
 }

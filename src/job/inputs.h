@@ -31,6 +31,11 @@ std::vector<Vec3> read_seeds(const std::string& path, const Given& given, std::s
 std::vector<double> read_density(const std::string& path, const std::string& attribute, const Given& given,
                                  std::size_t vertices);
 
+// Indices of a list in a file, or as given, ascending. Throws Error for those that are not below `count`; `what` is an
+// element, as "vertex", `option` the one that names the file.
+std::vector<Index> read_kept(const std::string& path, const std::vector<Index>& given, std::size_t count,
+                             const char* what, const char* option);
+
 // Folds of a wrap are those of its own triangles: creases are not looked for by themselves there.
 void leave_out_folds(const WrapOption& wrap, FeatureOptions& features);
 

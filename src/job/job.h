@@ -37,6 +37,7 @@ struct Given {
   std::optional<std::vector<Vec3>> seeds;
   std::vector<double> density;  // of the vertices, instead of an attribute's name
   SizeSamples sizes;
+  std::vector<Index> keep_vertices, keep_faces;
 };
 
 // What a command reads: a positional argument of the command line.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "bisector/io.h"
 #include "bisector/preview.h"
 #include "core/geometry.h"
@@ -125,6 +127,14 @@ void RemeshJob::add_options(CLI::App* app) {
             "vertices as it takes) or off")
       ->group("Features");
   add_feature_file(app, feature_file_);
+  add_file(app, "--keep-vertices", keep_vertices_, "FILE",
+           "vertices of the input that stay where they are: indices,\n"
+           "counted from 0")
+      ->group("Features");
+  add_file(app, "--keep-faces", keep_faces_, "FILE",
+           "faces of the input that stay as they are, with their\n"
+           "vertices: indices, counted from 0")
+      ->group("Features");
   add_weld(app, weld_);
   add_wrap(app, wrap_);
   add_words(app, "--topology", options_.topology, kTopologyWords,
@@ -174,8 +184,30 @@ void RemeshJob::check_usage(const Usage& usage) {
   if (length > 0 && (length < sizing.min_edge || (sizing.max_edge > 0 && length > sizing.max_edge)))
     throw CLI::ValidationError("--edge-length is not between --edge-min and --edge-max");
   if (sizing.kind == DensityKind::uniform) usage.check_uniform_density();
+  for (const char* option : {"--keep-vertices", "--keep-faces"})
+    if (usage.given("--wrap"))
+      usage.refuse(option, "a wrap has vertices and faces of its own; leave one of the two out");
+  if (usage.given("--seeds"))
+    usage.refuse("--keep-faces",
+                 "seeds are of the whole surface and leave no room for kept faces; leave one of the two out");
   if (options_.energy == Energy::restricted && options_.min_angle > 0)
     usage.refuse("--min-angle", "seeds have to be on the surface for that; leave out --energy rcvt");
+}
+
+void RemeshJob::keep() {
+  options_.keep_vertices =
+      read_kept(keep_vertices_, given.keep_vertices, surface->vertices.size(), "vertex", "--keep-vertices");
+  // Faces of more than three corners were split.
+  const std::vector<Index>& face_of = surface->face_of_triangle;
+  const std::size_t triangles = surface->triangles.size();
+  const std::size_t faces =
+      face_of.empty() ? triangles : std::size_t{*std::max_element(face_of.begin(), face_of.end())} + 1;
+  const std::vector<Index> kept = read_kept(keep_faces_, given.keep_faces, faces, "face", "--keep-faces");
+  if (wrap_.on && !(kept.empty() && options_.keep_vertices.empty()))
+    throw Error("--wrap: a wrap has vertices and faces of its own; keep none of the mesh's, or leave --wrap out");
+  for (Index t = 0; t < triangles; ++t)
+    if (std::binary_search(kept.begin(), kept.end(), face_of.empty() ? t : face_of[t]))
+      options_.keep_triangles.push_back(t);
 }
 
 // What the options say, with the files that they name.
@@ -185,6 +217,7 @@ void RemeshJob::complete_options() {
   if (edge_length_relative_ > 0)
     options_.edge_length = edge_length_relative_ * bounding_box(surface->vertices).diagonal();
   if (weld_ >= 0) options_.weld = weld_;
+  keep();
   leave_out_folds(wrap_, options_.features);
   options_.threads = threads;
   if (given.seeds || !seeds_.empty()) {
@@ -244,6 +277,10 @@ Json RemeshJob::report(Journal& journal) {
   report["topology"]["ball_property"] = result.ball_property;
   report["topology"]["divided"] = result.divided;
   report["topology"]["faults"] = faults_json(result);
+  if (!result.kept.empty())
+    report["kept"] = {{"vertices", result.kept.size() - static_cast<std::size_t>(
+                                                            std::count(result.kept.begin(), result.kept.end(), kNone))},
+                      {"faces", result.kept_triangles}};
   report["features"] = features_json(result.features, result.mesh.feature_edges.size());
   report["detail"] = detail_json(result.detail, result.features.curves);
   report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length}};
@@ -280,7 +317,8 @@ void RemeshJob::write(std::string_view output, const std::string& path, const st
 
 std::vector<ArrayView> RemeshJob::arrays() {
   return {array_of("vertices", result.mesh.vertices), array_of("faces", result.mesh.triangles),
-          array_of("labels", result.mesh.labels), array_of("feature_edges", result.mesh.feature_edges)};
+          array_of("labels", result.mesh.labels), array_of("feature_edges", result.mesh.feature_edges),
+          array_of("kept", result.kept)};
 }
 
 }  // namespace bisector::job

@@ -19,7 +19,9 @@ class RemeshJob final : public Job {
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;
-  std::vector<std::string> input_files() const override { return {input, seeds_, feature_file_}; }
+  std::vector<std::string> input_files() const override {
+    return {input, seeds_, feature_file_, keep_vertices_, keep_faces_};
+  }
   void read(Journal& journal) override;
   void check_format(std::string_view output, const std::string& path, Journal& journal) const override;
   void compute(Journal& journal) override;
@@ -34,9 +36,11 @@ class RemeshJob final : public Job {
 
  private:
   void complete_options();
+  void keep();
   const TriangleMesh& remeshed_surface() const { return wrapped_.is_null() ? *surface : wrap_mesh_; }
 
   std::string seeds_, feature_file_;
+  std::string keep_vertices_, keep_faces_;
   std::string attribute_;            // of the input's vertices, a density
   double edge_length_relative_ = 0;  // of the input's diagonal; 0: not given
   double weld_ = -1;                 // not given

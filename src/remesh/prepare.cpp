@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -18,6 +20,7 @@
 #include "mesh/touching.h"
 #include "remesh/detail.h"
 #include "remesh/sizing.h"
+#include "spatial/kd_tree.h"
 
 namespace bisector {
 namespace {
@@ -48,7 +51,7 @@ std::string plural(std::size_t count, const char* word) {
   return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
 }
 
-void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const Context& context) {
+void warn_of_weld(const WeldResult& welded, bool has_tolerance, const Context& context) {
   const std::size_t removed = welded.degenerate_triangles + welded.duplicate_triangles;
   std::vector<std::string> done;
   if (welded.merged_vertices)
@@ -60,7 +63,7 @@ void warn_of_weld(const WeldResult& welded, const RemeshOptions& options, const 
   std::string line = fmt::format("{}", fmt::join(done, ", "));
   if (welded.border_before)
     line += fmt::format("; {} of {} left", welded.border_after, plural(welded.border_before, "border edge"));
-  if (!options.weld && welded.border_after) line += "; a weld tolerance sets how far vertices may be apart";
+  if (!has_tolerance && welded.border_after) line += "; a weld tolerance sets how far vertices may be apart";
   context.warn(line);
 }
 
@@ -118,6 +121,14 @@ class Separation {
     if (mesh.vertices.size() == given_) return given;
     return edges_after_separating(mesh, original_, edges_after_halving(given, halved_, vertices_));
   }
+  // Of each vertex of a mesh, the one that it was; kNone of middles of edges.
+  std::vector<Index> originals(std::size_t vertices) const {
+    std::vector<Index> of = original_;
+    for (std::size_t v = of.size(); v < vertices; ++v) of.push_back(static_cast<Index>(v));
+    for (Index& v : of)
+      if (v >= given_) v = kNone;
+    return of;
+  }
   // Of each vertex, from those that were given.
   std::vector<double> values(std::vector<double> given) const {
     for (const auto& [a, b] : halved_) given.push_back(0.5 * (given[a] + given[b]));
@@ -132,12 +143,22 @@ class Separation {
   std::vector<Index> original_;
 };
 
-void check_edges(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& edges) {
+void check_edges(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& edges, const char* what) {
   if (edges.empty()) return;
   const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
   for (const auto& [a, b] : edges)
     if (!std::binary_search(table.edges.begin(), table.edges.end(), std::array{std::min(a, b), std::max(a, b)}))
-      throw Error(fmt::format("feature edge {} {} is not an edge of the mesh; remove it", a, b));
+      throw Error(fmt::format("{} {} {} is not an edge of the mesh; remove it", what, a, b));
+}
+
+void check_kept(const TriangleMesh& mesh, const RemeshOptions& options) {
+  std::vector<char> used(mesh.vertices.size(), 0);
+  for (const Triangle& t : mesh.triangles)
+    for (const Index v : t) used[v] = 1;
+  for (const Index v : options.keep_vertices)
+    if (v >= used.size() || !used[v])
+      throw Error(fmt::format("vertex {}, which is to be kept, is {}; leave it out", v,
+                              v < used.size() ? "on no triangle" : "none of the mesh's"));
 }
 
 SizingTarget target_of(const RemeshOptions& options) {
@@ -155,13 +176,17 @@ OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given
   if (!density.empty() && density.size() != vertices)
     throw Error(
         fmt::format("the density has {} values for {} vertices; give one per vertex", density.size(), vertices));
-  check_edges(input, given.features.given);
-  check_edges(input, input.feature_edges);
+  check_edges(input, given.features.given, "feature edge");
+  check_edges(input, input.feature_edges, "feature edge");
+  check_edges(input, given.keep_edges, "the edge to be kept,");
+  check_kept(input, given);
   OrderedMesh ordered = in_spatial_order(input);
   mesh = std::move(ordered.mesh);
   vertex_of = std::move(ordered.vertex_of);
-  for (auto& edge : options.features.given)
-    for (Index& v : edge) v = vertex_of[v];
+  for (auto* edges : {&options.features.given, &options.keep_edges})
+    for (auto& edge : *edges)
+      for (Index& v : edge) v = vertex_of[v];
+  for (Index& v : options.keep_vertices) v = vertex_of[v];
   if (density.empty()) return;
   for (std::size_t v = 0; v < vertices; ++v) density[vertex_of[v]] = given.sizing.attribute[v];
 }
@@ -187,24 +212,37 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   return best;
 }
 
+WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double>& tolerance, const Context& context) {
+  WeldResult welded = join_borders(input, tolerance);
+  warn_of_weld(welded, tolerance.has_value(), context);
+  orient_with_warning(welded.mesh, context);
+  return welded;
+}
+
 Preparation::Preparation(OrderedInput ordered, const Context& context)
-    : welded_(join_borders(ordered.mesh, ordered.options.weld)), mesh_(std::exchange(welded_.mesh, {})),
+    : welded_(weld_and_orient(ordered.mesh, ordered.options.weld, context)), mesh_(std::exchange(welded_.mesh, {})),
       sizing_(ordered.options.sizing), target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
   const TriangleMesh& input = ordered.mesh;
   const RemeshOptions& options = ordered.options;
   const std::vector<Index>& vertex_of = welded_.vertex_of;
-  warn_of_weld(welded_, options, context);
-  orient_with_warning(mesh_, context);
 
   const std::size_t vertices = mesh_.vertices.size();
   FeatureOptions features = options.features;
-  for (auto& edge : features.given)
-    for (Index& v : edge) v = vertex_of[v];
-  std::erase_if(features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+  std::vector<std::array<Index, 2>> keep_edges = options.keep_edges;
+  for (auto* edges : {&features.given, &keep_edges}) {
+    for (auto& edge : *edges)
+      for (Index& v : edge) v = vertex_of[v];
+    std::erase_if(*edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+  }
   const Separation separation(mesh_, context);
   features.given = separation.edges(mesh_, features.given);
+  keep_edges = separation.edges(mesh_, keep_edges);
+  features.given.insert(features.given.end(), keep_edges.begin(), keep_edges.end());
   if (options.energy == Energy::automatic) find_noise(features);
   features_ = detect_features(mesh_, features);
+  std::vector<Index> keep_vertices = options.keep_vertices;
+  for (const auto& edge : options.keep_edges) keep_vertices.insert(keep_vertices.end(), edge.begin(), edge.end());
+  if (!keep_vertices.empty()) keep(keep_vertices, std::move(keep_edges), separation.originals(vertices));
 
   if (!sizing_.attribute.empty()) {
     std::vector<double> values(vertices);
@@ -214,6 +252,63 @@ Preparation::Preparation(OrderedInput ordered, const Context& context)
   sizing_.sharp = features_.edges;
   // The folds of noise are no details.
   if (given_seeds_ == 0 && options.detail != DetailMode::off && !noisy_) plan(options);
+}
+
+void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
+                       const std::vector<Index>& original) {
+  std::vector<Index> welded_as(welded_.vertex_of.size(), kNone);  // by welded vertex
+  for (const Index v : vertices) {
+    Index& as = welded_as[welded_.vertex_of[v]];
+    as = std::min(as, v);
+  }
+  kept_as_.assign(mesh_.vertices.size(), kNone);
+  std::vector<Vec3> points;
+  std::vector<char> counted(welded_as.size(), 0);
+  for (Index v = 0; v < kept_as_.size(); ++v) {
+    if (original[v] == kNone || welded_as[original[v]] == kNone) continue;
+    kept_as_[v] = welded_as[original[v]];
+    keep_vertices_.push_back(v);
+    // Vertices that were one before they were separated are no distance apart.
+    if (std::exchange(counted[original[v]], 1) == 0) points.push_back(mesh_.vertices[v]);
+  }
+  add_corners(features_, keep_vertices_);
+  for (auto& edge : edges) edge = {std::min(edge[0], edge[1]), std::max(edge[0], edge[1])};
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  keep_edges_ = std::move(edges);
+  for (const auto& [a, b] : keep_edges_) {
+    kept_lengths_.points.push_back(0.5 * (mesh_.vertices[a] + mesh_.vertices[b]));
+    kept_lengths_.lengths.push_back(norm(mesh_.vertices[b] - mesh_.vertices[a]));
+  }
+  bounds_.add(kept_lengths_);
+  // Edges are no longer than kept vertices are apart.
+  if (points.size() < 2) return;
+  const PointSet set{points};
+  const KdTree tree(3, set);
+  for (const Vec3& p : points) {
+    std::array<Index, 2> nearest{};
+    std::array<double, 2> squares{};
+    const double at[] = {p.x, p.y, p.z};
+    tree.knnSearch(at, 2, nearest.data(), squares.data());
+    if (!(squares[1] > 0)) continue;
+    bounds_.points.push_back(p);
+    bounds_.lengths.push_back(std::sqrt(squares[1]));
+  }
+}
+
+KeptFeatures Preparation::kept_features(const FeatureGraph& features) const {
+  KeptFeatures kept;
+  if (keep_vertices_.empty()) return kept;
+  for (const Index v : features.corners) kept.corners.push_back(v < kept_as_.size() ? kept_as_[v] : kNone);
+  for (const FeatureCurve& curve : features.curves) {
+    const std::vector<Index>& on = curve.vertices;
+    const bool whole =
+        !curve.closed && std::all_of(on.begin() + 1, on.end() - 1, [&](Index v) { return v >= kept_as_.size(); });
+    kept.curves.push_back(
+        whole && std::binary_search(keep_edges_.begin(), keep_edges_.end(),
+                                    std::array{std::min(on.front(), on.back()), std::max(on.front(), on.back())}));
+  }
+  return kept;
 }
 
 // What noise folds is no feature.
@@ -246,6 +341,7 @@ void Preparation::plan(const RemeshOptions& options) {
   const Sizing& plain = unbounded_->sizing;
   DetailPlan plan = plan_details(mesh_, features_, lengths, plain.vertices, options.detail == DetailMode::all);
   features_ = std::move(plan.features);
+  add_corners(features_, keep_vertices_);
   detail_ = plan.result;
   if (options.detail == DetailMode::all && detail_.vertices > plain.vertices) {
     target_ = {detail_.vertices, 0};
@@ -267,8 +363,11 @@ void Preparation::bound(const SizeBounds& bounds) {
 PreparedInput Preparation::lay_down() {
   std::optional<SizeField> field;
   if (!bounds_.points.empty()) field.emplace(bounds_.points, bounds_.lengths, kDetailGradation);
-  SizedMesh sized = unbounded_ ? *std::exchange(unbounded_, std::nullopt)
-                               : refine_for_density(mesh_, sizing_, target_, field ? &*field : nullptr);
+  std::optional<SizeFloor> floor;
+  if (!kept_lengths_.points.empty()) floor.emplace(kept_lengths_.points, kept_lengths_.lengths, kDetailGradation);
+  SizedMesh sized = unbounded_ && !field ? *std::exchange(unbounded_, std::nullopt)
+                                         : refine_for_density(mesh_, sizing_, target_,
+                                                              {field ? &*field : nullptr, floor ? &*floor : nullptr});
   if (sized.sizing.vertices > kMostVertices && given_seeds_ == 0)
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
                             target_.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));
@@ -276,6 +375,7 @@ PreparedInput Preparation::lay_down() {
   prepared.detail = detail_;
   prepared.noisy = noisy_;
   prepared.features = split_features(features_, sized.splits);
+  prepared.kept = kept_features(prepared.features);
   prepared.mesh = std::move(sized.mesh);
   prepared.mesh.feature_edges.clear();
   prepared.mesh.labels.clear();

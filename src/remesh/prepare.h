@@ -1,9 +1,11 @@
 // From a mesh as it was read to the domain of remeshing: welded, with its features found and its density laid down.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
+#include "remesh/kept.h"
 #include "remesh/remesh.h"
 #include "remesh/sizing.h"
 
@@ -15,6 +17,7 @@ struct PreparedInput {
   std::vector<double> density;  // for Surface
   double unit_edge = 0;         // edge length where the density is 1
   std::size_t vertices = 0;     // wanted of the result
+  KeptFeatures kept;
   DetailResult detail;
   bool noisy = false;  // normals are noise, and Energy::automatic means restricted
 };
@@ -31,6 +34,9 @@ struct SizeBounds {
 // are there twice are then taken once.
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
 
+// The same, with triangles turned that run against most others, and warnings of what was done.
+WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double>& tolerance, const Context& context);
+
 // An input as a run takes it: in spatial order, so that what is near in space is near in memory, and the result does
 // not depend on the order in which a file lists triangles and vertices.
 struct OrderedInput {
@@ -38,7 +44,7 @@ struct OrderedInput {
   OrderedInput(const TriangleMesh& input, const RemeshOptions& options);
 
   TriangleMesh mesh;
-  RemeshOptions options;         // with feature edges and densities of `mesh`
+  RemeshOptions options;         // with what they say of vertices by those of `mesh`
   std::vector<Index> vertex_of;  // of each vertex of the input
 };
 
@@ -58,8 +64,12 @@ class Preparation {
 
  private:
   void find_noise(FeatureOptions& features);
+  // Vertices of the input, and edges of mesh(); `original` is of each of its vertices the welded one, kNone: none.
+  void keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
+            const std::vector<Index>& original);
   std::vector<double> lay_down_plain();
   void plan(const RemeshOptions& options);
+  KeptFeatures kept_features(const FeatureGraph& features) const;
 
   WeldResult welded_;  // without its mesh
   TriangleMesh mesh_;
@@ -71,6 +81,10 @@ class Preparation {
   bool noisy_ = false;
   std::optional<SizedMesh> unbounded_;  // laid down already, and still good
   SizeBounds bounds_;
+  std::vector<Index> keep_vertices_;              // of mesh_, ascending
+  std::vector<Index> kept_as_;                    // of each of mesh_'s vertices before its details, the input's
+  std::vector<std::array<Index, 2>> keep_edges_;  // of mesh_, sorted, lower vertex first
+  SizeBounds kept_lengths_;                       // edges around what is kept are so long
 };
 
 }  // namespace bisector

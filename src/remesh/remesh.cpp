@@ -19,6 +19,7 @@
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
 #include "mesh/topology.h"
+#include "remesh/around_kept.h"
 #include "remesh/coarse_surface.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/fit.h"
@@ -136,6 +137,9 @@ class Pipeline {
   bool begin_on_stand_in(std::size_t level);
   void return_to_input();
   void optimise_levels(const std::vector<std::size_t>& counts);
+  bool is_held(const SeedPlace& place) const {
+    return place.corner != kNone && !plan_.held.empty() && plan_.held[place.corner];
+  }
   bool can_localise() const;
   bool dual_suffices();
   bool free_tips();
@@ -300,7 +304,9 @@ bool Pipeline::free_tips() {
   bool freed = false;
   for (const TopologyFault& fault : topology_faults(topology_.ball, all_vertices()))
     for (Index seed : fault.seeds) {
-      if (seed >= places.size() || places[seed].corner == kNone || on_curve[places[seed].corner]) continue;
+      if (seed >= places.size() || places[seed].corner == kNone || on_curve[places[seed].corner] ||
+          is_held(places[seed]))
+        continue;
       places[seed] = {};
       freed = true;
     }
@@ -425,6 +431,8 @@ void Pipeline::fit() {
   fit.fixed.assign(result_.mesh.vertices.size(), 0);
   for (const auto& edge : result_.mesh.feature_edges)
     for (Index v : edge) fit.fixed[v] = 1;
+  for (std::size_t v = 0; v < fit.fixed.size(); ++v)
+    if (is_held(result_.places[v])) fit.fixed[v] = 1;
   const QualityReport quality = measure_quality(result_.mesh);
   fit.min_angle = std::min(quality.theta_min, plan_.min_angle);
   fit.min_quality = std::min(quality.q_min, kFitQuality);
@@ -594,13 +602,15 @@ RemeshPlan plan_of(const RemeshOptions& options) {
   return plan;
 }
 
-RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
+namespace {
+
+// All of a surface; triangles are not kept.
+RemeshResult remesh_surface(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
   const Stopwatch watch;
-  check_options(options);
-  std::optional<ThreadLimit> limit;
-  if (options.threads) limit.emplace(options.threads);
   OrderedInput ordered(input, options);
   const std::vector<Index> vertex_of = std::move(ordered.vertex_of);
+  std::vector<Index> input_of(vertex_of.size());
+  for (Index v = 0; v < vertex_of.size(); ++v) input_of[vertex_of[v]] = v;
   Preparation preparation(std::move(ordered), context);
   Compute compute(options.compute, context);
   const MakeBackend make_backend = [&](const Surface& surface) { return compute.backend(surface); };
@@ -620,6 +630,10 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
     RemeshPlan plan = plan_of(options);
     plan.vertices = prepared.vertices;
     if (prepared.noisy) plan.constrained = false;
+    for (Index& v : prepared.kept.corners) {
+      plan.held.push_back(v != kNone);
+      if (v != kNone) v = input_of[v];
+    }
     const Surface surface(std::move(prepared.mesh), prepared.density);
     preparing += laying_down.seconds();
     const std::unique_ptr<Backend> backend = compute.backend(surface);
@@ -638,6 +652,7 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
       }
     }
     RemeshResult result = pipeline.finish();
+    if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input, result);
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
@@ -666,6 +681,19 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   for (std::size_t v = 0; v < input.vertices.size(); ++v)
     chosen.welded.vertex_of[v] = preparation.welded().vertex_of[vertex_of[v]];
   return std::move(chosen);
+}
+
+}  // namespace
+
+RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
+  check_options(options);
+  std::optional<ThreadLimit> limit;
+  if (options.threads) limit.emplace(options.threads);
+  if (options.keep_triangles.empty()) return remesh_surface(input, options, context);
+  const Stopwatch watch;
+  RemeshResult result = remesh_around_kept(input, options, context, remesh_surface);
+  result.seconds.total = watch.seconds();
+  return result;
 }
 
 RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context,

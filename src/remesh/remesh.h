@@ -17,6 +17,7 @@ struct RemeshPlan {
   std::vector<Vec3> seeds;   // start from these, in one level; topology control may add as many as it takes
   // Of each seed; those on features are there already. Empty: features get seeds of their own.
   std::vector<SeedPlace> places = {};
+  std::vector<char> held = {};  // of each corner of the features, whether its seed never leaves it; empty: none is
   std::uint64_t random_seed = 1;
   int iterations = 100;  // as in RemeshOptions, like those that follow
   double tolerance = 1e-6;

@@ -167,15 +167,34 @@ void smooth_logarithms(const TriangleMesh& mesh, std::vector<double>& values) {
     if (count[v]) values[v] = std::exp(0.5 * std::log(values[v]) + 0.5 * sum[v] / static_cast<double>(count[v]));
 }
 
+// The limits of h at a point.
+struct Range {
+  double least = 0, most = std::numeric_limits<double>::infinity();
+
+  double clamp(double h) const { return std::min(std::max(h, least), most); }
+};
+
+Range range_at(const SizeLimits& limits, const Vec3& p) {
+  Range range;
+  if (limits.least) range.least = (*limits.least)(p);
+  if (limits.most) range.most = (*limits.most)(p);
+  return range;
+}
+
 // rho at the vertices, before it is scaled and bounded, and at vertices that are added.
 class Field {
  public:
   // For a result that would have so many vertices and edges of that length if it were uniform.
   Field(const TriangleMesh& mesh, const SizingOptions& options, double vertices, double uniform,
-        const SizeField* bound = nullptr)
-      : kind_(options.kind), bound_(bound) {
+        const SizeLimits& limits = {})
+      : kind_(options.kind), limits_(limits) {
+    if (limits.any()) ranges_.resize(mesh.vertices.size());
     std::vector<Index> nearest;
-    if (bound) bounds_ = bound->at(mesh.vertices, nearest);
+    const std::vector<double> most = limits.most ? limits.most->at(mesh.vertices, nearest) : std::vector<double>{};
+    parallel_each(ranges_.size(), [&](std::size_t v) {
+      if (limits.least) ranges_[v].least = (*limits.least)(mesh.vertices[v]);
+      if (limits.most) ranges_[v].most = most[v];
+    });
     const double diagonal = bounding_box(mesh.vertices).diagonal();
     unit_ = diagonal;
     least_ = std::min(kSmallestFeature * uniform / diagonal, 1.0);
@@ -202,18 +221,18 @@ class Field {
   }
 
   const std::vector<double>& values() const { return values_; }
-  // Upper bounds of the edge length; empty if there are none.
-  const std::vector<double>& bounds() const { return bounds_; }
+  // Of the edge length; empty if there are none.
+  const std::vector<Range>& ranges() const { return ranges_; }
 
   // A vertex in the middle of two.
   void add(const Vec3& p, Index a, Index b) {
     values_.push_back(kind_ == DensityKind::lfs ? from_size(p) : 0.5 * (values_[a] + values_[b]));
-    if (bound_) bounds_.push_back((*bound_)(p));
+    if (limits_.any()) ranges_.push_back(range_at(limits_, p));
   }
 
   // Whether the field between vertices is not known before there is one. Other fields are linear.
   bool measured() const { return kind_ == DensityKind::lfs; }
-  const SizeField* bound() const { return bound_; }
+  const SizeLimits& limits() const { return limits_; }
 
  private:
   double from_size(const Vec3& p) const { return std::pow(std::clamp((*size_)(p) / unit_, least_, 1.0), -exponent_); }
@@ -222,8 +241,8 @@ class Field {
   double unit_ = 1, least_ = 0, exponent_ = 1;
   std::unique_ptr<LocalFeatureSize> size_;
   std::vector<double> values_;
-  const SizeField* bound_;
-  std::vector<double> bounds_;
+  SizeLimits limits_;
+  std::vector<Range> ranges_;
 };
 
 // The lengths of a calibrated field, and the factor that led to them.
@@ -247,7 +266,7 @@ class Calibrator {
     std::vector<double> raw(rho.size());
     parallel_each(raw.size(), [&](std::size_t v) { raw[v] = 1 / fourth_root(rho[v]); });
     const auto excess = [&](Calibration& c) {
-      c.lengths = lengths(points, raw, field.bounds(), c.factor);
+      c.lengths = lengths(points, raw, field.ranges(), c.factor);
       const MeshEstimate e = estimate(domain, c.lengths);
       return target_.vertices ? 0.5 * std::log(static_cast<double>(target_.vertices) / e.vertices)
                               : std::log(e.mean_edge / target_.edge_length);
@@ -260,7 +279,7 @@ class Calibrator {
     c.factor = guess > 0 ? guess : unbounded;
     // Where bounds ask for more vertices than are wanted, whatever the factor, it stays below the one without bounds by
     // this much.
-    const double most = field.bounds().empty() ? std::numeric_limits<double>::infinity() : kMostFactor * unbounded;
+    const double most = field.ranges().empty() ? std::numeric_limits<double>::infinity() : kMostFactor * unbounded;
     double low = 0, high = 0, low_excess = 0, high_excess = 0;  // factors on either side
     double last = c.factor, last_off = 0;
     for (int i = 0; i < 60; ++i) {
@@ -288,11 +307,11 @@ class Calibrator {
 
  private:
   std::vector<double> lengths(const std::vector<Vec3>& points, const std::vector<double>& raw,
-                              const std::vector<double>& bounds, double factor) const {
+                              const std::vector<Range>& ranges, double factor) const {
     std::vector<double> h(raw.size());
     for (std::size_t v = 0; v < h.size(); ++v) h[v] = factor * raw[v];
     if (const double gradation = gradation_of_field(options_); gradation > 0) h = limit_gradation(points, h, gradation);
-    for (std::size_t v = 0; v < bounds.size(); ++v) h[v] = std::min(h[v], bounds[v]);
+    for (std::size_t v = 0; v < ranges.size(); ++v) h[v] = ranges[v].clamp(h[v]);
     for (double& x : h) {
       x = std::max(x, options_.min_edge);
       if (options_.max_edge > 0) x = std::min(x, options_.max_edge);
@@ -401,7 +420,7 @@ class Refiner {
 
   // The longest edge of a triangle inside which h differs.
   void push_longest(const Triangle& v) {
-    if (field_.measured() || !field_.bound()) return;
+    if (field_.measured() || !field_.limits().any()) return;
     const Edge longest = std::max({edge(v[0], v[1]), edge(v[1], v[2]), edge(v[2], v[0])}, Later());
     const double length = std::sqrt(std::get<0>(longest));
     const double least = std::min({lengths_[v[0]], lengths_[v[1]], lengths_[v[2]]});
@@ -420,7 +439,7 @@ class Refiner {
   // Looks at points about as far from each other as h, which changes little from one to the next.
   bool differs_along(Index a, Index b, double length) const {
     if (field_.measured()) return true;
-    if (!field_.bound()) return false;
+    if (!field_.limits().any()) return false;
     const int n = static_cast<int>(std::ceil(length));
     for (int i = 1; i < n; ++i) {
       const double w = static_cast<double>(i) / n;
@@ -438,21 +457,20 @@ class Refiner {
       linear += weights[k] * field_.values()[v[k]];
       density += weights[k] / fourth_power(lengths_[v[k]]);
     }
-    double h = bounded(factor_ / fourth_root(linear), (*field_.bound())(p));
+    double h = bounded(factor_ / fourth_root(linear), range_at(field_.limits(), p));
     if (gradation_ > 0)
       for (const Index k : v) h = std::min(h, lengths_[k] + gradation_ * norm(p - mesh_.vertices[k]));
     const double ratio = density * fourth_power(h);
     return ratio > kFarthest || ratio * kFarthest < 1;
   }
 
-  double bounded(double h, double bound) const {
-    h = std::max(std::min(h, bound), options_.min_edge);
+  double bounded(double h, const Range& range) const {
+    h = std::max(range.clamp(h), options_.min_edge);
     return options_.max_edge > 0 ? std::min(h, options_.max_edge) : h;
   }
 
   double raw_length(Index v) const {
-    return bounded(factor_ / fourth_root(field_.values()[v]),
-                   field_.bounds().empty() ? std::numeric_limits<double>::infinity() : field_.bounds()[v]);
+    return bounded(factor_ / fourth_root(field_.values()[v]), field_.ranges().empty() ? Range{} : field_.ranges()[v]);
   }
 
   // Lets two vertices limit each other. The next calibration does so for all; until then this keeps a finer place that
@@ -547,7 +565,7 @@ double target_edge_length(const Sizing& sizing, const TriangleMesh& mesh, Index 
 }
 
 SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target,
-                             const SizeField* bound) {
+                             const SizeLimits& limits) {
   check(mesh, options, target);
   SizedMesh sized;
   sized.mesh = mesh;
@@ -555,12 +573,12 @@ SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& opti
   for (Index t = 0; t < sized.parent.size(); ++t) sized.parent[t] = t;
   auto domain = std::make_unique<Domain>(sized.mesh);
   check_bounds(*domain, options, target);
-  if (options.kind == DensityKind::uniform && !bound) {
+  if (options.kind == DensityKind::uniform && !limits.any()) {
     sized.sizing = uniform_sizing(*domain, target);
     return sized;
   }
   const double uniform = uniform_length(*domain, target);
-  Field field(mesh, options, uniform_count(*domain, uniform), uniform, bound);
+  Field field(mesh, options, uniform_count(*domain, uniform), uniform, limits);
   const Calibrator calibrator(options, target);
   Calibration calibration;
   for (int round = 0;; ++round) {

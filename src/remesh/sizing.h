@@ -48,6 +48,14 @@ double target_edge_length(const Sizing& sizing, Index vertex);
 double target_edge_length(const Sizing& sizing, const TriangleMesh& mesh, Index triangle,
                           const std::array<double, 3>& weights);
 
+// Bounds of h beside those of the options; null: none. Where they contradict each other, h is the upper one.
+struct SizeLimits {
+  const SizeField* most = nullptr;
+  const SizeFloor* least = nullptr;
+
+  bool any() const { return most || least; }
+};
+
 // A mesh whose triangles can carry the density: the input's surface, its vertices first, edges bisected.
 struct SizedMesh {
   TriangleMesh mesh;
@@ -64,8 +72,8 @@ struct SizedMesh {
 // fields are linear. Stops at 400,000 triangles or the input's number, if that is larger; a uniform density bisects
 // nothing. Throws as compute_sizing.
 //
-// `bound`, if there is one, is an upper bound of h beside those of the options. It is not scaled with the field.
+// `bounds` are not scaled with the field.
 SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target,
-                             const SizeField* bound = nullptr);
+                             const SizeLimits& bounds = {});
 
 }  // namespace bisector

@@ -646,6 +646,10 @@ TEST_F(CliRemesh, WhatTheInputDoesNotAllow) {
   refused("square.ply", {"-n", "100", "--density", "attribute:size"}, "one of x, y, z, rho");
   refused("sphere.off", {"-n", "100", "--density", "attribute:rho"}, ".ply");
   refused("zero.ply", {"-n", "100", "--density", "attribute:rho"}, "vertex 0");
+  for (const char* option : {"--keep-vertices", "--keep-faces"}) {
+    refused("square.ply", {"-n", "100", option, in("missing.txt")}, "missing.txt");
+    refused("square.ply", {"-n", "100", option, in("far.txt")}, "far.txt:3");
+  }
   refused("square.ply", {"-n", "100", "--feature-file", in("missing.txt")}, "missing.txt");
   refused("square.ply", {"-n", "100", "--feature-file", in("far.txt")}, "far.txt:3");
   refused("square.ply", {"-n", "100", "--feature-file", in("chord.txt")}, "chord.txt:3");
@@ -938,6 +942,7 @@ TEST_F(CliRemesh, SoupIsWrapped) {
   refused(2, {"--wrap", "0.1", "--density", "attribute:rho"}, "--density");
   write_text("edges.txt", "0 1\n");
   refused(2, {"--wrap", "0.1", "--feature-file", in("edges.txt")}, "--feature-file");
+  refused(2, {"--wrap", "0.1", "--keep-faces", in("edges.txt")}, "--keep-faces");
 }
 
 TEST_F(CliRemesh, ReportHasWhatIsDocumented) {

@@ -452,6 +452,15 @@ class Running(unittest.TestCase):
         self.assertLess(between.max(), 0.5)
 
     @unittest.skipUnless(hasattr(ctypes.CDLL(None), "mallinfo2"), "needs glibc's count of what is allocated")
+    def test_kept(self):
+        vertices, faces = cube()
+        r = bs.remesh((vertices, faces), n=200, keep_vertices=[7], keep_faces=np.array([0, 1, 5]))
+        of_input = r.kept[r.kept >= 0]
+        self.assertLessEqual({7, *faces[[0, 1, 5]].ravel()}, set(of_input))
+        self.assertTrue(np.array_equal(r.vertices[r.kept >= 0], vertices[of_input]))
+        with self.assertRaisesRegex(bs.Error, "face 999"):
+            bs.remesh((vertices, faces), n=200, keep_faces=[999])
+
     def test_a_thousand_calls_leak_nothing(self):
         mesh = cube(3)
         bad = (mesh[0], mesh[1] + 5)

@@ -370,7 +370,7 @@ TEST(SizingRefinement, IsAsFineAsTheLinearDensityNeeds) {
   for (const Vec3& at : {Vec3{0.3, 0.6, 0}, Vec3{0.5, 0.5, 1}, Vec3{1, 0.1, 0.9}}) {
     // Steeper than the field itself may be by default.
     const SizeField bound({at}, {least}, 0.35);
-    const SizedMesh sized = refine_for_density(mesh, {}, {5000, 0}, &bound);
+    const SizedMesh sized = refine_for_density(mesh, {}, {5000, 0}, {&bound});
     check_refinement(mesh, sized);
     const std::vector<double> h = lengths_of(sized.sizing, sized.mesh);
     const double most = *std::max_element(h.begin(), h.end());

@@ -1,0 +1,31 @@
+// Vertices and edges of the input that a result has to have as they are.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "bisector/features.h"
+#include "bisector/remesh.h"
+
+namespace bisector {
+
+// Makes vertices of the mesh corners: curves through them are divided there, and those on no curve stand alone.
+void add_corners(FeatureGraph& graph, const std::vector<Index>& vertices);
+
+// What of a prepared input is to be kept, by its features.
+struct KeptFeatures {
+  std::vector<Index> corners;  // of each corner, the vertex of the input that it is; kNone: it may be left out
+  std::vector<char> curves;    // of each curve, whether it is an edge that must not be divided
+
+  bool empty() const { return corners.empty(); }
+};
+
+// Gives the vertices of a result that are kept ones the bits of the input's, names them in RemeshResult::kept, and
+// takes those out of the mesh that divide kept edges: edges are contracted along them, and the triangles around made
+// Delaunay as far as that goes. Places, features and topology follow. Throws Error if a kept vertex or edge is not in
+// the result.
+void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const TriangleMesh& input,
+                  RemeshResult& result);
+
+}  // namespace bisector
