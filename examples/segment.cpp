@@ -15,7 +15,7 @@ int main(int argc, char** argv) try {
   bisector::TriangleMesh mesh = bisector::read_mesh(argv[1]);
   const bisector::SegmentResult result = bisector::segment(mesh, options);
 
-  bisector::GroupNames groups{"region"};
+  bisector::WriteOptions groups{"region"};
   for (const bisector::SegmentRegion& region : result.regions) {
     groups.names.emplace_back(bisector::name_of(bisector::type_of(region.proxy)));
     std::printf("%-22s %6zu triangles, rms distance %.3g\n", groups.names.back().c_str(), region.triangles, region.rms);

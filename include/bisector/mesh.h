@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 namespace bisector {
@@ -23,6 +25,9 @@ struct Vec3 {
 
 using Triangle = std::array<Index, 3>;
 
+// What labels are called, where a file or a caller names them: "inlet", "steel". A label may lack a name.
+using LabelNames = std::map<std::int32_t, std::string>;
+
 // Triangles over shared vertices. Any soup is valid: open, non-manifold, with zero-area triangles.
 struct TriangleMesh {
   std::vector<Vec3> vertices;
@@ -32,6 +37,8 @@ struct TriangleMesh {
   std::vector<std::int32_t> labels = {};  // of each triangle, e.g. its CAD patch; or empty
   // Edges marked as features, by a file or a caller.
   std::vector<std::array<Index, 2>> feature_edges = {};
+  LabelNames label_names = {};
+  double unit = 0;  // of the coordinates, in metres; 0: not known
 };
 
 using Tetrahedron = std::array<Index, 4>;
@@ -45,6 +52,7 @@ struct TetMesh {
       {};  // marked triangles, on the boundary counter-clockwise seen from outside; or empty
   std::vector<std::int32_t> boundary_labels = {};        // of each marked triangle, or empty
   std::vector<std::array<Index, 2>> feature_edges = {};  // edges marked as features
+  LabelNames region_names = {}, label_names = {};
 };
 
 // Compressed sparse rows: row i is values[offsets[i] .. offsets[i + 1]).

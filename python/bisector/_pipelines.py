@@ -85,7 +85,8 @@ def remesh(
 ) -> RemeshResult:
     """A high-quality triangle mesh of a surface, of n vertices or of a mean edge length.
 
-    `mesh` is the path of a file (.off, .obj, .ply, .stl), (vertices, faces), or a mesh of trimesh, PyVista or meshio.
+    `mesh` is the path of a file in any format of docs/cli.md, (vertices, faces), or a mesh of trimesh, PyVista or
+    meshio.
     Lengths are in its unit. `seeds` is an (n, 3) array of points to start from, or a file of them; `density` a word
     ("lfs", "curvature:2", "attribute:NAME") or one positive value for each vertex, edges being as long as its power
     -1/4. `labels` is (m,), a number for each face of a mesh in memory, and `feature_edges` (k, 2), edges of it to keep.
@@ -138,7 +139,7 @@ def tetrahedralize(
 ) -> TetResult:
     """A high-quality tetrahedral mesh of a solid, of about n vertices or of a mean edge length.
 
-    `mesh` is a closed surface as for remesh(), or tetrahedra: a file (.mesh, .msh, .vtk, .vtu), (vertices, tets) with
+    `mesh` is a closed surface as for remesh(), or tetrahedra: a file in a format that has them, (vertices, tets) with
     tets (t, 4), a TetResult, or a meshio.Mesh. `sizes` are edge lengths: one for each vertex of the mesh, a pair of
     points (k, 3) and lengths (k,), or a file, "FILE:NAME". A density makes edges as long as its power -1/5. The rest,
     what is raised and what is warned of are as for remesh(). Surfaces are filled by TetGen.

@@ -55,7 +55,7 @@ Command add_remesh(CLI::App& program) {
          "Remesh a CAD part, write figures on its quality and draw a picture."},
         {"bisector remesh part.stl -o out.ply --edge-length 0.5 --features 30",
          "Make edges half a unit long, and keep all edges that are sharper than 30 degrees."}},
-       "Meshes are read and written by extension: .off, .obj, .ply, .stl. Ctrl-C stops the run; nothing is written."},
+       "Meshes are read and written by extension. Ctrl-C stops the run; nothing is written."},
       "write a report with quality, distance to the input and\n"
       "timings: JSON, or a page with 3D views if FILE ends in\n"
       ".html; - for stdout",

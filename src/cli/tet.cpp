@@ -60,9 +60,7 @@ Command add_tet(CLI::App& program) {
          "Make edges half a unit long, and write figures on angles and volumes."},
         {"bisector tet coarse.mesh -o fine.mesh -n 50000 --sizes sizes.vtu:h",
          "Mesh a solid anew, with the edge lengths h that another mesh has."}},
-       "The input is a closed surface (.off, .obj, .ply, .stl) or tetrahedra (.mesh, .msh, .vtk, .vtu). Ctrl-C stops "
-       "the run;\n"
-       "nothing is written."},
+       "Meshes are read and written by extension. Ctrl-C stops the run; nothing is written."},
       "write a report with quality, distance of the boundary to\n"
       "the input and timings: JSON, or a page with 3D views if\n"
       "FILE ends in .html; - for stdout",

@@ -3,10 +3,12 @@
 #include <charconv>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "core/grouping.h"
+#include "io/labels.h"
 #include "io/tet_formats.h"
 
 namespace bisector::io {
@@ -80,8 +82,8 @@ class GmshReader {
     triangles_.sort_by_tag();
     TetSoup soup;
     soup.vertices = std::move(vertices_);
-    soup.regions = choose_marks(3, tets_, kRegionPrefix);
-    soup.labels = choose_marks(2, triangles_, kLabelPrefix);
+    soup.regions = choose_marks(3, tets_, kRegionPrefix, soup.region_names);
+    soup.labels = choose_marks(2, triangles_, kLabelPrefix, soup.label_names);
     soup.tets = std::move(tets_.elements);
     soup.triangles = std::move(triangles_.elements);
     soup.edges = std::move(edges_.elements);
@@ -306,29 +308,38 @@ class GmshReader {
     if (read != n) in_.fail(fmt::format("{} elements are declared, but the blocks have {}; {}", n, read, kExportAgain));
   }
 
-  // Physical groups where there are any, else elementary entities. Where all groups are named as format_gmsh names
-  // them, the numbers in the names.
+  // Physical groups and their names where there are any, else elementary entities. Where all groups are named as
+  // format_gmsh names what has no name, the numbers in the names.
   template <std::size_t N>
-  std::vector<std::int32_t> choose_marks(int dimension, const Marked<N>& marked, std::string_view prefix) const {
+  std::vector<std::int32_t> choose_marks(int dimension, const Marked<N>& marked, std::string_view prefix,
+                                         LabelNames& names) const {
     const std::set<std::int32_t> groups(marked.physical.begin(), marked.physical.end());
     if (groups.empty() || (groups.size() == 1 && *groups.begin() == 0)) return marked.elementary;
     std::map<std::int32_t, std::int32_t> numbers;
     for (const std::int32_t group : groups) {
-      const auto name = names_.find({dimension, group});
-      if (name == names_.end()) return marked.physical;
-      if (groups.size() == 1 && name->second == kUnmarked[3 - dimension]) return {};
-      const std::string_view text = name->second;
-      std::int32_t number = 0;
-      const char* end = text.data() + text.size();
-      if (!text.starts_with(prefix)) return marked.physical;
-      const auto [stop, error] = std::from_chars(text.data() + prefix.size(), end, number);
-      if (error != std::errc{} || stop != end) return marked.physical;
-      numbers[group] = number;
+      const auto found = names_.find({dimension, group});
+      if (found == names_.end()) continue;
+      const std::string& name = found->second;
+      if (groups.size() == 1 && name == kUnmarked[3 - dimension]) return {};
+      if (const std::optional<std::int32_t> number = number_in(name, prefix)) numbers[group] = *number;
+      if (name != fmt::format("{}{}", prefix, group)) names[group] = name;
     }
+    if (numbers.size() < groups.size()) return marked.physical;
+    names.clear();
     std::vector<std::int32_t> marks;
     marks.reserve(marked.physical.size());
     for (const std::int32_t group : marked.physical) marks.push_back(numbers[group]);
     return marks;
+  }
+
+  // K of "prefixK".
+  static std::optional<std::int32_t> number_in(std::string_view name, std::string_view prefix) {
+    if (!name.starts_with(prefix)) return {};
+    std::int32_t number = 0;
+    const char* end = name.data() + name.size();
+    const auto [stop, error] = std::from_chars(name.data() + prefix.size(), end, number);
+    if (error != std::errc{} || stop != end) return {};
+    return number;
   }
 
   const std::string& path_;
@@ -432,14 +443,17 @@ class GmshWriter {
     const std::size_t names = volumes_.tags.size() + surfaces_.tags.size() + (curves_.empty() ? 0 : 1);
     print("$PhysicalNames\n{}\n", names);
     if (!curves_.empty()) print("1 1 \"{}\"\n", kUnmarked[2]);
-    write_names(2, surfaces_, mesh_.boundary_labels.empty(), kLabelPrefix);
-    write_names(3, volumes_, mesh_.regions.empty(), kRegionPrefix);
+    write_names(2, surfaces_, mesh_.boundary_labels.empty(), kLabelPrefix, mesh_.label_names);
+    write_names(3, volumes_, mesh_.regions.empty(), kRegionPrefix, mesh_.region_names);
     out_ += "$EndPhysicalNames\n";
   }
-  void write_names(int dimension, const Entities& entities, bool unmarked, const char* prefix) {
+  void write_names(int dimension, const Entities& entities, bool unmarked, const char* prefix,
+                   const LabelNames& names) {
     for (std::size_t e = 0; e < entities.tags.size(); ++e) {
+      const auto name = names.find(entities.marks[e]);
       if (unmarked) print("{} {} \"{}\"\n", dimension, entities.tags[e], kUnmarked[3 - dimension]);
-      else print("{} {} \"{}{}\"\n", dimension, entities.tags[e], prefix, entities.marks[e]);
+      else if (name == names.end()) print("{} {} \"{}{}\"\n", dimension, entities.tags[e], prefix, entities.marks[e]);
+      else print("{} {} \"{}\"\n", dimension, entities.tags[e], cleaned(name->second, "\""));
     }
   }
 

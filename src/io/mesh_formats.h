@@ -50,6 +50,8 @@ struct Soup {
   std::vector<std::int32_t> labels;         // of each face, or empty
   std::vector<std::array<Index, 2>> edges;  // whether or not they are edges of a face
   std::string ignored;                      // what follows the last face, if anything does
+  LabelNames label_names = {};
+  double unit = 0;  // of the coordinates, in metres; 0: not known
 
   void end_face() { faces.offsets.push_back(faces.values.size()); }
   std::size_t open_corners() const { return faces.values.size() - faces.offsets.back(); }
@@ -63,16 +65,24 @@ Soup read_off(const std::string& path, std::string_view bytes);
 Soup read_obj(const std::string& path, std::string_view bytes);
 Soup read_ply(const std::string& path, std::string_view bytes);
 Soup read_stl(const std::string& path, std::string_view bytes);
+Soup read_vtp(const std::string& path, std::string_view bytes);
+Soup read_3mf(const std::string& path, std::string_view bytes);
 std::vector<Vec3> read_ply_points(const std::string& path, std::string_view bytes);
 std::vector<double> read_ply_attribute(const std::string& path, std::string_view bytes, const std::string& name);
+std::vector<double> read_vtp_attribute(const std::string& path, std::string_view bytes, const std::string& name);
 
-// The bytes of a file. Coordinates must be finite and indices in range; STL throws for what is beyond a float.
-std::string format_off(const TriangleMesh& mesh);
-std::string format_off(const PolygonMesh& mesh);
-std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups);
-std::string format_obj(const PolygonMesh& mesh, const GroupNames& groups);
-std::string format_ply(const TriangleMesh& mesh);
-std::string format_ply(const PolygonMesh& mesh);
-std::string format_stl(const std::string& path, const TriangleMesh& mesh);
+// The bytes of a file; the path is for messages. Coordinates must be finite and indices in range; formats of floats
+// throw for what is beyond these.
+std::string format_off(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_obj(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_ply(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_stl(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_vtp(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_3mf(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_glb(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_off(const PolygonMesh& mesh, const WriteOptions& options);
+std::string format_obj(const PolygonMesh& mesh, const WriteOptions& options);
+std::string format_ply(const PolygonMesh& mesh, const WriteOptions& options);
+std::string format_vtp(const PolygonMesh& mesh, const WriteOptions& options);
 
 }  // namespace bisector::io

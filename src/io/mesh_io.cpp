@@ -22,6 +22,7 @@
 #include "bisector/error.h"
 #include "core/degenerate.h"
 #include "io/files.h"
+#include "io/formats.h"
 #include "io/mesh_formats.h"
 #include "io/text.h"
 #include "mesh/polygon.h"
@@ -116,46 +117,6 @@ using namespace io;
 
 namespace {
 
-// --- files ---
-
-struct MeshFormat {
-  std::string_view extension;
-  Soup (*read)(const std::string& path, std::string_view bytes);
-  std::string (*bytes_of)(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups);
-  std::string (*bytes_of_polygons)(const PolygonMesh& mesh, const GroupNames& groups);  // null: triangles only
-};
-
-constexpr MeshFormat kFormats[] = {
-    {".off", read_off, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_off(mesh); },
-     [](const PolygonMesh& mesh, const GroupNames&) { return format_off(mesh); }},
-    {".obj", read_obj,
-     [](const std::string&, const TriangleMesh& mesh, const GroupNames& groups) { return format_obj(mesh, groups); },
-     [](const PolygonMesh& mesh, const GroupNames& groups) { return format_obj(mesh, groups); }},
-    {".ply", read_ply, [](const std::string&, const TriangleMesh& mesh, const GroupNames&) { return format_ply(mesh); },
-     [](const PolygonMesh& mesh, const GroupNames&) { return format_ply(mesh); }},
-    {".stl", read_stl,
-     [](const std::string& path, const TriangleMesh& mesh, const GroupNames&) { return format_stl(path, mesh); },
-     nullptr},
-};
-
-// "use .off, .obj, .ply or .stl"
-std::string known_extensions() {
-  std::string list = "use ";
-  for (std::size_t k = 0; k < std::size(kFormats); ++k) {
-    if (k > 0) list += k + 1 < std::size(kFormats) ? ", " : " or ";
-    list += kFormats[k].extension;
-  }
-  return list;
-}
-
-const MeshFormat& format_of(const std::string& path) {
-  const std::string extension = lower_extension(path);
-  for (const MeshFormat& format : kFormats)
-    if (format.extension == extension) return format;
-  if (extension.empty()) fail(path, "no file name extension; " + known_extensions());
-  fail(path, "unknown mesh format '" + printable(extension) + "'; " + known_extensions());
-}
-
 // --- from what a file holds to triangles ---
 
 void split_faces(const std::string& path, const Soup& soup, TriangleMesh& mesh, const Context& context) {
@@ -249,13 +210,17 @@ void check_face(const std::string& path, std::size_t face, const Index* begin, c
                              *v, vertices));
 }
 
-// Each label has a name if any has.
+// Each label has a name if any has, and a colour.
 template <class Label>
-void check_label_names(const std::string& path, const std::vector<Label>& labels, const GroupNames& groups) {
-  if (groups.names.empty()) return;
-  for (const Label label : labels)
-    if (std::cmp_less(label, 0) || std::cmp_greater_equal(label, groups.names.size()))
-      fail(path, fmt::format("label {} has no name, there are {}; nothing was written", label, groups.names.size()));
+void check_label_names(const std::string& path, const std::vector<Label>& labels, const WriteOptions& options) {
+  const auto check = [&](std::size_t count, const char* what) {
+    if (count == 0) return;
+    for (const Label label : labels)
+      if (std::cmp_less(label, 0) || std::cmp_greater_equal(label, count))
+        fail(path, fmt::format("label {} has no {}, there are {}; nothing was written", label, what, count));
+  };
+  check(options.names.size(), "name");
+  check(options.colours.size(), "colour");
 }
 
 [[noreturn]] void fail_write(const std::string& path, int error) {
@@ -271,6 +236,8 @@ TriangleMesh io::mesh_of(const std::string& path, Soup soup, const Context& cont
     context.warn(fmt::format("{}: {} after the end of the mesh ignored", name_of(path), soup.ignored));
   TriangleMesh mesh;
   mesh.vertices = std::move(soup.vertices);
+  mesh.label_names = std::move(soup.label_names);
+  mesh.unit = soup.unit;
   split_faces(path, soup, mesh, context);
   keep_mesh_edges(path, std::move(soup.edges), mesh, context);
   warn_of_leftovers(path, mesh, context);
@@ -278,45 +245,47 @@ TriangleMesh io::mesh_of(const std::string& path, Soup soup, const Context& cont
 }
 
 TriangleMesh read_mesh(const std::string& path, const Context& context) {
-  const MeshFormat& format = format_of(path);
+  const Format& format = format_of(path, &FileFormat::reads_surfaces, "meshes");
   const std::string bytes = read_bytes(path);
-  return mesh_of(path, format.read(path, bytes), context);
+  Soup soup = format.read ? format.read(path, bytes) : surface_of(path, format.read_tets(path, bytes));
+  return mesh_of(path, std::move(soup), context);
 }
 
-void write_mesh(const std::string& path, const TriangleMesh& mesh, const GroupNames& groups) {
+void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options) {
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
     check_face(path, i, mesh.triangles[i].data(), mesh.triangles[i].data() + 3, mesh.vertices.size());
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.triangles.size())
     fail(path, fmt::format("{} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
-  check_label_names(path, mesh.labels, groups);
+  check_label_names(path, mesh.labels, options);
   for (const Edge& e : mesh.feature_edges)
     if (std::max(e[0], e[1]) >= mesh.vertices.size())
       fail(path, fmt::format("feature edge {} {} is out of range, the mesh has {} vertices; nothing was written", e[0],
                              e[1], mesh.vertices.size()));
-  const MeshFormat& format = format_of(path);
-  write_file(path, format.bytes_of(path, mesh, groups));
+  const Format& format = format_of(path, &FileFormat::writes_surfaces, "meshes");
+  if (format.bytes_of) return write_file(path, format.bytes_of(path, mesh, options));
+  write_file(path, format.bytes_of_tets(
+                       {mesh.vertices, {}, {}, mesh.triangles, mesh.labels, mesh.feature_edges, {}, mesh.label_names}));
 }
 
-void write_polygons(const std::string& path, const PolygonMesh& mesh, const GroupNames& groups) {
+void write_polygons(const std::string& path, const PolygonMesh& mesh, const WriteOptions& options) {
   const std::size_t faces = mesh.polygons.rows();
-  const MeshFormat& format = format_of(path);
-  if (format.bytes_of_polygons == nullptr)
-    fail(path, "polygons are written as PLY, OBJ or OFF; use .ply, .obj or .off");
+  const Format& format = format_of(path, &FileFormat::writes_polygons, "polygons");
   if ((!mesh.labels.empty() && mesh.labels.size() != faces) || (!mesh.colours.empty() && mesh.colours.size() != faces))
     fail(path, fmt::format("{} labels and {} colours for {} polygons; give one each", mesh.labels.size(),
                            mesh.colours.size(), faces));
   check_points(path, mesh.vertices);
   for (std::size_t i = 0; i < faces; ++i)
     check_face(path, i, mesh.polygons.begin(i), mesh.polygons.end(i), mesh.vertices.size());
-  check_label_names(path, mesh.labels, groups);
-  write_file(path, format.bytes_of_polygons(mesh, groups));
+  check_label_names(path, mesh.labels, options);
+  write_file(path, format.bytes_of_polygons(mesh, options));
 }
 
 std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name) {
   const std::string extension = lower_extension(path);
+  if (extension == ".vtp") return read_vtp_attribute(path, read_bytes(path), name);
   if (extension != ".ply")
-    fail(path, fmt::format("there is no vertex property '{}', {} files have none; use a .ply file that has it",
+    fail(path, fmt::format("there is no vertex property '{}', {} files have none; use a .ply or .vtp file that has it",
                            printable(name), extension.empty() ? "such" : printable(extension)));
   return read_ply_attribute(path, read_bytes(path), name);
 }

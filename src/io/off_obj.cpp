@@ -1,17 +1,21 @@
+// OFF (Geomview's object file format, geomview.org/docs/html/OFF.html) and Wavefront's OBJ.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <bit>
 #include <cstdint>
-#include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "bisector/error.h"
 #include "bisector/io.h"
+#include "io/bytes.h"
+#include "io/labels.h"
 #include "io/mesh_formats.h"
 #include "io/text.h"
 
@@ -19,14 +23,204 @@ namespace bisector::io {
 
 namespace {
 
-// The header may say which columns follow the coordinates; all are ignored, so only other dimensions matter.
-void check_off_header(TextReader& in, std::string_view header) {
-  if (!header.ends_with("OFF") && header != "off")
-    in.fail("does not begin with OFF but with '" + printable(header) + "'; check that this is an OFF file");
-  const std::string_view prefix = header.substr(0, header.size() - 3);
+// What the header says of the numbers that a point has; all but the coordinates are ignored.
+struct OffHeader {
+  bool binary = false;
+  std::size_t columns = 3;  // numbers of a point, with normal, colour and texture coordinates
+};
+
+OffHeader read_off_header(TextReader& in) {
+  if (!in.next_line()) in.fail_truncated("comments");
+  const std::string_view word = in.word();
+  if (!word.ends_with("OFF") && word != "off")
+    in.fail("does not begin with OFF but with '" + printable(word) + "'; check that this is an OFF file");
+  std::string_view prefix = word.substr(0, word.size() - 3);
   if (prefix.find_first_of("4n") != std::string_view::npos)
-    in.fail("'" + printable(header) + "' has points of other than three coordinates; export as OFF");
+    in.fail("'" + printable(word) + "' has points of other than three coordinates; export as OFF");
+  OffHeader header;
+  if (prefix.starts_with("ST")) {
+    header.columns += 2;
+    prefix.remove_prefix(2);
+  }
+  if (prefix.find('C') != std::string_view::npos) header.columns += 4;
+  if (prefix.find('N') != std::string_view::npos) header.columns += 3;
+  header.binary = TextReader(in).word() == "BINARY";
+  return header;
 }
+
+struct OffCounts {
+  std::size_t vertices, faces;
+};
+
+Index off_corner(TextReader& in, std::string_view word, std::size_t vertices) {
+  const std::int64_t v = in.integer(word);
+  if (v < 0 || v >= static_cast<std::int64_t>(vertices))
+    in.fail(fmt::format("index {} is out of range, the file has {} vertices; mend the face", v, vertices));
+  return static_cast<Index>(v);
+}
+
+void check_degree(const TextReader& in, std::size_t degree) {
+  if (degree < 3) in.fail(fmt::format("a face has {}; remove it", quantity(degree, "corner", "corners")));
+}
+
+// Each point and each face on a line of its own, whose further columns are ignored. As nearly all files are.
+Soup read_off_lines(TextReader in) {
+  Soup soup;
+  if (!in.at_word() && !in.next_line()) in.fail_truncated("the header");
+  const OffCounts n{in.count("vertices"), in.count("faces")};
+  soup.vertices.reserve(std::min(n.vertices, in.remaining() / 6 + 1));  // "0 0 0\n"
+  for (std::size_t i = 0; i < n.vertices; ++i) {
+    if (!in.next_line()) in.fail_truncated(fmt::format("{} of {} vertices", i, n.vertices));
+    soup.vertices.push_back(in.point());
+  }
+  for (std::size_t i = 0; i < n.faces; ++i) {
+    if (!in.next_line()) in.fail_truncated(fmt::format("{} of {} faces", i, n.faces));
+    const std::size_t degree = in.count("corners");
+    check_degree(in, degree);
+    for (std::size_t k = 0; k < degree; ++k) {
+      const std::string_view word = in.word();
+      if (word.empty()) in.fail(fmt::format("a face of {} corners ends after {}; {}", degree, k, kExportAgain));
+      soup.faces.values.push_back(off_corner(in, word, n.vertices));
+    }
+    soup.end_face();
+  }
+  soup.ignored = count_lines_left(in);
+  return soup;
+}
+
+// How a stream of numbers goes on after an item.
+enum class OffRest {
+  ignored,   // the rest of the line is colours and the like
+  next_item  // the next number begins the next item, on whichever line it is
+};
+
+// A stream of numbers with line ends anywhere. Throws Error unless it ends with the last face.
+Soup read_off_stream(TextReader in, const OffHeader& header, OffRest after_point, OffRest after_face) {
+  const auto number_ahead = [&] {
+    while (!in.at_word())
+      if (!in.next_line()) in.fail_truncated("a part of the numbers");
+  };
+  const auto skip_rest = [&] {
+    while (!in.word().empty()) {
+    }
+  };
+  number_ahead();
+  OffCounts n{};
+  n.vertices = in.count("vertices");
+  const std::size_t line = in.line();
+  number_ahead();
+  n.faces = in.count("faces");
+  if (in.at_word() || in.line() != line) {  // the number of edges, which some files lack
+    number_ahead();
+    in.word();
+  }
+  Soup soup;
+  soup.vertices.reserve(std::min(n.vertices, in.remaining() / 6 + 1));
+  for (std::size_t i = 0; i < n.vertices; ++i) {
+    Vec3 p;
+    for (int k = 0; k < 3; ++k) {
+      number_ahead();
+      p[k] = in.number();
+      if (const char* flaw = coordinate_flaw(p[k])) in.fail(flaw);
+    }
+    soup.vertices.push_back(p);
+    if (after_point == OffRest::ignored) {
+      skip_rest();
+      continue;
+    }
+    for (std::size_t k = 3; k < header.columns; ++k) {
+      number_ahead();
+      in.number();
+    }
+  }
+  for (std::size_t i = 0; i < n.faces; ++i) {
+    number_ahead();
+    const std::size_t degree = in.count("corners");
+    check_degree(in, degree);
+    for (std::size_t k = 0; k < degree; ++k) {
+      number_ahead();
+      soup.faces.values.push_back(off_corner(in, in.word(), n.vertices));
+    }
+    if (after_face == OffRest::ignored) skip_rest();
+    soup.end_face();
+  }
+  if (in.at_word() || in.next_line()) in.fail("there are more numbers than the header declares");
+  return soup;
+}
+
+std::optional<Soup> try_off_stream(const TextReader& in, const OffHeader& header) {
+  for (const OffRest after_point : {OffRest::ignored, OffRest::next_item})
+    for (const OffRest after_face : {OffRest::ignored, OffRest::next_item}) try {
+        return read_off_stream(in, header, after_point, after_face);
+      } catch (const Error&) {
+      }
+  return {};
+}
+
+// "OFF BINARY": integers and floats of 32 bits, the high byte first.
+class OffBinary {
+ public:
+  OffBinary(const std::string& path, std::string_view bytes) : path_(path), bytes_(bytes), whole_(bytes.size()) {}
+
+  Soup read(const OffHeader& header) {
+    Soup soup;
+    const std::size_t vertices = count("vertices"), faces = count("faces");
+    count("edges");
+    need(vertices, 4 * header.columns, "vertices");
+    soup.vertices.resize(vertices);
+    for (Vec3& p : soup.vertices) {
+      for (int k = 0; k < 3; ++k) {
+        p[k] = value<float>();
+        if (const char* flaw = coordinate_flaw(p[k])) fail(flaw);
+      }
+      bytes_.remove_prefix(4 * (header.columns - 3));
+    }
+    need(faces, 20, "faces");  // three corners and two counts
+    for (std::size_t i = 0; i < faces; ++i) {
+      const std::size_t degree = count("corners");
+      if (degree < 3) fail(fmt::format("face {} has {}; remove it", i, quantity(degree, "corner", "corners")));
+      need(degree, 4, "corners");
+      for (std::size_t k = 0; k < degree; ++k) {
+        const auto v = value<std::int32_t>();
+        if (v < 0 || static_cast<std::size_t>(v) >= vertices)
+          fail(fmt::format("index {} is out of range, the file has {} vertices; mend the face", v, vertices));
+        soup.faces.values.push_back(static_cast<Index>(v));
+      }
+      soup.end_face();
+      const std::size_t colours = count("colours");
+      need(colours, 4, "colours");
+      bytes_.remove_prefix(4 * colours);
+    }
+    if (!bytes_.empty()) soup.ignored = quantity(bytes_.size(), "byte", "bytes");
+    return soup;
+  }
+
+ private:
+  template <class T>
+  T value() {
+    need(1, sizeof(T), "numbers");
+    const T x = load<T>(bytes_.data(), true);
+    bytes_.remove_prefix(sizeof(T));
+    return x;
+  }
+  std::size_t count(const char* things) {
+    const auto n = value<std::int32_t>();
+    if (n < 0) fail(fmt::format("the number of {} is negative; {}", things, kExportAgain));
+    return static_cast<std::size_t>(n);
+  }
+  void need(std::size_t n, std::size_t bytes_each, const char* things) const {
+    if (n > bytes_.size() / bytes_each)
+      fail(
+          fmt::format("{} {} are declared, more than the file can hold; it is truncated, {}", n, things, kExportAgain));
+  }
+  [[noreturn]] void fail(const std::string& what) const {
+    io::fail(path_, fmt::format("byte {} after the header: {}", whole_ - bytes_.size(), what));
+  }
+
+  const std::string& path_;
+  std::string_view bytes_;
+  std::size_t whole_;
+};
 
 // The vertex of a corner "v", "v/vt", "v//vn" or "v/vt/vn", counted from 0.
 Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t vertices) {
@@ -39,98 +233,36 @@ Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t verti
   return static_cast<Index>(index);
 }
 
-// The label that a group's name tells, if format_obj may have written it.
-bool parse_label(std::string_view name, std::int32_t& label) {
-  for (const std::string_view prefix : {"label_", "region_", "branch_"}) {
-    if (!name.starts_with(prefix)) continue;
-    const char *begin = name.data() + prefix.size(), *end = name.data() + name.size();
-    const auto [stop, error] = std::from_chars(begin, end, label);
-    return error == std::errc{} && (stop == end || *stop == '_');
+// The rest of a line, its words one blank apart.
+std::string words_left(TextReader& in) {
+  std::string words;
+  for (std::string_view word = in.word(); !word.empty(); word = in.word()) {
+    if (!words.empty()) words += ' ';
+    words += word;
   }
-  return false;
+  return words;
 }
-
-// The labels of an OBJ file's faces: one for each pair of group and material.
-class ObjGroups {
- public:
-  void set_group(TextReader& in) { set(group_, in); }
-  void set_material(TextReader& in) { set(material_, in); }
-  void add_face() {
-    if (current_ == numbers_.end())
-      current_ = numbers_.try_emplace({group_, material_}, static_cast<std::int32_t>(numbers_.size())).first;
-    labels_.push_back(current_->second);
-  }
-  // Empty where they tell nothing.
-  std::vector<std::int32_t> take() {
-    std::vector<std::int32_t> named(numbers_.size());
-    const bool all_named = std::all_of(numbers_.begin(), numbers_.end(), [&](const auto& entry) {
-      return entry.first.second.empty() && parse_label(entry.first.first, named[static_cast<Index>(entry.second)]);
-    });
-    if (all_named && all_different(named)) {
-      for (std::int32_t& label : labels_) label = named[static_cast<Index>(label)];
-      return std::move(labels_);
-    }
-    return numbers_.size() > 1 ? std::move(labels_) : std::vector<std::int32_t>{};
-  }
-
- private:
-  static bool all_different(std::vector<std::int32_t> labels) {
-    std::sort(labels.begin(), labels.end());
-    return std::adjacent_find(labels.begin(), labels.end()) == labels.end();
-  }
-  void set(std::string& name, TextReader& in) {
-    name.clear();
-    for (std::string_view word = in.word(); !word.empty(); word = in.word()) {
-      if (!name.empty()) name += ' ';
-      name += word;
-    }
-    current_ = numbers_.end();
-  }
-
-  std::string group_, material_;
-  std::map<std::pair<std::string, std::string>, std::int32_t> numbers_;
-  std::map<std::pair<std::string, std::string>, std::int32_t>::const_iterator current_ = numbers_.end();
-  std::vector<std::int32_t> labels_;
-};
 
 }  // namespace
 
+// Numbers beside coordinates and corners are told from items by lines, so lines are tried first; what is no stream
+// either is refused with what is wrong with its lines.
 Soup read_off(const std::string& path, std::string_view bytes) {
   TextReader in(path, bytes, '#');
-  Soup soup;
-  if (!in.next_line()) in.fail_truncated("comments");
-  check_off_header(in, in.word());
-  if (!in.at_word() && !in.next_line()) in.fail_truncated("the header");
-  if (TextReader(in).word() == "BINARY") in.fail("binary OFF is not supported; export as text or PLY");
-  const std::size_t vertices = in.count("vertices"), faces = in.count("faces");
-
-  soup.vertices.reserve(std::min(vertices, in.remaining() / 6 + 1));  // "0 0 0\n"
-  for (std::size_t i = 0; i < vertices; ++i) {
-    if (!in.next_line()) in.fail_truncated(fmt::format("{} of {} vertices", i, vertices));
-    soup.vertices.push_back(in.point());
+  const OffHeader header = read_off_header(in);
+  if (header.binary) return OffBinary(path, in.after_line()).read(header);
+  try {
+    return read_off_lines(in);
+  } catch (const Error&) {
+    if (std::optional<Soup> soup = try_off_stream(in, header)) return *std::move(soup);
+    throw;
   }
-  for (std::size_t i = 0; i < faces; ++i) {
-    if (!in.next_line()) in.fail_truncated(fmt::format("{} of {} faces", i, faces));
-    const std::size_t degree = in.count("corners");
-    if (degree < 3) in.fail(fmt::format("a face has {}; remove it", quantity(degree, "corner", "corners")));
-    for (std::size_t k = 0; k < degree; ++k) {
-      const std::string_view word = in.word();
-      if (word.empty()) in.fail(fmt::format("a face of {} corners ends after {}; {}", degree, k, kExportAgain));
-      const std::int64_t v = in.integer(word);
-      if (v < 0 || v >= static_cast<std::int64_t>(vertices))
-        in.fail(fmt::format("index {} is out of range, the file has {} vertices; mend the face", v, vertices));
-      soup.faces.values.push_back(static_cast<Index>(v));
-    }
-    soup.end_face();
-  }
-  soup.ignored = count_lines_left(in);
-  return soup;
 }
 
 Soup read_obj(const std::string& path, std::string_view bytes) {
   TextReader in(path, bytes, '#', true);
   Soup soup;
-  ObjGroups groups;
+  GroupLabels groups;
   std::vector<std::pair<Index, std::size_t>> forward;  // indices beyond all before them and not yet defined; their line
   const auto read_corner = [&](std::string_view corner, std::size_t line) {
     const Index v = read_obj_corner(in, corner, soup.vertices.size());
@@ -160,16 +292,16 @@ Soup read_obj(const std::string& path, std::string_view bytes) {
       }
       if (count < 2) in.fail_at(line, fmt::format("a line has {}; remove it", quantity(count, "vertex", "vertices")));
     } else if (keyword == "g") {
-      groups.set_group(in);
+      groups.set_part(words_left(in));
     } else if (keyword == "usemtl") {
-      groups.set_material(in);
+      groups.set_material(words_left(in));
     }
   }
   for (const auto& [v, line] : forward)
     if (v >= soup.vertices.size())
       in.fail_at(line, fmt::format("index {} is out of range, the file has {}; mend the line", std::size_t{v} + 1,
                                    quantity(soup.vertices.size(), "vertex", "vertices")));
-  soup.labels = groups.take();
+  groups.take(soup);
   return soup;
 }
 
@@ -198,19 +330,21 @@ std::string off_of(const Mesh& mesh) {
   return out;
 }
 
+const LabelNames& names_in(const TriangleMesh& mesh) { return mesh.label_names; }
+LabelNames names_in(const PolygonMesh&) { return {}; }
+
 template <class Mesh>
-std::string obj_of(const Mesh& mesh, const GroupNames& groups) {
+std::string obj_of(const Mesh& mesh, const WriteOptions& options) {
+  const std::map<std::int32_t, std::string> names =
+      names_of_labels({mesh.labels.begin(), mesh.labels.end()}, names_in(mesh), options, "#\\");
   std::string out;
   for (const Vec3& p : mesh.vertices) {
     out += "v ";
     append_point(out, p);
   }
   for (std::size_t i = 0; i < face_count(mesh); ++i) {
-    if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1])) {
-      out += fmt::format("g {}_{}", groups.prefix, mesh.labels[i]);
-      if (!groups.names.empty()) out += '_' + groups.names[static_cast<std::size_t>(mesh.labels[i])];
-      out += '\n';
-    }
+    if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1]))
+      out += "g " + names.at(static_cast<std::int32_t>(mesh.labels[i])) + '\n';
     out += 'f';
     for (const Index v : face(mesh, i)) {
       out += ' ';
@@ -218,6 +352,7 @@ std::string obj_of(const Mesh& mesh, const GroupNames& groups) {
     }
     out += '\n';
   }
+  if (!options.lines) return out;
   for (const std::array<Index, 2>& e : mesh.feature_edges)
     out += fmt::format("l {} {}\n", std::size_t{e[0]} + 1, std::size_t{e[1]} + 1);
   return out;
@@ -225,9 +360,11 @@ std::string obj_of(const Mesh& mesh, const GroupNames& groups) {
 
 }  // namespace
 
-std::string format_off(const TriangleMesh& mesh) { return off_of(mesh); }
-std::string format_off(const PolygonMesh& mesh) { return off_of(mesh); }
-std::string format_obj(const TriangleMesh& mesh, const GroupNames& groups) { return obj_of(mesh, groups); }
-std::string format_obj(const PolygonMesh& mesh, const GroupNames& groups) { return obj_of(mesh, groups); }
+std::string format_off(const std::string&, const TriangleMesh& mesh, const WriteOptions&) { return off_of(mesh); }
+std::string format_off(const PolygonMesh& mesh, const WriteOptions&) { return off_of(mesh); }
+std::string format_obj(const std::string&, const TriangleMesh& mesh, const WriteOptions& options) {
+  return obj_of(mesh, options);
+}
+std::string format_obj(const PolygonMesh& mesh, const WriteOptions& options) { return obj_of(mesh, options); }
 
 }  // namespace bisector::io

@@ -1,3 +1,4 @@
+// PLY (Turk, The PLY polygon file format, Stanford 1994), and the triangle strips of Stanford's scans and Cyberware.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -271,11 +272,48 @@ void read_ply_label(Source& source, const PlyProperty& property, Soup& soup) {
 
 template <class Source>
 void read_ply_faces(Source& source, const PlyElement& element, std::size_t vertices, Soup& soup) {
+  if (std::any_of(element.properties.begin(), element.properties.end(), is_label))
+    soup.labels.resize(soup.faces.rows(), 0);  // of strips before
   for (std::size_t i = 0; i < element.count; ++i) {
     source.begin_item(element, i);
     for (const PlyProperty& property : element.properties) {
       if (is_index_list(property)) read_ply_face(source, property, vertices, soup);
       else if (is_label(property)) read_ply_label(source, property, soup);
+      else skip_ply_property(source, property);
+    }
+  }
+}
+
+// Triangles of a strip: every second one runs the other way round; -1 begins a new strip. A triangle with a corner
+// twice only leads from one part of a strip to another.
+template <class Source>
+void read_ply_strip(Source& source, const PlyProperty& property, std::size_t vertices, Soup& soup) {
+  const std::size_t length = read_ply_count(source, property);
+  Triangle last{};
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < length; ++i) {
+    const double v = source.value(property.type);
+    if (v == -1) {
+      known = 0;
+      continue;
+    }
+    if (!(v >= 0 && v < static_cast<double>(vertices) && v == std::floor(v)))
+      source.fail(fmt::format("index {} is out of range, the file has {} vertices; mend the strip", v, vertices));
+    last = {last[1], last[2], static_cast<Index>(v)};
+    if (++known < 3 || last[0] == last[1] || last[1] == last[2] || last[2] == last[0]) continue;
+    Triangle t = last;
+    if (known % 2 == 0) std::swap(t[1], t[2]);
+    soup.faces.values.insert(soup.faces.values.end(), t.begin(), t.end());
+    soup.end_face();
+  }
+}
+
+template <class Source>
+void read_ply_strips(Source& source, const PlyElement& element, std::size_t vertices, Soup& soup) {
+  for (std::size_t i = 0; i < element.count; ++i) {
+    source.begin_item(element, i);
+    for (const PlyProperty& property : element.properties) {
+      if (is_index_list(property)) read_ply_strip(source, property, vertices, soup);
       else skip_ply_property(source, property);
     }
   }
@@ -323,12 +361,15 @@ void read_ply_body(Source& source, const PlyHeader& header, Soup& soup) {
       read_ply_vertices(source, element, soup);
     } else if (element.name == "face") {
       read_ply_faces(source, element, vertices, soup);
+    } else if (element.name == "tristrips") {
+      read_ply_strips(source, element, vertices, soup);
     } else if (element.name == "edge" && has_ends(element)) {
       read_ply_edges(source, element, vertices, soup);
     } else {
       skip_ply_items(source, element);
     }
   }
+  if (!soup.labels.empty()) soup.labels.resize(soup.faces.rows(), 0);  // strips have none
   soup.ignored = source.ignored();
 }
 
@@ -345,11 +386,12 @@ void check_ply_vertices(const TextReader& in, const PlyHeader& header) {
 
 void check_ply_elements(const TextReader& in, const PlyHeader& header) {
   check_ply_vertices(in, header);
-  const PlyElement* face = header.find("face");
-  if (!face) in.fail("the header has no element 'face'; export as triangles");
-  if (std::count_if(face->properties.begin(), face->properties.end(), is_index_list) != 1)
-    in.fail("element 'face' needs one list 'vertex_indices'; export as triangles");
-  if (std::count_if(face->properties.begin(), face->properties.end(), is_label) > 1)
+  const PlyElement *face = header.find("face"), *strips = header.find("tristrips");
+  if (!face && !strips) in.fail("the header has no element 'face'; export as triangles");
+  for (const PlyElement* element : {face, strips})
+    if (element && std::count_if(element->properties.begin(), element->properties.end(), is_index_list) != 1)
+      in.fail(fmt::format("element '{}' needs one list 'vertex_indices'; export as triangles", element->name));
+  if (face && std::count_if(face->properties.begin(), face->properties.end(), is_label) > 1)
     in.fail(std::string("element 'face' has several properties 'label'; ") + kExportAgain);
 }
 
@@ -473,7 +515,7 @@ std::vector<double> read_ply_attribute(const std::string& path, std::string_view
   return read_ply_scalars(source, header, wanted, path);
 }
 
-std::string format_ply(const TriangleMesh& mesh) {
+std::string format_ply(const std::string&, const TriangleMesh& mesh, const WriteOptions&) {
   std::string out = ply_header(mesh.vertices.size(), mesh.triangles.size(), 3);
   if (!mesh.labels.empty()) out += "property int label\n";
   out += ply_edge_header(mesh.feature_edges, mesh.vertices.size()) + "end_header\n";
@@ -488,7 +530,7 @@ std::string format_ply(const TriangleMesh& mesh) {
   return out;
 }
 
-std::string format_ply(const PolygonMesh& mesh) {
+std::string format_ply(const PolygonMesh& mesh, const WriteOptions&) {
   const std::size_t faces = mesh.polygons.rows();
   std::size_t largest_degree = 0;
   for (std::size_t i = 0; i < faces; ++i) largest_degree = std::max(largest_degree, mesh.polygons.size(i));

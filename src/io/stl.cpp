@@ -1,17 +1,21 @@
+// STL, binary and ASCII (3D Systems, Stereolithography interface specification, 1989).
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "io/bytes.h"
+#include "io/labels.h"
 #include "io/mesh_formats.h"
 #include "io/text.h"
 
@@ -99,13 +103,18 @@ Soup read_stl_text(const std::string& path, std::string_view bytes) {
   TextReader in(path, bytes, 0);
   Soup soup;
   PointMerger merger(soup.vertices);
+  GroupLabels solids;
   bool in_solid = false, in_facet = false;
   std::size_t stray = 0;
   while (in.next_line()) {
     const std::string_view word = in.word();
     if (!in_solid) {
-      if (is_keyword(word, "solid")) in_solid = true;
-      else ++stray;
+      if (is_keyword(word, "solid")) {
+        in_solid = true;
+        solids.set_part(std::string(in.rest_of_line()));
+      } else {
+        ++stray;
+      }
     } else if (is_keyword(word, "facet")) {
       if (in_facet) in.fail(std::string("a facet begins inside another; ") + kExportAgain);
       in_facet = true;
@@ -117,6 +126,7 @@ Soup read_stl_text(const std::string& path, std::string_view bytes) {
       if (soup.open_corners() < 3)
         in.fail(fmt::format("a facet has {}; remove it", quantity(soup.open_corners(), "corner", "corners")));
       soup.end_face();
+      solids.add_face();
       in_facet = false;
     } else if (is_keyword(word, "endsolid")) {
       if (in_facet) in.fail(std::string("the solid ends inside a facet; ") + kExportAgain);
@@ -128,6 +138,7 @@ Soup read_stl_text(const std::string& path, std::string_view bytes) {
   const std::size_t faces = soup.faces.rows();
   if (in_solid) in.fail_truncated(quantity(faces, "face", "faces") + " without endsolid");
   if (stray > 0) soup.ignored = quantity(stray, "line", "lines");
+  solids.take(soup);
   return soup;
 }
 
@@ -149,7 +160,30 @@ Soup read_stl(const std::string& path, std::string_view bytes) {
   return is_stl_text(path, bytes) ? read_stl_text(path, bytes) : read_stl_binary(path, bytes);
 }
 
-std::string format_stl(const std::string& path, const TriangleMesh& mesh) {
+namespace {
+
+// The corners of a triangle as the file has them, and the normal of these.
+struct StlFacet {
+  std::array<Vec3, 3> corners;
+  Vec3 normal;
+};
+
+StlFacet facet_of(const std::string& path, const TriangleMesh& mesh, const Triangle& t) {
+  StlFacet facet;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const double x = mesh.vertices[t[i]][k];
+      if (std::abs(x) > std::numeric_limits<float>::max())
+        fail(path, fmt::format("vertex {}: a coordinate is beyond STL's range; write OFF, OBJ or PLY", t[i]));
+      facet.corners[i][k] = static_cast<float>(x);
+    }
+  const Vec3 normal = twice_area_normal(facet.corners[0], facet.corners[1], facet.corners[2]);
+  const double length = norm(normal);
+  if (std::isnormal(length)) facet.normal = (1 / length) * normal;
+  return facet;
+}
+
+std::string format_stl_binary(const std::string& path, const TriangleMesh& mesh) {
   std::string out = "binary STL by bisector";
   out.resize(80, ' ');
   out.reserve(kStlHeader + kStlFacet * mesh.triangles.size());
@@ -158,21 +192,52 @@ std::string format_stl(const std::string& path, const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) append_bytes(out, static_cast<float>(p[k]));
   };
   for (const Triangle& t : mesh.triangles) {
-    std::array<Vec3, 3> rounded;  // so that the normal is that of the corners in the file
-    for (std::size_t i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const double x = mesh.vertices[t[i]][k];
-        if (std::abs(x) > std::numeric_limits<float>::max())
-          fail(path, fmt::format("vertex {}: a coordinate is beyond STL's range; write OFF, OBJ or PLY", t[i]));
-        rounded[i][k] = static_cast<float>(x);
-      }
-    const Vec3 normal = twice_area_normal(rounded[0], rounded[1], rounded[2]);
-    const double length = norm(normal);
-    append_floats(std::isnormal(length) ? (1 / length) * normal : Vec3{});
-    for (const Vec3& p : rounded) append_floats(p);
+    const StlFacet facet = facet_of(path, mesh, t);
+    append_floats(facet.normal);
+    for (const Vec3& p : facet.corners) append_floats(p);
     append_bytes(out, std::uint16_t{0});
   }
   return out;
+}
+
+// A solid for each label, ascending. Numbers are those of the binary form.
+std::string format_stl_solids(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options) {
+  const auto append_floats = [](std::string& out, const Vec3& p) {
+    for (int k = 0; k < 3; ++k) {
+      std::array<char, 32> digits;
+      out += ' ';
+      out.append(digits.data(),
+                 std::to_chars(digits.data(), digits.data() + digits.size(), static_cast<float>(p[k])).ptr);
+    }
+    out += '\n';
+  };
+  const std::map<std::int32_t, std::string> names = names_of_labels(mesh.labels, mesh.label_names, options);
+  std::map<std::int32_t, std::string> facets;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const StlFacet facet = facet_of(path, mesh, mesh.triangles[i]);
+    std::string& out = facets[mesh.labels[i]];
+    out += "facet normal";
+    append_floats(out, facet.normal);
+    out += "outer loop\n";
+    for (const Vec3& p : facet.corners) {
+      out += "vertex";
+      append_floats(out, p);
+    }
+    out += "endloop\nendfacet\n";
+  }
+  std::string out;
+  for (const auto& [label, text] : facets) {
+    const std::string& name = names.at(label);
+    out += "solid " + name + '\n' + text + "endsolid " + name + '\n';
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string format_stl(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options) {
+  if (mesh.labels.empty() || mesh.label_names.empty()) return format_stl_binary(path, mesh);
+  return format_stl_solids(path, mesh, options);
 }
 
 }  // namespace bisector::io

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/geometry.h"
@@ -24,13 +25,17 @@ struct TetSoup {
   std::vector<Triangle> triangles;
   std::vector<std::array<Index, 2>> edges;
   std::vector<std::int32_t> regions, labels;
+  LabelNames region_names = {}, label_names = {};
 };
 
 // What read_tet_mesh() makes of a file's contents, with its warnings; the path is for these.
 TetMesh mesh_of(const std::string& path, TetSoup soup, const Context& context);
+// A file's triangles as a surface. Throws Error, naming the file, if it has tetrahedra.
+Soup surface_of(const std::string& path, TetSoup soup);
 
 // Readers of a whole file, already in memory; the path is for messages. Indices and coordinates are checked.
 TetSoup read_medit(const std::string& path, std::string_view bytes);
+TetSoup read_medit_binary(const std::string& path, std::string_view bytes);
 TetSoup read_gmsh(const std::string& path, std::string_view bytes);
 TetSoup read_vtk(const std::string& path, std::string_view bytes);
 TetSoup read_vtu(const std::string& path, std::string_view bytes);
@@ -39,9 +44,11 @@ TetSoup read_vtu(const std::string& path, std::string_view bytes);
 std::vector<double> read_vtk_attribute(const std::string& path, std::string_view bytes, const std::string& name);
 std::vector<double> read_vtu_attribute(const std::string& path, std::string_view bytes, const std::string& name);
 std::vector<double> read_medit_solution(const std::string& path, std::string_view bytes);
+std::vector<double> read_medit_solution_binary(const std::string& path, std::string_view bytes);
 
 // The bytes of a file; the mesh must be sound.
 std::string format_medit(const TetMesh& mesh);
+std::string format_medit_binary(const TetMesh& mesh);
 std::string format_gmsh(const TetMesh& mesh);
 std::string format_vtu(const TetMesh& mesh);
 

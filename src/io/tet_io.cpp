@@ -1,11 +1,14 @@
 #include "bisector/io.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
+#include "core/grouping.h"
 #include "core/orientation.h"
 #include "core/parallel.h"
 #include "io/files.h"
+#include "io/formats.h"
 #include "io/tet_formats.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/topology.h"
@@ -17,12 +20,6 @@ using namespace io;
 namespace {
 
 using Edge = std::array<Index, 2>;
-
-[[noreturn]] void fail_extension(const std::string& path, const char* known) {
-  const std::string extension = lower_extension(path);
-  if (extension.empty()) fail(path, fmt::format("no file name extension; use {}", known));
-  fail(path, fmt::format("unknown format '{}' of tetrahedral meshes; use {}", printable(extension), known));
-}
 
 template <std::size_t N>
 void check_corners(const std::string& path, const char* kind, const std::vector<std::array<Index, N>>& elements) {
@@ -108,7 +105,22 @@ void check_sound(const std::string& path, const TetMesh& mesh) {
 
 bool is_tet_format(const std::string& path) {
   const std::string extension = lower_extension(path);
-  return extension == ".mesh" || extension == ".msh" || extension == ".vtk" || extension == ".vtu";
+  return std::any_of(file_formats().begin(), file_formats().end(),
+                     [&](const FileFormat& format) { return format.reads_tets && format.extension == extension; });
+}
+
+Soup io::surface_of(const std::string& path, TetSoup soup) {
+  if (!soup.tets.empty())
+    fail(path, fmt::format("it holds {}, where a surface is needed; give their boundary",
+                           quantity(soup.tets.size(), "tetrahedron", "tetrahedra")));
+  Soup surface;
+  surface.vertices = std::move(soup.vertices);
+  surface.faces = rows_of(soup.triangles);
+  drop_zero_marks(soup.labels);
+  surface.labels = std::move(soup.labels);
+  surface.edges = std::move(soup.edges);
+  surface.label_names = std::move(soup.label_names);
+  return surface;
 }
 
 TetMesh io::mesh_of(const std::string& path, TetSoup soup, const Context& context) {
@@ -116,8 +128,14 @@ TetMesh io::mesh_of(const std::string& path, TetSoup soup, const Context& contex
     fail(path, "there are neither tetrahedra nor triangles; export a mesh of them");
   check_corners(path, "tetrahedron", soup.tets);
   check_corners(path, "triangle", soup.triangles);
-  TetMesh mesh{std::move(soup.vertices),  std::move(soup.tets),   std::move(soup.regions),
-               std::move(soup.triangles), std::move(soup.labels), {}};
+  TetMesh mesh;
+  mesh.vertices = std::move(soup.vertices);
+  mesh.tets = std::move(soup.tets);
+  mesh.regions = std::move(soup.regions);
+  mesh.boundary = std::move(soup.triangles);
+  mesh.boundary_labels = std::move(soup.labels);
+  mesh.region_names = std::move(soup.region_names);
+  mesh.label_names = std::move(soup.label_names);
   turn_positive(path, mesh, context);
   turn_outward(mesh);
   drop_zero_marks(mesh.regions);
@@ -133,38 +151,32 @@ TetMesh io::mesh_of(const std::string& path, TetSoup soup, const Context& contex
 }
 
 TetMesh read_tet_mesh(const std::string& path, const Context& context) {
-  const std::string extension = lower_extension(path);
-  TetSoup (*read)(const std::string&, std::string_view) = extension == ".mesh"  ? read_medit
-                                                          : extension == ".msh" ? read_gmsh
-                                                          : extension == ".vtk" ? read_vtk
-                                                          : extension == ".vtu" ? read_vtu
-                                                                                : nullptr;
-  if (!read) fail_extension(path, ".mesh, .msh, .vtk or .vtu");
-  return mesh_of(path, read(path, read_bytes(path)), context);
+  const Format& format = format_of(path, &FileFormat::reads_tets, "tetrahedral meshes");
+  return mesh_of(path, format.read_tets(path, read_bytes(path)), context);
 }
 
 void write_tet_mesh(const std::string& path, const TetMesh& mesh) {
-  const std::string extension = lower_extension(path);
-  std::string (*format)(const TetMesh&) = extension == ".mesh"  ? format_medit
-                                          : extension == ".msh" ? format_gmsh
-                                          : extension == ".vtu" ? format_vtu
-                                                                : nullptr;
-  if (!format) fail_extension(path, ".mesh, .msh or .vtu");
+  const Format& format = format_of(path, &FileFormat::writes_tets, "tetrahedral meshes");
   check_sound(path, mesh);
-  write_file(path, format(mesh));
+  write_file(path, format.bytes_of_tets(mesh));
 }
 
 std::vector<double> read_tet_attribute(const std::string& path, const std::string& name) {
   const std::string extension = lower_extension(path);
   if (extension == ".vtk") return read_vtk_attribute(path, read_bytes(path), name);
   if (extension == ".vtu") return read_vtu_attribute(path, read_bytes(path), name);
-  if (extension != ".mesh")
+  const bool binary = extension == ".meshb";
+  if (!binary && extension != ".mesh")
     fail(path, fmt::format("there are no values '{}' at vertices, {} files are not read for them; use .vtk, .vtu, or "
-                           ".mesh with a .sol",
+                           ".mesh or .meshb with a .sol",
                            printable(name), extension.empty() ? "such" : printable(extension)));
-  const std::string solution = path.substr(0, path.size() - extension.size()) + ".sol";
-  std::vector<double> values = read_medit_solution(solution, read_bytes(solution));
-  const std::size_t vertices = read_medit(path, read_bytes(path)).vertices.size();
+  const std::string stem = path.substr(0, path.size() - extension.size());
+  const bool binary_solution = binary && std::filesystem::exists(stem + ".solb");
+  const std::string solution = stem + (binary_solution ? ".solb" : ".sol"), bytes = read_bytes(solution);
+  const std::vector<double> values =
+      binary_solution ? read_medit_solution_binary(solution, bytes) : read_medit_solution(solution, bytes);
+  const std::string mesh = read_bytes(path);
+  const std::size_t vertices = (binary ? read_medit_binary : read_medit)(path, mesh).vertices.size();
   if (values.size() != vertices)
     fail(solution,
          fmt::format("{} values for the {} vertices of {}; give one each", values.size(), vertices, name_of(path)));
@@ -172,7 +184,7 @@ std::vector<double> read_tet_attribute(const std::string& path, const std::strin
 }
 
 TriangleMesh surface_of_marks(const TetMesh& mesh) {
-  TriangleMesh surface{mesh.vertices, mesh.boundary, {}, mesh.boundary_labels, {}};
+  TriangleMesh surface{mesh.vertices, mesh.boundary, {}, mesh.boundary_labels, {}, mesh.label_names};
   const EdgeTable table = edge_table(surface.triangles, surface.vertices.size());
   for (const Edge& e : mesh.feature_edges)
     if (std::binary_search(table.edges.begin(), table.edges.end(), e)) surface.feature_edges.push_back(e);

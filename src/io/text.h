@@ -87,6 +87,14 @@ class TextReader {
     return {begin, static_cast<std::size_t>(at_ - begin)};
   }
 
+  // What is left of the line without blanks around it, up to a comment.
+  std::string_view rest_of_line() {
+    if (!at_word()) return {};
+    const char *begin = at_, *last = at_;
+    for (std::string_view text = word(); !text.empty(); text = word()) last = text.data() + text.size();
+    return {begin, static_cast<std::size_t>(last - begin)};
+  }
+
   double number() {
     const std::string_view text = word();
     if (text.empty()) fail(std::string("a number is missing at the end of the line; ") + kExportAgain);

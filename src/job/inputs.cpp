@@ -102,6 +102,7 @@ Json wrap_if_asked(const WrapOption& option, const TriangleMesh& mesh, std::size
   const double thickness = !tetrahedra ? 0 : edge_length > 0 ? edge : std::sqrt(2.0) * edge;
   WrapResult result = wrap(mesh, alpha, thickness, journal.context());
   wrapped = std::move(result.mesh);
+  wrapped.unit = mesh.unit;
   if (thickness > 0 && 2 * result.offset >= thickness)
     journal.warn(fmt::format(
         "--wrap: sheets with both sides outside became shells about an edge thick, {:.4g}, for tetrahedra to "

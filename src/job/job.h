@@ -43,7 +43,7 @@ struct Given {
 // What a command reads: a positional argument of the command line.
 struct InputKind {
   const char* name;
-  const char* help;
+  std::string help;
   std::vector<std::string> extensions = {};  // the formats that can be read; empty: any name
 };
 
@@ -52,7 +52,7 @@ struct OutputKind {
   const char* name;    // "output", "preview", ...
   const char* option;  // of the command line
   const char* type;    // of its value
-  const char* help;
+  std::string help;
   std::vector<std::string> extensions;  // the formats that can be written; empty: any name
   bool required = false;                // on the command line
   bool planned = false;                 // has to be asked for before the run

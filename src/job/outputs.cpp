@@ -70,6 +70,36 @@ std::string extension_of(const std::string& path) {
   return extension;
 }
 
+std::string with_extensions(const std::string& text, const std::vector<std::string>& extensions) {
+  constexpr std::size_t kWidth = 57;  // of the help's column
+  std::string lines = text + ":";
+  std::size_t line = lines.rfind('\n') + 1;  // where the last one starts
+  const std::string words = listed(extensions);
+  for (std::size_t at = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    const bool full = lines.size() - line + 1 + (end - at) > kWidth;
+    lines += full ? '\n' : ' ';
+    if (full) line = lines.size();
+    lines += words.substr(at, end - at);
+    at = end + 1;
+  }
+  return lines;
+}
+
+std::string lost_labels(const std::string& path, bool named, const char* labels) {
+  using Labels = FileFormat::Labels;
+  const std::string extension = extension_of(path);
+  std::vector<std::string> holders;
+  Labels held = Labels::none;
+  for (const FileFormat& format : file_formats()) {
+    if (format.extension == extension) held = format.labels;
+    if (format.labels == Labels::all && format.writes_surfaces) holders.emplace_back(format.extension);
+  }
+  if (held == Labels::all || (held == Labels::named && named)) return {};
+  return fmt::format("{}: {} files hold no face labels{}, {} are lost; write {}", path, extension,
+                     held == Labels::named ? " without names" : "", labels, listed(holders));
+}
+
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs) {
   std::vector<fs::path> taken;
   for (std::size_t k = 0; k < outputs.size(); ++k) {

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "bisector/io.h"
+
 namespace bisector::job {
 
 struct Output {
@@ -20,12 +22,25 @@ inline Output report_output(const std::string& path) { return {path == "-" ? "" 
 // an output other than the first would replace an input.
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
-inline const std::vector<std::string> kMeshFormats{".off", ".obj", ".ply", ".stl"};  // read, too
-inline const std::vector<std::string> kPolygonFormats{".obj", ".ply", ".off"};
-inline const std::vector<std::string> kTreeFormats{".obj", ".ply", ".off", ".stl", ".igs", ".iges"};
-inline const std::vector<std::string> kTetFormats{".mesh", ".msh", ".vtu"};
+// Extensions of meshes that are read and written, from the library's table.
+inline const std::vector<std::string> kMeshInputs = extensions_that(&FileFormat::reads_surfaces);
+inline const std::vector<std::string> kTetInputs = extensions_that(&FileFormat::reads_tets);
+inline const std::vector<std::string> kMeshFormats = extensions_that(&FileFormat::writes_surfaces);
+inline const std::vector<std::string> kPolygonFormats = extensions_that(&FileFormat::writes_polygons);
+inline const std::vector<std::string> kTetFormats = extensions_that(&FileFormat::writes_tets);
 inline const std::vector<std::string> kReportFormats{".json", ".html"};
-// What is read where a surface or tetrahedra will do.
-inline const std::vector<std::string> kDomainFormats{".off", ".obj", ".ply", ".stl", ".mesh", ".msh", ".vtk", ".vtu"};
+inline const std::vector<std::string> kIgesFormats{".igs", ".iges"};
+inline const std::vector<std::string> kTreeFormats = [] {
+  std::vector<std::string> formats = kMeshFormats;
+  formats.insert(formats.end(), kIgesFormats.begin(), kIgesFormats.end());
+  return formats;
+}();
+
+// "TEXT: .off, .obj or .ply" in lines for the help of an option.
+std::string with_extensions(const std::string& text, const std::vector<std::string>& extensions);
+
+// What to warn of if a file of this name loses labels of faces, "the regions" or the like; empty if it holds them.
+// `named`: they have names.
+std::string lost_labels(const std::string& path, bool named, const char* labels);
 
 }  // namespace bisector::job

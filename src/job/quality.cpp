@@ -12,7 +12,7 @@ Json measured_size_json(const Domain& domain) {
 }
 
 void QualityJob::add_options(CLI::App* app) {
-  add_file(app, "--reference", reference_file, "IN", "also measure the two-sided distance to this mesh", kDomainFormats)
+  add_file(app, "--reference", reference_file, "IN", "also measure the two-sided distance to this mesh", kMeshInputs)
       ->group("Output");
   add_threads(app, threads);
 }

@@ -23,10 +23,7 @@ class QualityJob final : public Job {
 
   const char* command() const override { return "quality"; }
   InputKind input_kind() const override {
-    return {"MESH",
-            "surface to measure: .off, .obj, .ply or .stl; or\n"
-            "tetrahedra: .mesh, .msh, .vtk or .vtu",
-            kDomainFormats};
+    return {"MESH", with_extensions("surface or tetrahedral mesh to measure", kMeshInputs), kMeshInputs};
   }
   std::vector<OutputKind> outputs() const override { return {}; }
   void add_options(CLI::App* app) override;

@@ -82,13 +82,13 @@ Json remesh_seconds(const RemeshSeconds& seconds) {
 }  // namespace
 
 std::vector<OutputKind> RemeshJob::outputs() const {
-  return {{"output", "-o", "FILE", "mesh to write", kMeshFormats, true},
+  return {{"output", "-o", "FILE", with_extensions("mesh to write", kMeshFormats), kMeshFormats, true},
           {"preview", "--preview", "FILE.png", "draw a picture of the result", {".png"}, false, false, "preview"},
           {"feature-output",
            "--feature-output",
            "FILE",
            "write the result's feature edges, as lines of two vertex\n"
-           "numbers; .ply and .obj outputs hold them too",
+           "numbers; an .obj output then holds them too, as lines l",
            {}}};
 }
 
@@ -226,6 +226,10 @@ void RemeshJob::complete_options() {
   }
 }
 
+void RemeshJob::plan(std::string_view output, const std::string&) {
+  if (output == "feature-output") wants_feature_edges_ = true;
+}
+
 void RemeshJob::read(Journal& journal) {
   const Stopwatch reading;
   surface = read_surface(input, given.mesh, journal);
@@ -235,10 +239,9 @@ void RemeshJob::read(Journal& journal) {
 }
 
 void RemeshJob::check_format(std::string_view output, const std::string& path, Journal& journal) const {
-  const std::string extension = extension_of(path);
-  if (output != "output" || remeshed_surface().labels.empty() || extension == ".ply" || extension == ".obj") return;
-  journal.warn(
-      fmt::format("{}: {} files hold no face labels, the input's are lost; write .ply or .obj", path, extension));
+  if (output != "output" || remeshed_surface().labels.empty()) return;
+  const std::string lost = lost_labels(path, !remeshed_surface().label_names.empty(), "the input's");
+  if (!lost.empty()) journal.warn(lost);
 }
 
 void RemeshJob::compute(Journal& journal) {
@@ -310,7 +313,9 @@ view::Scene RemeshJob::scene(const std::string& output) {
 }
 
 void RemeshJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
-  if (output == "output") write_mesh(path, result.mesh);
+  WriteOptions options;
+  options.lines = wants_feature_edges_;
+  if (output == "output") write_mesh(path, result.mesh, options);
   else if (output == "preview") write_preview(path, result.mesh);
   else write_feature_edges(path, result.mesh.feature_edges);
 }

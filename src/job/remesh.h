@@ -15,13 +15,16 @@ namespace bisector::job {
 class RemeshJob final : public Job {
  public:
   const char* command() const override { return "remesh"; }
-  InputKind input_kind() const override { return {"IN", "surface to remesh", kMeshFormats}; }
+  InputKind input_kind() const override {
+    return {"IN", with_extensions("surface to remesh", kMeshInputs), kMeshInputs};
+  }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;
   std::vector<std::string> input_files() const override {
     return {input, seeds_, feature_file_, keep_vertices_, keep_faces_};
   }
+  void plan(std::string_view output, const std::string& name) override;
   void read(Journal& journal) override;
   void check_format(std::string_view output, const std::string& path, Journal& journal) const override;
   void compute(Journal& journal) override;
@@ -41,9 +44,10 @@ class RemeshJob final : public Job {
 
   std::string seeds_, feature_file_;
   std::string keep_vertices_, keep_faces_;
-  std::string attribute_;            // of the input's vertices, a density
-  double edge_length_relative_ = 0;  // of the input's diagonal; 0: not given
-  double weld_ = -1;                 // not given
+  std::string attribute_;             // of the input's vertices, a density
+  double edge_length_relative_ = 0;   // of the input's diagonal; 0: not given
+  double weld_ = -1;                  // not given
+  bool wants_feature_edges_ = false;  // --feature-output is given
   WrapOption wrap_;
   RemeshOptions options_;
   TriangleMesh wrap_mesh_;

@@ -30,6 +30,7 @@ TriangleMesh labelled_mesh(const TriangleMesh& input, const SegmentResult& resul
   TriangleMesh mesh{result.projected.empty() ? input.vertices : result.projected, input.triangles};
   mesh.labels.assign(result.labels.begin(), result.labels.end());
   mesh.feature_edges = input.feature_edges;
+  mesh.unit = input.unit;
   return mesh;
 }
 
@@ -59,10 +60,10 @@ std::vector<Colour> face_colours(const std::vector<Label>& labels, const std::ve
   return colours;
 }
 
-// PLY has the regions' colours too, which only meshes of polygons hold.
+// In PLY meshes of polygons alone hold the regions' colours.
 void write_regions(const std::string& path, const TriangleMesh& mesh, const SegmentResult& result,
                    const std::vector<Colour>& of_regions) {
-  const GroupNames names{"region", region_names(result)};
+  const WriteOptions names{"region", region_names(result), of_regions};
   if (extension_of(path) != ".ply") return write_mesh(path, mesh, names);
   write_polygons(path,
                  {mesh.vertices,
@@ -126,7 +127,8 @@ Json polygons_json(const PolygonisedMesh& polygons) {
 }
 
 std::vector<OutputKind> SegmentJob::outputs() const {
-  return {{"output", "-o", "FILE", "mesh to write, with the region of each triangle", kMeshFormats, true},
+  return {{"output", "-o", "FILE", with_extensions("mesh to write, with the region of each triangle", kMeshFormats),
+           kMeshFormats, true},
           {"preview", "--preview", "FILE.png", "draw a picture of the regions", {".png"}, false, false, "preview"},
           {"json",
            "--json",
@@ -135,9 +137,8 @@ std::vector<OutputKind> SegmentJob::outputs() const {
            "them and the regions beside these",
            {".json"}},
           {"polygons", "--polygons", "FILE",
-           "write a coarse mesh with a polygon for each plane:\n"
-           ".obj, .ply or .off",
-           kPolygonFormats, false, true}};
+           with_extensions("write a coarse mesh with a polygon for each plane", kPolygonFormats), kPolygonFormats,
+           false, true}};
 }
 
 void SegmentJob::add_options(CLI::App* app) {
@@ -218,10 +219,9 @@ void SegmentJob::read(Journal& journal) {
 }
 
 void SegmentJob::check_format(std::string_view output, const std::string& path, Journal& journal) const {
-  const std::string extension = extension_of(path);
-  if (output != "output" || extension == ".ply" || extension == ".obj") return;
-  journal.warn(
-      fmt::format("{}: {} files hold no face labels, the regions are lost; write .ply or .obj", path, extension));
+  if (output != "output") return;
+  const std::string lost = lost_labels(path, false, "the regions");
+  if (!lost.empty()) journal.warn(lost);
 }
 
 void SegmentJob::compute(Journal& journal) {

@@ -106,8 +106,8 @@ Json size_json(const Domain& domain) {
 }
 
 std::vector<OutputKind> TetJob::outputs() const {
-  return {{"output", "-o", "FILE", "mesh to write: .mesh, .msh or .vtu", kTetFormats, true},
-          {"boundary", "--boundary", "FILE", "also write the boundary's triangles: .off, .obj, .ply\nor .stl",
+  return {{"output", "-o", "FILE", with_extensions("mesh to write", kTetFormats), kTetFormats, true},
+          {"boundary", "--boundary", "FILE", with_extensions("also write the boundary's triangles", kMeshFormats),
            kMeshFormats},
           {"preview",
            "--preview",
@@ -138,8 +138,9 @@ void TetJob::add_options(CLI::App* app) {
               "long as its power -1/5)");
   add_file(app, "--sizes", sizes_, "FILE[:NAME]",
            "edge lengths at the vertices of a mesh (.vtk, .vtu with\n"
-           "point data NAME; .mesh with a .sol beside it), instead\n"
-           "of a density; -n makes them a matter of proportion")
+           "point data NAME; .mesh, .meshb with a .sol beside it),\n"
+           "instead of a density; -n makes them a matter of\n"
+           "proportion")
       ->group("Size");
   app->add_option("--gradation", options_.sizing.field.gradation,
                   "edge lengths grow by at most so much per length into\n"

@@ -129,7 +129,9 @@ TreeJob::Ground TreeJob::parse_ground(const std::string& text) {
 
 std::vector<OutputKind> TreeJob::outputs() const {
   return {
-      {"output", "-o", "FILE", "surfaces to write: .obj, .ply, .off, .stl, or as B-splines\n.igs", kTreeFormats, true},
+      {"output", "-o", "FILE",
+       with_extensions("surfaces to write", kMeshFormats) + ";\n" + with_extensions("B-splines", kIgesFormats),
+       kTreeFormats, true},
       {"skeleton", "--skeleton", "FILE.ply", "also write the branches' axes with radii", {".ply"}},
       {"cylinders",
        "--cylinders",
@@ -224,6 +226,7 @@ void TreeJob::compute(Journal& journal) {
   result = reconstruct_tree(cloud.points, options_, journal.context());
   const Stopwatch meshing;
   mesh = tree_mesh(result, journal.context());
+  mesh.unit = cloud.unit;
   seconds = tree_seconds(result.seconds);
   seconds["mesh"] = meshing.seconds();
   journal.phase("measuring the distance of the points");

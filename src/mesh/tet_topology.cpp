@@ -93,6 +93,7 @@ TriangleMesh boundary_surface(const TetMesh& mesh, std::vector<Index>* vertices)
     }
     if (std::all_of(surface.labels.begin(), surface.labels.end(), [](std::int32_t label) { return label == 0; }))
       surface.labels.clear();
+    else surface.label_names = mesh.label_names;
   }
 
   std::vector<Index> index(mesh.vertices.size(), kNone), origin;

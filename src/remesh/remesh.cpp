@@ -689,9 +689,11 @@ RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, con
   check_options(options);
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
-  if (options.keep_triangles.empty()) return remesh_surface(input, options, context);
   const Stopwatch watch;
-  RemeshResult result = remesh_around_kept(input, options, context, remesh_surface);
+  RemeshResult result = options.keep_triangles.empty() ? remesh_surface(input, options, context)
+                                                       : remesh_around_kept(input, options, context, remesh_surface);
+  if (!result.mesh.labels.empty()) result.mesh.label_names = input.label_names;
+  result.mesh.unit = input.unit;
   result.seconds.total = watch.seconds();
   return result;
 }

@@ -309,6 +309,7 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
   TetMesh background = tetgen_tets(surface, {}, context).mesh;
   const double seconds = watch.seconds();
   TetResult result = mesh_solid(std::move(background), moved, context);
+  result.mesh.label_names = input.label_names;
   result.seconds.background = seconds;
   result.seconds.total = watch.seconds();
   return result;
@@ -320,7 +321,10 @@ TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const 
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   check_boundary(solid);
-  return mesh_solid(solid, options, context);
+  TetResult result = mesh_solid(solid, options, context);
+  result.mesh.region_names = solid.region_names;
+  result.mesh.label_names = solid.label_names;
+  return result;
 }
 
 }  // namespace bisector

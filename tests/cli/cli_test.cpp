@@ -192,6 +192,26 @@ TEST_F(Cli, HelpListsAllWords) {
   expect_words("tree", "--unit", job::kUnitWords.list());
 }
 
+TEST_F(Cli, HelpListsAllFormats) {
+  const auto expect_formats = [&](const char* command, const char* option, const std::vector<std::string>& extensions) {
+    const std::string help = run({command, "--help"}).out;
+    const std::size_t begin = help.find(option);
+    ASSERT_NE(begin, std::string::npos) << command << ' ' << option;
+    std::istringstream about(help.substr(begin, help.find("\n  -", begin) - begin));
+    std::string words;
+    for (std::string word; about >> word;) words += word + ' ';
+    EXPECT_NE(words.find(": " + listed(extensions)), std::string::npos) << command << ' ' << words;
+  };
+  const std::vector<std::string> read = extensions_that(&FileFormat::reads_surfaces),
+                                 written = extensions_that(&FileFormat::writes_surfaces);
+  for (const char* command : {"remesh", "segment", "rvd", "tet"}) expect_formats(command, "  IN FILE", read);
+  expect_formats("quality", "  MESH FILE", read);
+  for (const char* command : {"remesh", "segment", "tree"}) expect_formats(command, "  -o FILE", written);
+  expect_formats("tet", "  -o FILE", extensions_that(&FileFormat::writes_tets));
+  expect_formats("tet", "  --boundary FILE", written);
+  expect_formats("segment", "  --polygons FILE", extensions_that(&FileFormat::writes_polygons));
+}
+
 TEST_F(Cli, BadUsage) {
   const std::string sphere = in("sphere.off"), out = in("out.obj");
   write_text("points.xyz", "0 0 1\n0 1 0\n1 0 0\n-1 -1 -1\n");
@@ -790,7 +810,7 @@ TEST_F(CliRemesh, LabelsStay) {
   for (const char* name : {"plane.ply", "plane.obj"}) {
     write_mesh(in(name), plane);
     for (const char* out : {"out.ply", "out.obj"}) {
-      EXPECT_EQ(remesh(name, {"-n", "120"}, out)["features"]["broken"], 0);
+      EXPECT_EQ(remesh(name, {"-n", "120", "--feature-output", in("edges.txt")}, out)["features"]["broken"], 0);
       const TriangleMesh mesh = output(out);
       ASSERT_EQ(mesh.labels.size(), mesh.triangles.size()) << out;
       const auto found = area_of_labels(mesh);
@@ -811,6 +831,9 @@ TEST_F(CliRemesh, LabelsStay) {
   EXPECT_EQ(ply.triangles, obj.triangles);
   EXPECT_EQ(ply.labels, obj.labels);
   EXPECT_EQ(ply.feature_edges, obj.feature_edges);
+  // Lines, which some readers refuse, are in an OBJ file only if edges are asked for.
+  EXPECT_GT(remesh("plane.ply", {"-n", "120"}, "out.obj")["features"]["edges"].get<int>(), 0);
+  EXPECT_EQ(read_text(in("out.obj")).find("\nl "), std::string::npos);
 
   // Formats without labels say so, and borders between labels are no features where none are wanted.
   const std::vector<std::string> words{"remesh", in("plane.ply"), "-o",           in("out.off"),
@@ -820,6 +843,37 @@ TEST_F(CliRemesh, LabelsStay) {
   EXPECT_TRUE(lost.err.starts_with("bisector: warning: ")) << lost.err;
   EXPECT_NE(lost.err.find("labels"), std::string::npos) << lost.err;
   EXPECT_EQ(remesh("plane.ply", {"-n", "120", "--iterations", "5", "--features", "none"})["features"]["curves"], 4);
+}
+
+TEST_F(CliRemesh, NamesAndUnitsComeThrough) {
+  TriangleMesh box = test::box(4);
+  for (const Triangle& t : box.triangles)
+    box.labels.push_back(box.vertices[t[0]].z + box.vertices[t[1]].z + box.vertices[t[2]].z > 1.5 ? 4 : 9);
+  box.label_names = {{4, "lid"}, {9, "rim & base"}};
+  box.unit = 0.0254;
+  const auto names_of = [](const TriangleMesh& mesh) {
+    std::set<std::string> names;
+    for (const std::int32_t label : mesh.labels) names.insert(mesh.label_names.at(label));
+    return names;
+  };
+  for (const std::string from : {".3mf", ".msh", ".stl", ".obj"}) {
+    write_mesh(in("box" + from), box);
+    for (const std::string to : {".3mf", ".msh", ".stl", ".obj"}) {
+      const Result result = run({"remesh", in("box" + from), "-o", in("out" + to), "-n", "200", "--iterations", "3"});
+      ASSERT_EQ(result.code, 0) << result.err;
+      EXPECT_EQ(result.err, "") << from << to;
+      const TriangleMesh mesh = read_mesh(in("out" + to));
+      EXPECT_EQ(names_of(mesh), (std::set<std::string>{"lid", "rim & base"})) << from << to;
+      const double unit = to != ".3mf" ? 0 : from == ".3mf" ? 0.0254 : 1e-3;
+      EXPECT_EQ(mesh.unit, unit) << from << to;
+    }
+  }
+  // A surface in a format of tetrahedra is one for every command.
+  for (const char* name : {"box.mesh", "box.meshb", "box.vtu", "box.vtp"}) {
+    write_mesh(in(name), box);
+    EXPECT_EQ(run({"segment", in(name), "-o", in("regions.glb"), "--proxies", "6"}).err, "");
+    EXPECT_EQ(report_of({"quality", in(name), "--report", "-", "--quiet"})["topology"]["closed"], true);
+  }
 }
 
 TEST_F(CliRemesh, CutsAreWelded) {
@@ -1440,7 +1494,7 @@ TEST_F(CliSegment, EveryFormatHoldsTheSameRegions) {
   const TriangleMesh ply = read_mesh(in("out.ply")), obj = read_mesh(in("out.obj"));
   EXPECT_EQ(obj.labels, ply.labels);
   EXPECT_EQ(obj.triangles, ply.triangles);
-  EXPECT_EQ(obj.feature_edges, box.feature_edges);
+  EXPECT_TRUE(obj.feature_edges.empty());
   EXPECT_EQ(ply.feature_edges, box.feature_edges);
   EXPECT_NE(read_text(in("out.obj")).find("g region_3_plane\n"), std::string::npos);
   EXPECT_NE(read_text(in("out.ply")).find("property uchar red\n"), std::string::npos);
@@ -1454,7 +1508,7 @@ TEST_F(CliSegment, EveryFormatHoldsTheSameRegions) {
 }
 
 TEST_F(CliSegment, WritesPolygonsOfPlanes) {
-  for (const char* name : {"p.ply", "p.obj", "p.off"}) {
+  for (const char* name : {"p.ply", "p.obj", "p.vtp", "p.off"}) {
     const Result result = run(segment({"--proxies", "6", "--surfaces", "planes", "--polygons", in(name)}));
     ASSERT_EQ(result.code, 0) << result.err;
     EXPECT_EQ(result.err, "");

@@ -85,6 +85,8 @@ void expect_same(const TriangleMesh& a, const TriangleMesh& b) {
   EXPECT_EQ(a.face_of_triangle, b.face_of_triangle);
   EXPECT_EQ(a.labels, b.labels);
   EXPECT_EQ(a.feature_edges, b.feature_edges);
+  EXPECT_EQ(a.label_names, b.label_names);
+  EXPECT_EQ(a.unit, b.unit);
 }
 
 TriangleMesh awkward_numbers() {
@@ -249,7 +251,7 @@ TEST_F(Io, ToleratesHowTextIsLaidOut) {
               kSquare);
   expect_same(read("a.obj", "f 1 2 3\nf 1 3 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"), kSquare);
   expect_same(read("a.stl", replaced(replaced(kStl, "facet", "FACET"), "solid", "Solid")), kSquare);
-  expect_same(read("a.stl", replaced(kStl, "endfacet\nfacet", "endfacet\nendsolid\nsolid two\nfacet")), kSquare);
+  expect_same(read("a.stl", replaced(kStl, "endfacet\nfacet", "endfacet\nendsolid\nsolid square\nfacet")), kSquare);
   EXPECT_TRUE(warnings_.empty());
 }
 
@@ -416,12 +418,12 @@ TEST_F(Io, RefusesMalformedFilesInOneLine) {
       {"a.obj", "", ": the file is empty"},
       {"a.ply", " \n\n", ": the file is empty"},
       {"a.stl", "", ": the file is empty"},
-      {"a.xyz", off, ": unknown mesh format '.xyz'"},
+      {"a.xyz", off, ": unknown format '.xyz' of meshes"},
       {"a", off, ": no file name extension"},
       // OFF
       {"a.off", "# only a comment\n", ":2: "},
       {"a.off", "PLY\n1 1 1\n", ":1: does not begin with OFF"},
-      {"a.off", "OFF BINARY\n", ":1: binary OFF"},
+      {"a.off", "OFF BINARY\n", ": byte 0 after the header: 1 numbers are declared"},
       {"a.off", "4OFF\n1 1 0\n", ":1: "},
       {"a.off", "OFF\n", ":2: "},
       {"a.off", "OFF\n4\n", ":2: the number of faces is missing"},
@@ -566,7 +568,9 @@ TEST_F(Io, RefusesWhatIsNotAFile) {
 }
 
 TEST_F(Io, SurvivesTruncationAndDamage) {
-  write_mesh(path("marked.obj"), marked_square());
+  WriteOptions lines;
+  lines.lines = true;
+  write_mesh(path("marked.obj"), marked_square(), lines);
   write_mesh(path("marked.ply"), marked_square());
   const std::vector<std::pair<const char*, std::string>> valid{
       {"a.obj", slurp(path("marked.obj"))},
@@ -625,11 +629,16 @@ TEST_F(Io, LabelsAndFeatureEdgesRoundTrip) {
   TriangleMesh one = kSquare, only_edges = kSquare;
   one.labels = {7, 7};
   only_edges.feature_edges = {{1, 2}};
+  WriteOptions lines;
+  lines.lines = true;
   for (const TriangleMesh& mesh : {marked_square(), several, one, only_edges})
     for (const char* name : {"a.ply", "a.obj"}) {
-      write_mesh(path(name), mesh);
+      write_mesh(path(name), mesh, lines);
       expect_same(read_mesh(path(name)), mesh);
     }
+  write_mesh(path("a.obj"), only_edges);
+  EXPECT_TRUE(read_mesh(path("a.obj")).feature_edges.empty());
+  EXPECT_EQ(slurp(path("a.obj")).find("\nl "), std::string::npos);
   one.labels = {1, 0};
   for (const char* name : {"a.ply", "a.obj"}) {
     write_mesh(path(name), one, {"region", {"plane", "plane_pair"}});

@@ -83,6 +83,8 @@ void expect_same(const TetMesh& a, const TetMesh& b) {
   EXPECT_EQ(a.boundary, b.boundary);
   EXPECT_EQ(a.boundary_labels, b.boundary_labels);
   EXPECT_EQ(a.feature_edges, b.feature_edges);
+  EXPECT_EQ(a.region_names, b.region_names);
+  EXPECT_EQ(a.label_names, b.label_names);
 }
 
 // n^3 cubes of six tetrahedra each, with every mark: regions by layer, labels by side, the cube's edges as features.
@@ -141,12 +143,12 @@ TetMesh awkward_numbers() {
 }
 
 TEST_F(TetIo, RoundTripsAreExact) {
-  for (const char* extension : {".mesh", ".msh", ".vtu", ".MSH"})
+  for (const char* extension : {".mesh", ".meshb", ".msh", ".vtu", ".MSH"})
     for (const TetMesh& mesh : {marked_cube(3), awkward_numbers()}) {
       write_tet_mesh(path("a" + std::string(extension)), mesh);
       expect_same(read_tet_mesh(path("a" + std::string(extension))), mesh);
     }
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}), 4);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}), 5);
 }
 
 TEST_F(TetIo, WhatIsNotMarkedStaysUnmarked) {
@@ -155,7 +157,7 @@ TEST_F(TetIo, WhatIsNotMarkedStaysUnmarked) {
   mesh.boundary_labels.clear();
   TetMesh bare{mesh.vertices, mesh.tets, {}, {}, {}, {}};
   TetMesh shell{mesh.vertices, {}, {}, mesh.boundary, {}, {}};
-  for (const char* extension : {".mesh", ".msh", ".vtu"})
+  for (const char* extension : {".mesh", ".meshb", ".msh", ".vtu"})
     for (const TetMesh& m : {mesh, bare, shell}) {
       write_tet_mesh(path("a" + std::string(extension)), m);
       expect_same(read_tet_mesh(path("a" + std::string(extension))), m);
@@ -284,7 +286,9 @@ TEST_F(TetIo, ReadsEveryFormOfGmsh) {
           EXPECT_TRUE(mesh.vertices[static_cast<std::size_t>(v)] == kCorners[static_cast<std::size_t>(corner)]);
         ASSERT_EQ(mesh.tets.size(), 1u);
         EXPECT_EQ(mesh.tets[0], (Tetrahedron{0, 1, 2, 3}));
-        EXPECT_EQ(mesh.regions, std::vector<std::int32_t>{5});          // its physical group
+        EXPECT_EQ(mesh.regions, std::vector<std::int32_t>{5});  // its physical group
+        const bool named = bytes.find("steel bar") != std::string::npos;
+        EXPECT_EQ(mesh.region_names, named ? (LabelNames{{5, "steel bar"}}) : LabelNames{});
         EXPECT_EQ(mesh.boundary, (std::vector<Triangle>{{0, 2, 1}}));   // turned outward
         EXPECT_EQ(mesh.boundary_labels, std::vector<std::int32_t>{8});  // has none: its entity
         EXPECT_EQ(mesh.feature_edges, (std::vector<std::array<Index, 2>>{{0, 1}}));
@@ -418,7 +422,7 @@ TEST_F(TetIo, RefusesBadFilesInOneLine) {
   expect_error("a.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices 1\nnan 0 0 0\n", "not finite");
   expect_error("a.mesh", " \n", "empty");
   expect_error("a.mesh", "\x01\x02\x03", "ASCII");
-  expect_error("a.meshb", "x", "unknown format");
+  expect_error("a.meshc", "x", "unknown format");
   EXPECT_THROW(read_tet_mesh(path("missing.msh")), Error);
 
   for (const bool binary : {false, true})

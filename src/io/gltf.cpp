@@ -1,0 +1,150 @@
+// glTF 2.0 in one binary file (Khronos Group, glTF 2.0 Specification, section 4, "GLB File Format").
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/bytes.h"
+#include "io/colours.h"
+#include "io/labels.h"
+#include "io/mesh_formats.h"
+
+namespace bisector::io {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// What the format's numbers mean.
+enum : int { kUnsignedInt = 5125, kFloat = 5126, kArrayBuffer = 34962, kElementArrayBuffer = 34963, kTriangles = 4 };
+constexpr std::uint32_t kMagic = 0x46546c67, kVersion = 2, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
+
+// sRGB to the linear share that materials have.
+double linear(unsigned char channel) {
+  const double c = channel / 255.0;
+  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+}
+
+class GlbWriter {
+ public:
+  GlbWriter(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options)
+      : path_(path), mesh_(mesh), options_(options) {}
+
+  std::string write() {
+    json_["asset"] = {{"version", "2.0"}, {"generator", "bisector"}};
+    json_["scene"] = 0;
+    json_["scenes"] = Json::array({{{"nodes", {0}}}});
+    Json node{{"mesh", 0}};
+    // Lengths are in metres.
+    if (mesh_.unit > 0 && mesh_.unit != 1) node["scale"] = {mesh_.unit, mesh_.unit, mesh_.unit};
+    json_["nodes"] = Json::array({std::move(node)});
+    add_positions();
+    add_triangles();
+    json_["buffers"] = Json::array({{{"byteLength", buffer_.size()}}});
+    return joined();
+  }
+
+ private:
+  void add_positions() {
+    std::array<float, 3> low, high;
+    low.fill(std::numeric_limits<float>::max());
+    high.fill(std::numeric_limits<float>::lowest());
+    for (std::size_t v = 0; v < mesh_.vertices.size(); ++v)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double x = mesh_.vertices[v][static_cast<int>(k)];
+        if (std::abs(x) > std::numeric_limits<float>::max())
+          fail(path_, fmt::format("vertex {}: a coordinate is beyond glTF's range; write another format", v));
+        const auto rounded = static_cast<float>(x);
+        low[k] = std::min(low[k], rounded);
+        high[k] = std::max(high[k], rounded);
+        append_bytes(buffer_, rounded);
+      }
+    add_accessor(kFloat, "VEC3", mesh_.vertices.size(), 0, kArrayBuffer);
+    json_["accessors"].back()["min"] = low;
+    json_["accessors"].back()["max"] = high;
+  }
+
+  // A primitive for each label, all over the same vertices.
+  void add_triangles() {
+    const std::map<std::int32_t, std::string> names = names_of_labels(mesh_.labels, mesh_.label_names, options_);
+    std::map<std::int32_t, std::vector<std::size_t>> members;
+    for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
+      members[mesh_.labels.empty() ? 0 : mesh_.labels[i]].push_back(i);
+    Json primitives = Json::array();
+    for (const auto& [label, triangles] : members) {
+      const std::size_t start = buffer_.size();
+      for (const std::size_t i : triangles)
+        for (const Index v : mesh_.triangles[i]) append_bytes(buffer_, v);
+      add_accessor(kUnsignedInt, "SCALAR", 3 * triangles.size(), start, kElementArrayBuffer);
+      Json primitive{
+          {"attributes", {{"POSITION", 0}}}, {"indices", json_["accessors"].size() - 1}, {"mode", kTriangles}};
+      if (!names.empty()) {
+        primitive["material"] = json_.contains("materials") ? json_["materials"].size() : 0;
+        json_["materials"].push_back(material(label, names.at(label)));
+      }
+      primitives.push_back(std::move(primitive));
+    }
+    json_["meshes"] = Json::array({{{"primitives", std::move(primitives)}}});
+  }
+
+  Json material(std::int32_t label, const std::string& name) const {
+    const std::array<unsigned char, 3> c = colour_of_label(label, options_);
+    return {{"name", name},
+            {"doubleSided", true},
+            {"pbrMetallicRoughness",
+             {{"baseColorFactor", {linear(c[0]), linear(c[1]), linear(c[2]), 1}},
+              {"metallicFactor", 0},
+              {"roughnessFactor", 1}}}};
+  }
+
+  // Of the bytes from `start` to the end, which get a view of their own.
+  void add_accessor(int component, const char* type, std::size_t count, std::size_t start, int target) {
+    const std::size_t view = json_.contains("bufferViews") ? json_["bufferViews"].size() : 0;
+    json_["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", start}, {"byteLength", buffer_.size() - start}, {"target", target}});
+    json_["accessors"].push_back(
+        {{"bufferView", view}, {"componentType", component}, {"count", count}, {"type", type}});
+  }
+
+  std::string joined() const {
+    // Names from files may be anything; JSON has Unicode only.
+    std::string text = json_.dump(-1, ' ', false, Json::error_handler_t::replace);
+    text.resize((text.size() + 3) / 4 * 4, ' ');
+    constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+    const std::size_t size = kHeader + 2 * kChunkHeader + text.size() + buffer_.size();
+    if (size > std::numeric_limits<std::uint32_t>::max())
+      fail(path_, "the file would be larger than the 4 GiB of a binary glTF file; use another format");
+    std::string out;
+    out.reserve(size);
+    append_bytes(out, kMagic);
+    append_bytes(out, kVersion);
+    append_bytes(out, static_cast<std::uint32_t>(size));
+    append_bytes(out, static_cast<std::uint32_t>(text.size()));
+    append_bytes(out, kJsonChunk);
+    out += text;
+    append_bytes(out, static_cast<std::uint32_t>(buffer_.size()));
+    append_bytes(out, kBinaryChunk);
+    return out + buffer_;
+  }
+
+  const std::string& path_;
+  const TriangleMesh& mesh_;
+  const WriteOptions& options_;
+  Json json_;
+  std::string buffer_;
+};
+
+}  // namespace
+
+std::string format_glb(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options) {
+  return GlbWriter(path, mesh, options).write();
+}
+
+}  // namespace bisector::io
