@@ -53,8 +53,10 @@ void expect_kept(const TriangleMesh& input, const std::vector<Index>& triangles,
   for (const Index t : triangles)
     EXPECT_EQ(std::count(got.begin(), got.end(), corners_of(input, t)), 1) << "triangle " << t;
   ASSERT_EQ(result.kept.size(), result.mesh.vertices.size());
-  for (std::size_t v = 0; v < result.kept.size(); ++v)
-    if (const Index of = result.kept[v]; of != kNone) EXPECT_EQ(result.mesh.vertices[v], input.vertices[of]);
+  for (std::size_t v = 0; v < result.kept.size(); ++v) {
+    if (result.kept[v] == kNone) continue;
+    EXPECT_EQ(result.mesh.vertices[v], input.vertices[result.kept[v]]);
+  }
 }
 
 void expect_sound(const TriangleMesh& input, const RemeshResult& result) {
@@ -103,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Surfaces, KeptFaces,
                                          Case{"icosphere_coarser", icosphere(2), {0, 1, 0}, 16, 1500, 12},
                                          Case{"box", box(8), {1, 1, 1}, 40, 900, 15},
                                          Case{"patch_with_border", wavy_patch(24), {0, 0, 0}, 60, 500, 15}),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& problem) { return problem.param.name; });
 
 TEST(Kept, VerticesStayAndEdgesAreNotDivided) {
   const TriangleMesh mesh = icosphere(3);
