@@ -10,11 +10,12 @@
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "bisector/remesh.h"
+#include "core/degenerate.h"
 #include "core/geometry.h"
 #include "remesh/kept.h"
 #include "remesh/whole_edges.h"
+#include "support/diagram.h"
 #include "support/models.h"
-#include "support/shuffled.h"
 
 namespace bisector::test {
 namespace {
