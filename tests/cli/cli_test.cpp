@@ -1356,7 +1356,7 @@ TEST_F(CliTet, BadInputIsOneLine) {
   for (const char* name : {"out.off", "out.vtk", "out.txt", "out"})
     expect_failure(1, {"tet", in("cube.mesh"), "-o", in(name), "-n", "100"}, "can be written here");
   expect_failure(1, {"tet", in("cube.mesh"), "-o", in("nowhere/out.msh"), "-n", "100"}, "does not exist");
-  refused("cube.mesh", {"--boundary", in("skin.msh")}, "skin.msh");
+  refused("cube.mesh", {"--boundary", in("skin.xyz")}, "skin.xyz");
   refused("cube.mesh", {"--preview", in("p.jpg")}, "p.jpg");
   refused("cube.mesh", {"--boundary", in("cube.off"), "--report", in("cube.off")}, "cube.off");
 
@@ -1658,7 +1658,7 @@ TEST_F(CliSegment, BadInputIsOneLine) {
   write_text("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
   expect_failure(1, {"segment", in("flat.off"), "-o", in("out.ply"), "--quiet"}, "area");
   expect_failure(1, {"segment", in("missing.off"), "-o", in("out.ply")}, "missing.off");
-  expect_failure(1, {"segment", in("box.ply"), "-o", in("out.msh")}, "format");
+  expect_failure(1, {"segment", in("box.ply"), "-o", in("out.xyz")}, "format");
   expect_failure(1, segment({"--preview", in("out.jpg")}), "format");
   expect_failure(1, segment({"--polygons", in("p.stl")}), "format");
   expect_failure(1, segment({"--json", in("regions.txt")}), "format");
@@ -2044,7 +2044,7 @@ TEST_F(CliTree, BadUsageAndInput) {
   expect_failure(2, {"tree", tree, "-o", out, "--clusters", "0"}, "whole number");
   expect_failure(2, {"tree", tree, "-o", out, "--max-cluster-points", "3"}, "whole number");
   expect_failure(1, {"tree", tree, "-o", out, "--delta", "2"}, "delta");
-  expect_failure(1, {"tree", tree, "-o", in("t.msh")}, "t.msh");
+  expect_failure(1, {"tree", tree, "-o", in("t.xyz")}, "t.xyz");
   expect_failure(1, {"tree", tree, "-o", out, "--skeleton", in("s.obj")}, "s.obj");
   expect_failure(1, {"tree", tree, "-o", out, "--ground", "1e9"}, "below the ground");
   expect_failure(1, {"tree", in("none.xyz"), "-o", out}, "none.xyz");
