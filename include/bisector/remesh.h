@@ -138,7 +138,8 @@ struct FeatureResult {
 };
 
 struct RemeshResult {
-  // The restricted Delaunay triangulation of the seeds that own a cell. Its feature_edges are the edges along the
+  // The restricted Delaunay triangulation of the seeds that own a cell, but for kept triangles and what surrounds kept
+  // edges that seeds had divided. Its feature_edges are the edges along the
   // input's features; labels are those of the input's triangles in which its dual vertices lie.
   TriangleMesh mesh;
   std::vector<SeedPlace> places;   // of mesh's vertices

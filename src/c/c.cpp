@@ -248,6 +248,17 @@ void hand_out(Handle** to, std::shared_ptr<Object> object) {
   *to = static_cast<Handle*>(Handles::all().add(std::move(object)));
 }
 
+// Takes indices of what is to be kept.
+bisector_status keep(bisector_options* options, std::vector<Index> job::Given::*which, const char* option,
+                     const std::int64_t* indices, std::size_t count) {
+  return guarded([&] {
+    const std::shared_ptr<Options> object = options_of(options);
+    std::vector<Index> kept = indices_of(option, indices, count);
+    const std::lock_guard lock(object->mutex);
+    object->given.*which = std::move(kept);
+  });
+}
+
 bisector_type type_of(job::ArrayView::Type type) {
   switch (type) {
     case job::ArrayView::Type::double_: return BISECTOR_DOUBLE;
@@ -411,21 +422,11 @@ bisector_status bisector_options_reference(bisector_options* options, const bise
 }
 
 bisector_status bisector_options_keep_vertices(bisector_options* options, const int64_t* indices, size_t count) {
-  return guarded([&] {
-    const std::shared_ptr<Options> object = options_of(options);
-    auto kept = indices_of("--keep-vertices", indices, count);
-    const std::lock_guard lock(object->mutex);
-    object->given.keep_vertices = std::move(kept);
-  });
+  return keep(options, &job::Given::keep_vertices, "--keep-vertices", indices, count);
 }
 
 bisector_status bisector_options_keep_faces(bisector_options* options, const int64_t* indices, size_t count) {
-  return guarded([&] {
-    const std::shared_ptr<Options> object = options_of(options);
-    auto kept = indices_of("--keep-faces", indices, count);
-    const std::lock_guard lock(object->mutex);
-    object->given.keep_faces = std::move(kept);
-  });
+  return keep(options, &job::Given::keep_faces, "--keep-faces", indices, count);
 }
 
 bisector_status bisector_options_free(bisector_options* options) {

@@ -94,7 +94,8 @@ Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandT
   const auto files = std::make_shared<JobFiles>();
   CLI::App* app = add_command(program, job->command(), text);
   const job::InputKind input = job->input_kind();
-  job::add_file(app, input.name, job->input, "FILE", input.help.c_str(), input.extensions)->required();
+  const std::string help = input.extensions.empty() ? input.help : job::with_extensions(input.help, input.extensions);
+  job::add_file(app, input.name, job->input, "FILE", help.c_str(), input.extensions)->required();
   for (const job::OutputKind& kind : job->outputs())
     job::add_file(app, kind.option, files->outputs[kind.name], kind.type, kind.help.c_str(), kind.extensions)
         ->required(kind.required)

@@ -80,9 +80,9 @@ Command add_segment(CLI::App& program) {
         {"bisector segment part.stl -o regions.ply --proxies 22 --regularize",
          "Let surfaces share axes, planes, radii and angles where the data allow."},
         {"bisector segment bunny.off -o regions.ply --proxies 28", "Divide a scan into 28 regions."}},
-       ".ply and .obj files hold the regions, as face labels and colours and as groups. Ctrl-C stops the run; nothing "
-       "is\n"
-       "written."},
+       "Files hold the regions as labels, groups or materials, and their colours where they can. Ctrl-C stops the "
+       "run;\n"
+       "nothing is written."},
       "write a report with type, parameters and error of each\n"
       "region: JSON, or a page with 3D views if FILE ends in\n"
       ".html; - for stdout",

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/colour.h"
 #include "io/bytes.h"
 #include "io/colours.h"
 #include "io/labels.h"
@@ -25,12 +26,6 @@ using Json = nlohmann::ordered_json;
 // What the format's numbers mean.
 enum : int { kUnsignedInt = 5125, kFloat = 5126, kArrayBuffer = 34962, kElementArrayBuffer = 34963, kTriangles = 4 };
 constexpr std::uint32_t kMagic = 0x46546c67, kVersion = 2, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
-
-// sRGB to the linear share that materials have.
-double linear(unsigned char channel) {
-  const double c = channel / 255.0;
-  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-}
 
 class GlbWriter {
  public:
@@ -73,7 +68,7 @@ class GlbWriter {
 
   // A primitive for each label, all over the same vertices.
   void add_triangles() {
-    const std::map<std::int32_t, std::string> names = names_of_labels(mesh_.labels, mesh_.label_names, options_);
+    const LabelNames names = names_of_labels(mesh_.labels, mesh_.label_names, options_);
     std::map<std::int32_t, std::vector<std::size_t>> members;
     for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
       members[mesh_.labels.empty() ? 0 : mesh_.labels[i]].push_back(i);
@@ -99,7 +94,7 @@ class GlbWriter {
     return {{"name", name},
             {"doubleSided", true},
             {"pbrMetallicRoughness",
-             {{"baseColorFactor", {linear(c[0]), linear(c[1]), linear(c[2]), 1}},
+             {{"baseColorFactor", {light_of_srgb(c[0]), light_of_srgb(c[1]), light_of_srgb(c[2]), 1}},
               {"metallicFactor", 0},
               {"roughnessFactor", 1}}}};
   }

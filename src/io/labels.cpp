@@ -26,9 +26,9 @@ std::string cleaned(std::string_view name, std::string_view forbidden) {
   return clean;
 }
 
-std::map<std::int32_t, std::string> names_of_labels(const std::vector<std::int32_t>& labels, const LabelNames& own,
-                                                    const WriteOptions& options, std::string_view forbidden) {
-  std::map<std::int32_t, std::string> names;
+LabelNames names_of_labels(const std::vector<std::int32_t>& labels, const LabelNames& own, const WriteOptions& options,
+                           std::string_view forbidden) {
+  LabelNames names;
   std::set<std::string> taken;
   for (const std::int32_t label : std::set<std::int32_t>(labels.begin(), labels.end())) {
     std::string name = fmt::format("{}_{}", options.prefix, label);

@@ -22,8 +22,8 @@ std::string cleaned(std::string_view name, std::string_view forbidden = {});
 
 // What the labels of a mesh are called in a file, each otherwise than the others: PREFIX_K_NAME where the options name
 // them, else the mesh's own name, else PREFIX_K. One entry for each label that occurs.
-std::map<std::int32_t, std::string> names_of_labels(const std::vector<std::int32_t>& labels, const LabelNames& own,
-                                                    const WriteOptions& options, std::string_view forbidden = {});
+LabelNames names_of_labels(const std::vector<std::int32_t>& labels, const LabelNames& own, const WriteOptions& options,
+                           std::string_view forbidden = {});
 
 // The labels of faces that a file puts into parts (groups, solids, objects) and gives materials: one for each pair of
 // names that occurs.

@@ -335,8 +335,7 @@ LabelNames names_in(const PolygonMesh&) { return {}; }
 
 template <class Mesh>
 std::string obj_of(const Mesh& mesh, const WriteOptions& options) {
-  const std::map<std::int32_t, std::string> names =
-      names_of_labels({mesh.labels.begin(), mesh.labels.end()}, names_in(mesh), options, "#\\");
+  const LabelNames names = names_of_labels({mesh.labels.begin(), mesh.labels.end()}, names_in(mesh), options, "#\\");
   std::string out;
   for (const Vec3& p : mesh.vertices) {
     out += "v ";

@@ -211,8 +211,8 @@ std::string format_stl_solids(const std::string& path, const TriangleMesh& mesh,
     }
     out += '\n';
   };
-  const std::map<std::int32_t, std::string> names = names_of_labels(mesh.labels, mesh.label_names, options);
-  std::map<std::int32_t, std::string> facets;
+  const LabelNames names = names_of_labels(mesh.labels, mesh.label_names, options);
+  LabelNames facets;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const StlFacet facet = facet_of(path, mesh, mesh.triangles[i]);
     std::string& out = facets[mesh.labels[i]];

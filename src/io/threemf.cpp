@@ -377,7 +377,7 @@ std::string_view unit_name(double metres) {
 bool is_degenerate(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
 std::string model_of(const TriangleMesh& mesh, const WriteOptions& options) {
-  const std::map<std::int32_t, std::string> names = names_of_labels(mesh.labels, mesh.label_names, options);
+  const LabelNames names = names_of_labels(mesh.labels, mesh.label_names, options);
   std::string out = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"{}\" xml:lang=\"en-US\" "
       "xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\">\n<resources>\n",

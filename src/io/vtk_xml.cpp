@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "core/base64.h"
 #include "core/grouping.h"
 #include "io/vtk_grid.h"
 #include "io/xml.h"
@@ -336,21 +337,6 @@ class PolyDataReader {
   std::vector<std::size_t> cell_of_face_;
 };
 
-void append_base64(std::string& out, const std::string& bytes) {
-  static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const auto byte = [&](std::size_t k) {
-      return i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u;
-    };
-    const unsigned bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-    const std::size_t left = bytes.size() - i;
-    out += kDigits[bits >> 18];
-    out += kDigits[bits >> 12 & 63];
-    out += left > 1 ? kDigits[bits >> 6 & 63] : '=';
-    out += left > 2 ? kDigits[bits & 63] : '=';
-  }
-}
-
 template <class T>
 void append_array(std::string& out, const char* type, const char* name, int components, const std::vector<T>& values) {
   // meshio takes an explicit 1 for a matrix of one column.
@@ -361,7 +347,7 @@ void append_array(std::string& out, const char* type, const char* name, int comp
   bytes.reserve(8 + sizeof(T) * values.size());
   append_bytes(bytes, static_cast<std::uint64_t>(sizeof(T) * values.size()));
   for (const T x : values) append_bytes(bytes, x);
-  append_base64(out, bytes);
+  out += base64(bytes);
   out += "\n</DataArray>\n";
 }
 

@@ -43,7 +43,7 @@ struct Given {
 // What a command reads: a positional argument of the command line.
 struct InputKind {
   const char* name;
-  std::string help;
+  const char* help;                          // the extensions are added
   std::vector<std::string> extensions = {};  // the formats that can be read; empty: any name
 };
 

@@ -260,7 +260,8 @@ void Usage::check_wrap(const std::string& attribute) const {
   if (!attribute.empty())
     throw CLI::ValidationError("--density: a wrap has other vertices than its input; leave out attribute: or --wrap");
   refuse("--weld", "--wrap closes what welding would; leave one of the two out");
-  refuse("--feature-file", "a wrap has other vertices than its input; leave out --feature-file or --wrap");
+  for (const std::string option : {"--feature-file", "--keep-vertices", "--keep-faces"})
+    refuse(option.c_str(), ("a wrap has other vertices than its input; leave out " + option + " or --wrap").c_str());
 }
 
 }  // namespace bisector::job

@@ -22,9 +22,7 @@ class QualityJob final : public Job {
   };
 
   const char* command() const override { return "quality"; }
-  InputKind input_kind() const override {
-    return {"MESH", with_extensions("surface or tetrahedral mesh to measure", kMeshInputs), kMeshInputs};
-  }
+  InputKind input_kind() const override { return {"MESH", "surface or tetrahedral mesh to measure", kMeshInputs}; }
   std::vector<OutputKind> outputs() const override { return {}; }
   void add_options(CLI::App* app) override;
   std::vector<std::string> input_files() const override { return {input, reference_file}; }

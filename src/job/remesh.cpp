@@ -184,9 +184,6 @@ void RemeshJob::check_usage(const Usage& usage) {
   if (length > 0 && (length < sizing.min_edge || (sizing.max_edge > 0 && length > sizing.max_edge)))
     throw CLI::ValidationError("--edge-length is not between --edge-min and --edge-max");
   if (sizing.kind == DensityKind::uniform) usage.check_uniform_density();
-  for (const char* option : {"--keep-vertices", "--keep-faces"})
-    if (usage.given("--wrap"))
-      usage.refuse(option, "a wrap has vertices and faces of its own; leave one of the two out");
   if (usage.given("--seeds"))
     usage.refuse("--keep-faces",
                  "seeds are of the whole surface and leave no room for kept faces; leave one of the two out");
@@ -204,7 +201,7 @@ void RemeshJob::keep() {
       face_of.empty() ? triangles : std::size_t{*std::max_element(face_of.begin(), face_of.end())} + 1;
   const std::vector<Index> kept = read_kept(keep_faces_, given.keep_faces, faces, "face", "--keep-faces");
   if (wrap_.on && !(kept.empty() && options_.keep_vertices.empty()))
-    throw Error("--wrap: a wrap has vertices and faces of its own; keep none of the mesh's, or leave --wrap out");
+    throw Error("--wrap: a wrap has other vertices than its input; keep none of them, or leave --wrap out");
   for (Index t = 0; t < triangles; ++t)
     if (std::binary_search(kept.begin(), kept.end(), face_of.empty() ? t : face_of[t]))
       options_.keep_triangles.push_back(t);

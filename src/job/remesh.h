@@ -15,9 +15,7 @@ namespace bisector::job {
 class RemeshJob final : public Job {
  public:
   const char* command() const override { return "remesh"; }
-  InputKind input_kind() const override {
-    return {"IN", with_extensions("surface to remesh", kMeshInputs), kMeshInputs};
-  }
+  InputKind input_kind() const override { return {"IN", "surface to remesh", kMeshInputs}; }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;

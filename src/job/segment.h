@@ -18,7 +18,7 @@ namespace bisector::job {
 class SegmentJob final : public Job {
  public:
   const char* command() const override { return "segment"; }
-  InputKind input_kind() const override { return {"IN", with_extensions("surface", kMeshInputs), kMeshInputs}; }
+  InputKind input_kind() const override { return {"IN", "surface", kMeshInputs}; }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;

@@ -21,9 +21,7 @@ class TetJob final : public Job {
   };
 
   const char* command() const override { return "tet"; }
-  InputKind input_kind() const override {
-    return {"IN", with_extensions("closed surface or tetrahedral mesh", kMeshInputs), kMeshInputs};
-  }
+  InputKind input_kind() const override { return {"IN", "closed surface or tetrahedral mesh", kMeshInputs}; }
   std::vector<OutputKind> outputs() const override;
   void add_options(CLI::App* app) override;
   void check_usage(const Usage& usage) override;

@@ -12,6 +12,9 @@
 
 namespace bisector {
 
+// An edge with its lower vertex first.
+inline std::array<Index, 2> sorted_edge(Index a, Index b) { return a < b ? std::array{a, b} : std::array{b, a}; }
+
 // The undirected edges in lexicographic order. Half-edge 3 t + k runs from corner k of triangle t to the next corner.
 struct EdgeTable {
   std::vector<std::array<Index, 2>> edges;  // lower vertex first

@@ -8,6 +8,7 @@
 
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "core/colour.h"
 #include "core/geometry.h"
 #include "core/grouping.h"
 #include "core/parallel.h"
@@ -58,12 +59,10 @@ struct Rgb {
 
 Rgb mix(const Rgb& a, const Rgb& b, float t) { return (1 - t) * a + t * b; }
 
-float to_linear(unsigned char value) {
-  const double s = value / 255.0;
-  return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
+Rgb to_linear(const Colour& c) {
+  const auto light = [](unsigned char channel) { return static_cast<float>(light_of_srgb(channel)); };
+  return {light(c[0]), light(c[1]), light(c[2])};
 }
-
-Rgb to_linear(const Colour& c) { return {to_linear(c[0]), to_linear(c[1]), to_linear(c[2])}; }
 
 unsigned char to_srgb(float value) {
   const double x = std::clamp(static_cast<double>(value), 0.0, 1.0);

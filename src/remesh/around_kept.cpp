@@ -19,8 +19,6 @@ namespace {
 
 using Edge = std::array<Index, 2>;
 
-Edge sorted(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
-
 // The input, welded and oriented, in the part that is kept and the part that is remeshed.
 class Division {
  public:
@@ -56,14 +54,14 @@ class Division {
   std::vector<Edge> in_free(const std::vector<Edge>& edges) const {
     std::vector<Edge> found;
     for (const auto& [a, b] : edges)
-      if (std::binary_search(free_edges_.begin(), free_edges_.end(), sorted(a, b)))
+      if (std::binary_search(free_edges_.begin(), free_edges_.end(), sorted_edge(a, b)))
         found.push_back({free_of_[a], free_of_[b]});
     return found;
   }
   // Edges of the input as edges of the whole.
   std::vector<Edge> in_whole(const std::vector<Edge>& edges) const {
     std::vector<Edge> found;
-    for (const auto& [a, b] : edges) found.push_back(sorted(welded_.vertex_of[a], welded_.vertex_of[b]));
+    for (const auto& [a, b] : edges) found.push_back(sorted_edge(welded_.vertex_of[a], welded_.vertex_of[b]));
     return found;
   }
 
@@ -206,17 +204,17 @@ void Division::join(const RemeshOptions& options, RemeshResult& result) const {
   features.given = in_whole(options.features.given);
   const FeatureGraph graph = detect_features(whole(), features);
   std::vector<Edge> along;
-  for (const auto& [a, b] : interface_) along.push_back(sorted(at_whole[a], at_whole[b]));
+  for (const auto& [a, b] : interface_) along.push_back(sorted_edge(at_whole[a], at_whole[b]));
   std::sort(along.begin(), along.end());
   for (const auto& [a, b] : mesh.feature_edges)
-    if (const Edge edge = sorted(index[a], index[b]); !std::binary_search(along.begin(), along.end(), edge))
+    if (const Edge edge = sorted_edge(index[a], index[b]); !std::binary_search(along.begin(), along.end(), edge))
       joined.feature_edges.push_back(edge);
   const auto is_of_free = [&](const Edge& edge) {
     return std::binary_search(free_edges_.begin(), free_edges_.end(), edge) &&
            !std::binary_search(interface_.begin(), interface_.end(), edge);
   };
   for (const Edge& edge : graph.edges)
-    if (!is_of_free(edge)) joined.feature_edges.push_back(sorted(at_whole[edge[0]], at_whole[edge[1]]));
+    if (!is_of_free(edge)) joined.feature_edges.push_back(sorted_edge(at_whole[edge[0]], at_whole[edge[1]]));
   std::sort(joined.feature_edges.begin(), joined.feature_edges.end());
   for (TopologyFault& fault : result.faults)
     for (Index& seed : fault.seeds)

@@ -16,8 +16,6 @@ namespace {
 
 using Edge = std::array<Index, 2>;
 
-Edge sorted(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
-
 // The parts of a curve between corners, `is_corner` by vertex.
 std::vector<FeatureCurve> divide(FeatureCurve curve, const std::vector<char>& is_corner) {
   std::vector<Index>& on = curve.vertices;
@@ -47,23 +45,29 @@ std::vector<Index> vertices_at_corners(const RemeshResult& result, std::size_t c
   return at;
 }
 
+// The corners at both ends of an open curve.
+std::array<std::size_t, 2> ends_of(const FeatureGraph& features, const FeatureCurve& curve) {
+  const auto corner_at = [&](Index v) {
+    const auto corner = std::lower_bound(features.corners.begin(), features.corners.end(), v);
+    return static_cast<std::size_t>(corner - features.corners.begin());
+  };
+  return {corner_at(curve.vertices.front()), corner_at(curve.vertices.back())};
+}
+
 std::vector<VertexChain> chains_of(const KeptFeatures& kept, const FeatureGraph& features,
                                    const std::vector<Index>& at_corner, const RemeshResult& result) {
   std::vector<std::vector<std::pair<double, Index>>> inside(features.curves.size());
   for (Index v = 0; v < result.places.size(); ++v)
     if (const SeedPlace& place = result.places[v]; place.curve != kNone && kept.curves[place.curve])
       inside[place.curve].push_back({place.position, v});
-  const auto vertex_at = [&](Index v) {
-    const auto corner = std::lower_bound(features.corners.begin(), features.corners.end(), v);
-    return at_corner[static_cast<std::size_t>(corner - features.corners.begin())];
-  };
   std::vector<VertexChain> chains;
   for (std::size_t c = 0; c < features.curves.size(); ++c) {
     if (!kept.curves[c]) continue;
-    VertexChain chain{vertex_at(features.curves[c].vertices.front())};
+    const auto [from, to] = ends_of(features, features.curves[c]);
+    VertexChain chain{at_corner[from]};
     std::sort(inside[c].begin(), inside[c].end());
     for (const auto& [position, v] : inside[c]) chain.push_back(v);
-    chain.push_back(vertex_at(features.curves[c].vertices.back()));
+    chain.push_back(at_corner[to]);
     chains.push_back(std::move(chain));
   }
   return chains;
@@ -88,7 +92,7 @@ void drop_unused(RemeshResult& result) {
   result.kept.resize(count);
   for (Triangle& t : mesh.triangles)
     for (Index& v : t) v = index[v];
-  for (Edge& e : mesh.feature_edges) e = sorted(index[e[0]], index[e[1]]);
+  for (Edge& e : mesh.feature_edges) e = sorted_edge(index[e[0]], index[e[1]]);
   std::sort(mesh.feature_edges.begin(), mesh.feature_edges.end());
   for (TopologyFault& fault : result.faults)
     for (Index& seed : fault.seeds)
@@ -106,11 +110,11 @@ void take_out_divisions(const std::vector<VertexChain>& chains, const TriangleMe
   make_whole(mesh, chains, options);
   std::vector<Edge> links, edges;
   for (const VertexChain& chain : chains)
-    for (std::size_t k = 0; k + 1 < chain.size(); ++k) links.push_back(sorted(chain[k], chain[k + 1]));
+    for (std::size_t k = 0; k + 1 < chain.size(); ++k) links.push_back(sorted_edge(chain[k], chain[k + 1]));
   std::sort(links.begin(), links.end());
   std::set_difference(mesh.feature_edges.begin(), mesh.feature_edges.end(), links.begin(), links.end(),
                       std::back_inserter(edges));
-  for (const VertexChain& chain : chains) edges.push_back(sorted(chain.front(), chain.back()));
+  for (const VertexChain& chain : chains) edges.push_back(sorted_edge(chain.front(), chain.back()));
   mesh.feature_edges = std::move(edges);
   drop_unused(result);
   result.topology = analyse_topology(mesh.triangles, mesh.vertices.size());
@@ -122,17 +126,13 @@ void check_edges(const KeptFeatures& kept, const FeatureGraph& features, const R
   for (const Triangle& t : result.mesh.triangles)
     for (std::size_t k = 0; k < 3; ++k) {
       const Index a = result.kept[t[k]], b = result.kept[t[(k + 1) % 3]];
-      if (a != kNone && b != kNone) edges.push_back(sorted(a, b));
+      if (a != kNone && b != kNone) edges.push_back(sorted_edge(a, b));
     }
   std::sort(edges.begin(), edges.end());
-  const auto corner_of = [&](Index v) {
-    const auto at = std::lower_bound(features.corners.begin(), features.corners.end(), v);
-    return kept.corners[static_cast<std::size_t>(at - features.corners.begin())];
-  };
   for (std::size_t c = 0; c < features.curves.size(); ++c) {
     if (!kept.curves[c]) continue;
-    const FeatureCurve& curve = features.curves[c];
-    const Edge edge = sorted(corner_of(curve.vertices.front()), corner_of(curve.vertices.back()));
+    const auto [from, to] = ends_of(features, features.curves[c]);
+    const Edge edge = sorted_edge(kept.corners[from], kept.corners[to]);
     if (!std::binary_search(edges.begin(), edges.end(), edge))
       throw Error(
           fmt::format("the edge from vertex {} to {}, which is to be kept, is too long beside the edges "

@@ -147,7 +147,7 @@ void check_edges(const TriangleMesh& mesh, const std::vector<std::array<Index, 2
   if (edges.empty()) return;
   const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
   for (const auto& [a, b] : edges)
-    if (!std::binary_search(table.edges.begin(), table.edges.end(), std::array{std::min(a, b), std::max(a, b)}))
+    if (!std::binary_search(table.edges.begin(), table.edges.end(), sorted_edge(a, b)))
       throw Error(fmt::format("{} {} {} is not an edge of the mesh; remove it", what, a, b));
 }
 
@@ -272,7 +272,7 @@ void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::arra
     if (std::exchange(counted[original[v]], 1) == 0) points.push_back(mesh_.vertices[v]);
   }
   add_corners(features_, keep_vertices_);
-  for (auto& edge : edges) edge = {std::min(edge[0], edge[1]), std::max(edge[0], edge[1])};
+  for (auto& edge : edges) edge = sorted_edge(edge[0], edge[1]);
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   keep_edges_ = std::move(edges);
@@ -305,8 +305,7 @@ KeptFeatures Preparation::kept_features(const FeatureGraph& features) const {
     const bool whole =
         !curve.closed && std::all_of(on.begin() + 1, on.end() - 1, [&](Index v) { return v >= kept_as_.size(); });
     kept.curves.push_back(
-        whole && std::binary_search(keep_edges_.begin(), keep_edges_.end(),
-                                    std::array{std::min(on.front(), on.back()), std::max(on.front(), on.back())}));
+        whole && std::binary_search(keep_edges_.begin(), keep_edges_.end(), sorted_edge(on.front(), on.back())));
   }
   return kept;
 }

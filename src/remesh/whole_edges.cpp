@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/geometry.h"
+#include "mesh/topology.h"
 
 namespace bisector {
 namespace {
@@ -24,7 +25,6 @@ constexpr std::size_t kMostCorners = 64;
 
 using Edge = std::array<Index, 2>;
 
-Edge sorted(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 bool has(const Triangle& t, Index v) { return t[0] == v || t[1] == v || t[2] == v; }
 bool faces_the_same_way(const Vec3& a, const Vec3& b) { return dot(a, b) > kLeastCosine * norm(a) * norm(b); }
 
@@ -37,7 +37,7 @@ class Mender {
  public:
   Mender(TriangleMesh& mesh, const WholeEdgesOptions& options)
       : mesh_(mesh), options_(options), stars_(mesh.vertices.size()), alive_(mesh.triangles.size(), 1) {
-    for (const auto& [a, b] : options.locked) locked_.insert(sorted(a, b));
+    for (const auto& [a, b] : options.locked) locked_.insert(sorted_edge(a, b));
     for (Index t = 0; t < mesh.triangles.size(); ++t)
       for (const Index v : mesh.triangles[t]) stars_[v].push_back(t);
   }
@@ -55,7 +55,7 @@ class Mender {
         if (stars_[chain[k]].empty()) chain.erase(chain.begin() + static_cast<std::ptrdiff_t>(k));
       }
     }
-    for (std::size_t k = 0; k + 1 < chain.size(); ++k) locked_.insert(sorted(chain[k], chain[k + 1]));
+    for (std::size_t k = 0; k + 1 < chain.size(); ++k) locked_.insert(sorted_edge(chain[k], chain[k + 1]));
   }
 
   void improve() {
@@ -229,9 +229,9 @@ class Mender {
     }
     if (covered == 0 || covered != stars_[v].size()) return false;
     for (std::size_t k = 0; k < fans.size(); ++k) replace(fans[k], filled[k]);
-    locked_.erase(sorted(from, v));
-    locked_.erase(sorted(v, to));
-    locked_.insert(sorted(from, to));
+    locked_.erase(sorted_edge(from, v));
+    locked_.erase(sorted_edge(v, to));
+    locked_.insert(sorted_edge(from, to));
     return true;
   }
 
@@ -269,7 +269,7 @@ class Mender {
 
   // False if the edge is locked or the flip would fold or double the surface.
   bool flip(Index a, Index b) {
-    if (locked_.contains(sorted(a, b))) return false;
+    if (locked_.contains(sorted_edge(a, b))) return false;
     const std::vector<Index> both = triangles_at(a, b);
     if (both.size() != 2) return false;
     Index left = both[0], right = both[1];

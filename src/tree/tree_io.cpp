@@ -10,6 +10,7 @@
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "bisector/preview.h"
+#include "core/colour.h"
 #include "core/geometry.h"
 #include "core/random.h"
 #include "io/bytes.h"
@@ -25,7 +26,6 @@ using Colour = std::array<unsigned char, 3>;
 constexpr Colour kNoBranch{150, 150, 150};
 constexpr Colour kLeafColour{120, 180, 90};
 constexpr std::int32_t kLeafLabel = -2;
-constexpr double kGoldenSection = 0.6180339887498949;
 constexpr double kPointSize = 5e-4;  // half the edge of a drawn point, in the points' diagonal
 constexpr double kApart = 1.1;       // of the two views, in widths of the tree
 
@@ -36,14 +36,11 @@ std::size_t tree_of_branch(const TreeResult& tree, std::size_t branch) {
   return static_cast<std::size_t>(next - tree.trees.begin()) - 1;
 }
 
-// `hue` in [0, 6).
+// `hue` in turns.
 Colour colour_of(double hue, double bright) {
-  Colour colour{};
-  for (int k = 0; k < 3; ++k) {
-    const double off = std::abs(std::remainder(hue - 2 * k, 6.0));
-    colour[static_cast<std::size_t>(k)] =
-        static_cast<unsigned char>(255 * bright * (0.35 + 0.65 * std::clamp(2 - off, 0.0, 1.0)));
-  }
+  const std::array<double, 3> shares = shares_of_hue(hue);
+  Colour colour;
+  for (std::size_t k = 0; k < 3; ++k) colour[k] = static_cast<unsigned char>(255 * bright * (0.35 + 0.65 * shares[k]));
   return colour;
 }
 
@@ -51,12 +48,12 @@ Colour colour_of(double hue, double bright) {
 Colour branch_colour(const TreeResult& tree, Index branch) {
   if (branch == kNone) return kNoBranch;
   if (!tree.tree.empty()) {
-    const double turns = kGoldenSection * static_cast<double>(tree_of_branch(tree, branch));
-    return colour_of(6 * (turns - std::floor(turns)), 0.65 + 0.25 * Random(1, branch).uniform());
+    const double hue = spread_hue(static_cast<double>(tree_of_branch(tree, branch)));
+    return colour_of(hue, 0.65 + 0.25 * Random(1, branch).uniform());
   }
   if (tree.branches[branch].parent == kNone) return {142, 112, 86};
   Random random(1, branch);
-  const double hue = 6 * random.uniform(), bright = 0.65 + 0.25 * random.uniform();
+  const double hue = random.uniform(), bright = 0.65 + 0.25 * random.uniform();
   return colour_of(hue, bright);
 }
 

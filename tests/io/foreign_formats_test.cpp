@@ -2,12 +2,10 @@
 // read here, with equal vertices, cells, labels and names.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -20,55 +18,24 @@
 #include "bisector/io.h"
 #include "core/geometry.h"
 #include "mesh/tet_topology.h"
+#include "support/files.h"
 #include "support/models.h"
+#include "support/solids.h"
 
 namespace bisector::test {
 namespace {
 
-namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using Point = std::array<double, 3>;
 
 constexpr int kSkipped = 77;
 
-// Cubes of 2 x 2 x 2, of six tetrahedra each: regions by layer, labels by side, the outer edges as features.
+// Coordinates that need all digits, and positive marks, which all of the formats take.
 TetMesh marked_solid() {
-  TetMesh mesh;
-  const auto at = [](int x, int y, int z) { return static_cast<Index>((z * 3 + y) * 3 + x); };
-  for (int z = 0; z <= 2; ++z)
-    for (int y = 0; y <= 2; ++y)
-      for (int x = 0; x <= 2; ++x) mesh.vertices.push_back({x / 3.0, y / 7.0, 100 * z / 9.0});
-  for (int z = 0; z < 2; ++z)
-    for (int y = 0; y < 2; ++y)
-      for (int x = 0; x < 2; ++x) {
-        std::array<int, 3> axes{0, 1, 2};
-        do {
-          std::array<int, 3> p{x, y, z};
-          Tetrahedron t{at(x, y, z), 0, 0, 0};
-          for (std::size_t k = 0; k < 3; ++k) {
-            ++p[static_cast<std::size_t>(axes[k])];
-            t[k + 1] = at(p[0], p[1], p[2]);
-          }
-          if ((axes[0] + 1) % 3 != axes[1]) std::swap(t[2], t[3]);
-          mesh.tets.push_back(t);
-          mesh.regions.push_back(z + 1);
-        } while (std::next_permutation(axes.begin(), axes.end()));
-      }
-  mesh.boundary = boundary_facets(mesh.tets);
-  const Vec3 high = mesh.vertices.back();
-  for (const Triangle& t : mesh.boundary)
-    for (int k = 0; k < 3; ++k)
-      for (const double side : {0.0, high[k]})
-        if (std::all_of(t.begin(), t.end(), [&](Index v) { return mesh.vertices[v][k] == side; }))
-          mesh.boundary_labels.push_back(2 * k + (side > 0) + 1);
-  for (int i = 0; i < 2; ++i)
-    for (const int a : {0, 2})
-      for (const int b : {0, 2}) {
-        mesh.feature_edges.push_back({at(i, a, b), at(i + 1, a, b)});
-        mesh.feature_edges.push_back({at(a, i, b), at(a, i + 1, b)});
-        mesh.feature_edges.push_back({at(a, b, i), at(a, b, i + 1)});
-      }
-  std::sort(mesh.feature_edges.begin(), mesh.feature_edges.end());
+  TetMesh mesh = marked_cube(2);
+  for (Vec3& p : mesh.vertices) p = {p.x, 3 * p.y / 7, 100 * p.z / 3};
+  for (std::int32_t& region : mesh.regions) region = region == 7 ? 1 : 2;
+  for (std::int32_t& label : mesh.boundary_labels) label += 3;
   return mesh;
 }
 
@@ -87,22 +54,15 @@ Json rows_of(const std::vector<std::array<Index, N>>& rows) {
   return Json(rows);
 }
 
-class ForeignFormats : public ::testing::Test {
+class ForeignFormats : public FileTest {
  protected:
   void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("bisector-" + std::string(info->name()) + "-" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
+    FileTest::SetUp();
     solid_ = marked_solid();
     std::vector<Index> kept;
     surface_ = boundary_surface(solid_, &kept);
     write_all();
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-
   void write_all() {
     TriangleMesh named = surface_;
     named.label_names = kLabelNames;
@@ -250,7 +210,6 @@ class ForeignFormats : public ::testing::Test {
     return all;
   }
 
-  fs::path folder_;
   TetMesh solid_;
   TriangleMesh surface_;  // its boundary
 };

@@ -1,14 +1,11 @@
 // Formats beyond the common ones, and what all of them keep: labels, names, units. Malformed, truncated and hostile
 // files are refused in one line, and none makes a reader allocate much more than the file's size.
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <locale>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -26,64 +23,30 @@
 #include "io/zip.h"
 #include "mesh/tet_topology.h"
 #include "support/allocations.h"
+#include "support/files.h"
 #include "support/models.h"
 
 namespace bisector::test {
 namespace {
 
-namespace fs = std::filesystem;
 using Edges = std::vector<std::array<Index, 2>>;
 using Labels = std::vector<std::int32_t>;
 
-class Formats : public ::testing::Test {
+class Formats : public FileTest {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("bisector-" + std::string(info->name()) + "-" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::string store(const std::string& name, std::string_view bytes) const {
-    std::ofstream(path(name), std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    return path(name);
-  }
-  std::string slurp(const std::string& name) const {
-    std::ifstream in(path(name), std::ios::binary);
-    std::ostringstream bytes;
-    bytes << in.rdbuf();
-    return bytes.str();
-  }
   TriangleMesh read(const std::string& name, std::string_view bytes) {
-    warnings_.clear();
-    Context context;
-    context.warning = [this](const std::string& line) { warnings_.push_back(line); };
-    return read_mesh(store(name, bytes), context);
+    return read_mesh(store(name, bytes), collecting());
   }
   TriangleMesh written_and_read(const std::string& name, const TriangleMesh& mesh, const WriteOptions& options = {}) {
     write_mesh(path(name), mesh, options);
     return read_mesh(path(name));
   }
-  // The message of the Error, which must be one line that names the file and holds `part`.
   void expect_error(const std::string& name, std::string_view bytes, const std::string& part) {
-    try {
-      read(name, bytes);
-      ADD_FAILURE() << name << ": no error: " << part;
-    } catch (const Error& error) {
-      const std::string what = error.what();
-      EXPECT_EQ(what.find('\n'), std::string::npos) << what;
-      EXPECT_TRUE(what.starts_with(path(name))) << what;
-      EXPECT_NE(what.find(part), std::string::npos) << what;
-    }
+    expect_error_line([&] { read(name, bytes); }, path(name), part);
   }
   // What is read of any part of the bytes, or of bytes with damage, is sound or refused in one line, and takes at most
   // `most` times the file's size in one piece, or 128 kB.
   void expect_robust(const std::string& name, const std::string& bytes, std::size_t most);
-
-  fs::path folder_;
-  std::vector<std::string> warnings_;
 };
 
 void Formats::expect_robust(const std::string& name, const std::string& bytes, std::size_t most) {

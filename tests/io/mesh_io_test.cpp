@@ -11,7 +11,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -26,6 +25,7 @@
 #include "io/files.h"
 #include "mesh/topology.h"
 #include "support/allocations.h"
+#include "support/files.h"
 #include "support/models.h"
 
 namespace bisector::test {
@@ -33,43 +33,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string slurp(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << in.rdbuf();
-  return bytes.str();
-}
-
-// A folder of its own for each test, removed at its end.
-class Io : public ::testing::Test {
+class Io : public FileTest {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("bisector-" + std::string(info->name()) + "-" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::string store(const std::string& name, std::string_view bytes) const {
-    std::ofstream(path(name), std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    return path(name);
-  }
   TriangleMesh read(const std::string& name, std::string_view bytes) {
-    warnings_.clear();
-    Context context;
-    context.warning = [this](const std::string& line) { warnings_.push_back(line); };
-    return read_mesh(store(name, bytes), context);
+    return read_mesh(store(name, bytes), collecting());
   }
   std::vector<std::string> files() const {
     std::vector<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder_)) names.push_back(entry.path().filename().string());
     return names;
   }
-
-  fs::path folder_;
-  std::vector<std::string> warnings_;
 };
 
 bool same_bits(const Vec3& a, const Vec3& b) {
@@ -197,9 +170,9 @@ TEST_F(Io, RoundTripsAreBitExact) {
     for (const char* name : {"a.off", "a.obj", "a.ply", "A.OFF", "A.Obj", "A.PLY"}) {
       write_mesh(path(name), mesh);
       expect_same(read_mesh(path(name)), mesh);
-      const std::string bytes = slurp(path(name));
+      const std::string bytes = slurp(name);
       write_mesh(path(name), mesh);
-      EXPECT_TRUE(slurp(path(name)) == bytes);
+      EXPECT_TRUE(slurp(name) == bytes);
     }
 }
 
@@ -215,7 +188,7 @@ TEST_F(Io, StlRoundTripsToFloat) {
       for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(static_cast<double>(static_cast<float>(p[axis])), q[axis]);
     }
   write_mesh(path("b.stl"), back);
-  EXPECT_TRUE(slurp(path("a.stl")) == slurp(path("b.stl")));
+  EXPECT_TRUE(slurp("a.stl") == slurp("b.stl"));
 }
 
 TEST_F(Io, ReadsEveryFormat) {
@@ -573,8 +546,8 @@ TEST_F(Io, SurvivesTruncationAndDamage) {
   write_mesh(path("marked.obj"), marked_square(), lines);
   write_mesh(path("marked.ply"), marked_square());
   const std::vector<std::pair<const char*, std::string>> valid{
-      {"a.obj", slurp(path("marked.obj"))},
-      {"a.ply", slurp(path("marked.ply"))},
+      {"a.obj", slurp("marked.obj")},
+      {"a.ply", slurp("marked.ply")},
       {"a.off", kOff},
       {"a.off", replaced(kOff, "3 0 1 2\n3 0 2 3", "4 0 1 2 3\n4 3 2 1 0")},
       {"a.obj", kObj},
@@ -638,7 +611,7 @@ TEST_F(Io, LabelsAndFeatureEdgesRoundTrip) {
     }
   write_mesh(path("a.obj"), only_edges);
   EXPECT_TRUE(read_mesh(path("a.obj")).feature_edges.empty());
-  EXPECT_EQ(slurp(path("a.obj")).find("\nl "), std::string::npos);
+  EXPECT_EQ(slurp("a.obj").find("\nl "), std::string::npos);
   one.labels = {1, 0};
   for (const char* name : {"a.ply", "a.obj"}) {
     write_mesh(path(name), one, {"region", {"plane", "plane_pair"}});
@@ -804,7 +777,7 @@ TEST_F(Io, WritesPolygons) {
   for (const Index v : {3u, 2u, 4u}) put(tail, v);
   put(tail, 4000000000u);
   tail += std::string("\x02\x03\x04", 3);
-  EXPECT_TRUE(slurp(path("a.ply")).ends_with(tail));
+  EXPECT_TRUE(slurp("a.ply").ends_with(tail));
 
   PolygonMesh wheel;  // more corners than a byte counts
   for (int i = 0; i < 300; ++i) {
@@ -843,13 +816,13 @@ TEST_F(Io, WritesNothingThatCannotBeRead) {
 TEST_F(Io, ReplacesFilesAtOnce) {
   write_file(path("a.txt"), "one");
   write_file(path("a.txt"), "two");
-  EXPECT_EQ(slurp(path("a.txt")), "two");
+  EXPECT_EQ(slurp("a.txt"), "two");
   EXPECT_EQ(files(), std::vector<std::string>{"a.txt"});
 
   fs::create_symlink("a.txt", path("link.txt"));
   write_file(path("link.txt"), "three");
   EXPECT_TRUE(fs::is_symlink(path("link.txt")));
-  EXPECT_EQ(slurp(path("a.txt")), "three");
+  EXPECT_EQ(slurp("a.txt"), "three");
 
   fs::create_directory(path("folder"));
   EXPECT_THROW(write_file(path("folder"), "x"), Error);
@@ -865,7 +838,7 @@ TEST_F(Io, LeavesTheOldFileWhenTheFolderIsReadOnly) {
   fs::permissions(folder_, fs::perms::owner_read | fs::perms::owner_exec);
   EXPECT_THROW(write_file(path("a.txt"), "new"), Error);
   fs::permissions(folder_, fs::perms::owner_all);
-  EXPECT_EQ(slurp(path("a.txt")), "old");
+  EXPECT_EQ(slurp("a.txt"), "old");
 }
 
 TEST_F(Io, LeavesTheOldFileWhenWritingFailsHalfway) {
@@ -879,7 +852,7 @@ TEST_F(Io, LeavesTheOldFileWhenWritingFailsHalfway) {
   EXPECT_THROW(write_file(path("a.txt"), std::string(1 << 20, 'x')), Error);
   ::setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
-  EXPECT_EQ(slurp(path("a.txt")), "old");
+  EXPECT_EQ(slurp("a.txt"), "old");
   EXPECT_EQ(files(), std::vector<std::string>{"a.txt"});
 }
 

@@ -1,14 +1,11 @@
 // Scans: files made here byte by byte read as what they hold, and what is malformed is refused in one line.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
@@ -23,35 +20,19 @@
 #include "io/bytes.h"
 #include "io/point_formats.h"
 #include "support/allocations.h"
+#include "support/files.h"
 
 namespace bisector::test {
 namespace {
 
-namespace fs = std::filesystem;
 using io::append_bytes;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-class PointIo : public ::testing::Test {
+class PointIo : public FileTest {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("bisector-" + std::string(info->name()) + "-" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string store(const std::string& name, std::string_view bytes) const {
-    const std::string path = (folder_ / name).string();
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    return path;
-  }
   PointCloud read(const std::string& name, std::string_view bytes) {
-    warnings_.clear();
-    Context context;
-    context.warning = [this](const std::string& line) { warnings_.push_back(line); };
-    return read_point_cloud(store(name, bytes), context);
+    return read_point_cloud(store(name, bytes), collecting());
   }
   // Refused in one line that begins with the file's name and `place`, has `what` in it and says what to do.
   void expect_refused(const std::string& name, std::string_view bytes, const std::string& place,
@@ -70,8 +51,6 @@ class PointIo : public ::testing::Test {
     }
     EXPECT_LE(largest_allocation, std::size_t{1} << 18) << what;
   }
-  fs::path folder_;
-  std::vector<std::string> warnings_;
 };
 
 template <class T>

@@ -1,7 +1,6 @@
 // Files of tetrahedra: what is written reads back bit for bit, other programs read it, and what is malformed is refused
 // in one line.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -22,55 +21,23 @@
 #include "bisector/quality.h"
 #include "core/geometry.h"
 #include "mesh/tet_topology.h"
+#include "support/files.h"
 #include "support/models.h"
+#include "support/solids.h"
 
 namespace bisector::test {
 namespace {
 
 namespace fs = std::filesystem;
 
-class TetIo : public ::testing::Test {
+class TetIo : public FileTest {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("bisector-" + std::string(info->name()) + "-" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::string store(const std::string& name, std::string_view bytes) const {
-    std::ofstream(path(name), std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    return path(name);
-  }
-  std::string slurp(const std::string& name) const {
-    std::ifstream in(path(name), std::ios::binary);
-    std::ostringstream bytes;
-    bytes << in.rdbuf();
-    return bytes.str();
-  }
   TetMesh read(const std::string& name, std::string_view bytes) {
-    warnings_.clear();
-    Context context;
-    context.warning = [this](const std::string& line) { warnings_.push_back(line); };
-    return read_tet_mesh(store(name, bytes), context);
+    return read_tet_mesh(store(name, bytes), collecting());
   }
-  // The message of the Error, which must be one line that names the file and holds `part`.
   void expect_error(const std::string& name, std::string_view bytes, const std::string& part) {
-    try {
-      read(name, bytes);
-      ADD_FAILURE() << "no error: " << part;
-    } catch (const Error& error) {
-      const std::string what = error.what();
-      EXPECT_EQ(what.find('\n'), std::string::npos) << what;
-      EXPECT_TRUE(what.starts_with(path(name))) << what;
-      EXPECT_NE(what.find(part), std::string::npos) << what;
-    }
+    expect_error_line([&] { read(name, bytes); }, path(name), part);
   }
-
-  fs::path folder_;
-  std::vector<std::string> warnings_;
 };
 
 bool same_bits(const Vec3& a, const Vec3& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
@@ -85,50 +52,6 @@ void expect_same(const TetMesh& a, const TetMesh& b) {
   EXPECT_EQ(a.feature_edges, b.feature_edges);
   EXPECT_EQ(a.region_names, b.region_names);
   EXPECT_EQ(a.label_names, b.label_names);
-}
-
-// n^3 cubes of six tetrahedra each, with every mark: regions by layer, labels by side, the cube's edges as features.
-TetMesh marked_cube(int n) {
-  TetMesh mesh;
-  const auto at = [n](int x, int y, int z) { return static_cast<Index>((z * (n + 1) + y) * (n + 1) + x); };
-  for (int z = 0; z <= n; ++z)
-    for (int y = 0; y <= n; ++y)
-      for (int x = 0; x <= n; ++x) mesh.vertices.push_back({x / 3.0, y / 3.0, z / 3.0});
-  for (int z = 0; z < n; ++z)
-    for (int y = 0; y < n; ++y)
-      for (int x = 0; x < n; ++x) {
-        std::array<int, 3> axes{0, 1, 2};
-        do {
-          std::array<int, 3> p{x, y, z};
-          Tetrahedron t{at(x, y, z), 0, 0, 0};
-          for (std::size_t k = 0; k < 3; ++k) {
-            ++p[static_cast<std::size_t>(axes[k])];
-            t[k + 1] = at(p[0], p[1], p[2]);
-          }
-          const bool positive = (axes[0] + 1) % 3 == axes[1];
-          if (!positive) std::swap(t[2], t[3]);
-          mesh.tets.push_back(t);
-          mesh.regions.push_back(7 - 3 * z);
-        } while (std::next_permutation(axes.begin(), axes.end()));
-      }
-  mesh.boundary = boundary_facets(mesh.tets);
-  for (const Triangle& t : mesh.boundary) {
-    int label = 0;
-    for (int k = 0; k < 3; ++k)
-      for (const double side : {0.0, n / 3.0})
-        if (std::all_of(t.begin(), t.end(), [&](Index v) { return mesh.vertices[v][k] == side; }))
-          label = 2 * k + (side > 0) - 2;
-    mesh.boundary_labels.push_back(label);
-  }
-  for (int i = 0; i < n; ++i)
-    for (const int a : {0, n})
-      for (const int b : {0, n}) {
-        mesh.feature_edges.push_back({at(i, a, b), at(i + 1, a, b)});
-        mesh.feature_edges.push_back({at(a, i, b), at(a, i + 1, b)});
-        mesh.feature_edges.push_back({at(a, b, i), at(a, b, i + 1)});
-      }
-  std::sort(mesh.feature_edges.begin(), mesh.feature_edges.end());
-  return mesh;
 }
 
 TetMesh awkward_numbers() {

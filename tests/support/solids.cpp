@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "mesh/tet_topology.h"
 #include "support/models.h"
 
 namespace bisector::test {
@@ -60,6 +61,32 @@ TetMesh tet_grid(int nx, int ny, int nz) {
 }
 
 TetMesh tet_box(int n) { return scaled(tet_grid(n, n, n), 1.0 / n); }
+
+TetMesh marked_cube(int n) {
+  TetMesh mesh = tet_grid(n, n, n);
+  for (Vec3& p : mesh.vertices) p = {p.x / 3, p.y / 3, p.z / 3};
+  const auto at = [n](int x, int y, int z) { return static_cast<Index>((z * (n + 1) + y) * (n + 1) + x); };
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    mesh.regions.push_back(7 - 3 * static_cast<std::int32_t>(t / static_cast<std::size_t>(6 * n * n)));
+  mesh.boundary = boundary_facets(mesh.tets);
+  for (const Triangle& t : mesh.boundary) {
+    int label = 0;
+    for (int k = 0; k < 3; ++k)
+      for (const double side : {0.0, n / 3.0})
+        if (std::all_of(t.begin(), t.end(), [&](Index v) { return mesh.vertices[v][k] == side; }))
+          label = 2 * k + (side > 0) - 2;
+    mesh.boundary_labels.push_back(label);
+  }
+  for (int i = 0; i < n; ++i)
+    for (const int a : {0, n})
+      for (const int b : {0, n}) {
+        mesh.feature_edges.push_back({at(i, a, b), at(i + 1, a, b)});
+        mesh.feature_edges.push_back({at(a, i, b), at(a, i + 1, b)});
+        mesh.feature_edges.push_back({at(a, b, i), at(a, b, i + 1)});
+      }
+  std::sort(mesh.feature_edges.begin(), mesh.feature_edges.end());
+  return mesh;
+}
 
 TetMesh five_tets() {
   TetMesh mesh;

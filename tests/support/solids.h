@@ -11,15 +11,17 @@ namespace bisector::test {
 
 TetMesh single_tet();  // (0,0,0), (4,0,0), (0,4,0), (0,0,4)
 TetMesh tet_grid(int nx, int ny,
-                 int nz);              // [0,nx] x [0,ny] x [0,nz], each unit cube in six tetrahedra around its diagonal
-TetMesh tet_box(int n);                // the unit cube, n to a side
-TetMesh five_tets();                   // the unit cube in five
-TetMesh step();                        // an L: a grid of 2 x 1 x 2 cubes without one of them
-TetMesh hollow();                      // a grid of 3 x 3 x 3 cubes without the middle one
-TetMesh two_cubes();                   // disjoint
-TetMesh pores();                       // a cube with three cavities, each far smaller than their distances
-TetMesh specks();                      // two cubes as small, far from a large one
-TetMesh shell_of_pores();              // a cube with 26 such cavities around its middle, in a lattice
+                 int nz);    // [0,nx] x [0,ny] x [0,nz], each unit cube in six tetrahedra around its diagonal
+TetMesh tet_box(int n);      // the unit cube, n to a side
+TetMesh marked_cube(int n);  // n^3 cubes of a third, with every mark: a region for each layer, a label for each
+                             // side, the cube's edges as features
+TetMesh five_tets();         // the unit cube in five
+TetMesh step();              // an L: a grid of 2 x 1 x 2 cubes without one of them
+TetMesh hollow();            // a grid of 3 x 3 x 3 cubes without the middle one
+TetMesh two_cubes();         // disjoint
+TetMesh pores();             // a cube with three cavities, each far smaller than their distances
+TetMesh specks();            // two cubes as small, far from a large one
+TetMesh shell_of_pores();    // a cube with 26 such cavities around its middle, in a lattice
 std::vector<Vec3> lattice_of_pores();  // the lattice, with seven points along each edge of the cube, shaken a little
 TetMesh slivers();                     // octahedron around a tetrahedron 2^-40 high
 TetMesh flat_among_good();             // octahedron around one of exactly no volume
