@@ -53,6 +53,33 @@ BISECTOR_C_API const char* bisector_last_error(void);
 
 /* --- meshes --- */
 
+/* Numbers of each vertex, face, tetrahedron or corner of a mesh under a name. An element is a face, or, of a mesh that
+ * has tetrahedra, one of these; corners are those of the faces, in their order. */
+typedef enum bisector_site { BISECTOR_VERTEX = 0, BISECTOR_ELEMENT = 1, BISECTOR_CORNER = 2 } bisector_site;
+
+/* What files hold the numbers as. Integers but for colours are not interpolated. */
+typedef enum bisector_number {
+  BISECTOR_NUMBER_INT8 = 0,
+  BISECTOR_NUMBER_UINT8 = 1,
+  BISECTOR_NUMBER_INT16 = 2,
+  BISECTOR_NUMBER_UINT16 = 3,
+  BISECTOR_NUMBER_INT32 = 4,
+  BISECTOR_NUMBER_UINT32 = 5,
+  BISECTOR_NUMBER_INT64 = 6,
+  BISECTOR_NUMBER_UINT64 = 7,
+  BISECTOR_NUMBER_FLOAT32 = 8,
+  BISECTOR_NUMBER_FLOAT64 = 9
+} bisector_number;
+
+typedef struct bisector_attribute {
+  const char* name;
+  int32_t site;   /* a bisector_site */
+  int32_t number; /* a bisector_number */
+  size_t components;
+  const double* values; /* `components` of each vertex, element or corner */
+  size_t count;         /* of all values */
+} bisector_attribute;
+
 /* A mesh in memory. `size` is sizeof(bisector_mesh_arrays), set by BISECTOR_MESH_ARRAYS_INIT; what is NULL or 0 is not
  * there. Faces have three corners each, or, with `face_offsets` (face_count + 1 numbers, from 0), any number: face k
  * has the corners face_offsets[k] to face_offsets[k + 1] of `faces`. Neither faces nor tetrahedra: points, for `tree`.
@@ -72,10 +99,12 @@ typedef struct bisector_mesh_arrays {
   size_t region_count;
   const int64_t* feature_edges; /* edge_count rows of 2, kept like those of a file */
   size_t edge_count;
+  const bisector_attribute* attributes; /* which `remesh` and `tet` carry to the result */
+  size_t attribute_count;
 } bisector_mesh_arrays;
 
 #define BISECTOR_MESH_ARRAYS_INIT \
-  { sizeof(bisector_mesh_arrays), NULL, 0, NULL, 0, NULL, NULL, 0, NULL, 0, NULL, 0, NULL, 0 }
+  { sizeof(bisector_mesh_arrays), NULL, 0, NULL, 0, NULL, NULL, 0, NULL, 0, NULL, 0, NULL, 0, NULL, 0 }
 
 /* Copies the arrays and checks them as a file is checked. */
 BISECTOR_C_API bisector_status bisector_mesh_from_arrays(const bisector_mesh_arrays* arrays, bisector_mesh** mesh);
@@ -153,7 +182,8 @@ typedef struct bisector_array {
 
 /* An array of a result, by name:
  *   remesh   vertices (n, 3), faces (m, 3), labels (m, or none), feature_edges (k, 2), kept (n, or none:
- *            the mesh's vertex that each is, or 0xffffffff)
+ *            the mesh's vertex that each is, or 0xffffffff); with the option `map` map_faces (n: the mesh's face that
+ *            each vertex is on) and map_weights (n, 3: of the corners of a triangle of that)
  *   tet      vertices, tets (t, 4), regions (t, or none), faces of the boundary, their labels, feature_edges
  *   segment  vertices, faces, labels (the region of each face), feature_edges; with the option `polygons`
  *            polygon_vertices, polygon_corners, polygon_offsets, polygon_labels
@@ -164,13 +194,18 @@ typedef struct bisector_array {
  * BISECTOR_FAILED if there is no array of this name. */
 BISECTOR_C_API bisector_status bisector_result_array(const bisector_result* result, const char* name,
                                                      bisector_array* array);
+/* The attributes of a result of `remesh` or `tet` (bisector/attributes.h says how they are carried), whose names and
+ * values are valid until the result is freed. BISECTOR_FAILED if `index` is not below their number. */
+BISECTOR_C_API bisector_status bisector_result_attribute_count(const bisector_result* result, size_t* count);
+BISECTOR_C_API bisector_status bisector_result_attribute(const bisector_result* result, size_t index,
+                                                         bisector_attribute* attribute);
 /* The report (docs/cli.md) as JSON, valid until the result is freed. What is in no other output is measured by the
  * first call, which may take a while. */
 BISECTOR_C_API bisector_status bisector_result_report(const bisector_result* result,
                                                       const bisector_callbacks* callbacks, const char** json);
 /* Writes a file as the program does. `what` is "output" (-o), or another of the command's files: "preview",
- * "feature-output" (remesh), "boundary" (tet), "json", "polygons" (segment), "skeleton", "cylinders", "labels" (tree),
- * "pairs" (rvd); or "report", as JSON, or as a page with 3D views if the name of the file ends in .html. */
+ * "feature-output", "map" (remesh), "boundary" (tet), "json", "polygons" (segment), "skeleton", "cylinders", "labels"
+ * (tree), "pairs" (rvd); or "report", as JSON, or as a page with 3D views if the name of the file ends in .html. */
 BISECTOR_C_API bisector_status bisector_result_save(const bisector_result* result, const char* what, const char* path,
                                                     const bisector_callbacks* callbacks);
 BISECTOR_C_API bisector_status bisector_result_free(bisector_result* result);

@@ -32,6 +32,11 @@ BISECTOR_API const std::vector<FileFormat>& file_formats();
 // The extensions of which one of the above is true, in their order.
 BISECTOR_API std::vector<std::string> extensions_that(bool FileFormat::*use);
 
+// Names of the attributes that a file of this name, by its extension, has no place for; all of them if no format is
+// known by it.
+BISECTOR_API std::vector<std::string> lost_attributes(const std::string& path,
+                                                      const std::vector<Attribute>& attributes);
+
 // ".off, .obj or .ply".
 BISECTOR_API std::string listed(const std::vector<std::string>& names);
 
@@ -44,14 +49,19 @@ BISECTOR_API std::string listed(const std::vector<std::string>& names);
 //   .off    text, each item on a line of its own or all as one stream of numbers, and binary; what points and faces
 //           have beside coordinates and corners is ignored.
 //   .obj    labels: each pair of `g` and `usemtl` gets the next number from 0 as its first face appears, if there are
-//           several. Feature edges: lines `l`.
+//           several. Feature edges: lines `l`. Attributes: `color` of vertices, from three numbers behind the
+//           coordinates of all of them; `texcoord` from `vt`, of vertices if each has only one, else of corners (0 0
+//           where there is none). Normals, those of the input's facets, are ignored.
 //   .ply    text and binary; faces and `tristrips`. Labels: the face property `label` of any integer type (from 2^31 on
-//           they wrap around). Feature edges: `vertex1 vertex2` of the element `edge`.
+//           they wrap around). Feature edges: `vertex1 vertex2` of the element `edge`. Attributes: all other scalar
+//           properties of vertices and faces, of which red, green, blue (and alpha) one after the other become
+//           `color`, nx, ny, nz `normal`, u, v or s, t `texcoord`, and NAME_0, NAME_1, ... NAME; and the faces' list
+//           `texcoord`, of corners.
 //   .stl    text and binary. Labels: solids of different names, if there are several.
 //   .3mf    objects as built, with their transforms. Labels: each pair of an object in the build and a material or
 //           colour, if there are several. `unit` is that of the file.
 //   .vtp    one piece: ASCII, base64, raw, zlib-compressed or not; polygons and strips. Labels: cell data `label` or
-//           what else read_tet_mesh takes. Feature edges: lines.
+//           what else read_tet_mesh takes. Feature edges: lines. Attributes: other point and cell data.
 //   others  those of read_tet_mesh, without tetrahedra.
 // Where all names of groups, solids or materials are label_K, as write_mesh calls them, or region_K or branch_K, labels
 // are these numbers; else they have the file's names. Feature edges are ascending, each once and with the lower vertex
@@ -75,9 +85,10 @@ struct WriteOptions {
 // glTF hold floats. Labels become the face property `int label` in PLY, groups in OBJ, materials in 3MF and glTF,
 // solids of an ASCII file in STL if the mesh has names for them (else it is binary), cell data in VTP, and what
 // write_tet_mesh makes of them; feature edges the element `edge` in PLY, lines in OBJ if asked for and in VTP; OFF
-// holds neither. The file appears under its name only when complete. Throws Error, also for coordinates that are not
-// finite or beyond the format's range, indices out of range, labels that are not one per triangle and labels without a
-// name or colour among those given.
+// holds neither. Attributes become what read_mesh reads, as far as lost_attributes says; glTF has colours, normals and
+// texture coordinates, with a vertex for each of several of these at one place. The file appears under its name only
+// when complete. Throws Error, also for coordinates that are not finite or beyond the format's range, indices out of
+// range, labels that are not one per triangle and labels without a name or colour among those given.
 BISECTOR_API void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options = {});
 
 // A mesh of polygons with one integer label and one colour each.
@@ -157,6 +168,7 @@ BISECTOR_API bool is_tet_format(const std::string& path);
 // other formats and versions, NaN or infinite coordinates and those beyond 1e100, an index out of range, a repeated
 // corner, and elements that are curved or neither tetrahedra, triangles, edges nor points. Memory is bounded by the
 // file's size.
+// Attributes are what else VTK's files have of points and tetrahedra.
 BISECTOR_API TetMesh read_tet_mesh(const std::string& path, const Context& context = {});
 
 // Writes Medit .mesh (ASCII) or .meshb (binary, version 2, beyond 2 GiB 3 or 4), Gmsh .msh (4.1, ASCII) or .vtu

@@ -28,6 +28,21 @@ using Triangle = std::array<Index, 3>;
 // What labels are called, where a file or a caller names them: "inlet", "steel". A label may lack a name.
 using LabelNames = std::map<std::int32_t, std::string>;
 
+// Numbers of each vertex, triangle or corner of a mesh, under a name: a temperature, a colour, texture coordinates.
+struct Attribute {
+  // Elements are the triangles of a TriangleMesh and the tetrahedra of a TetMesh; a corner is one of three of each
+  // triangle.
+  enum class Site { vertex, element, corner };
+  // Of the numbers in files. Integers beyond 2^53 lose digits.
+  enum class Type { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
+
+  std::string name;
+  Site site = Site::vertex;
+  Type type = Type::float64;
+  std::size_t components = 1;
+  std::vector<double> values = {};  // `components` of the first vertex, element or corner, those of the next one, ...
+};
+
 // Triangles over shared vertices. Any soup is valid: open, non-manifold, with zero-area triangles.
 struct TriangleMesh {
   std::vector<Vec3> vertices;
@@ -39,6 +54,12 @@ struct TriangleMesh {
   std::vector<std::array<Index, 2>> feature_edges = {};
   LabelNames label_names = {};
   double unit = 0;  // of the coordinates, in metres; 0: not known
+  // What a caller or a file brings; results have those that carry_attributes (attributes.h) gives them.
+  std::vector<Attribute> attributes = {};
+  // What materials or textures are in, as files name them: `mtllib` of OBJ, `TextureFile` of PLY.
+  std::vector<std::string> material_files = {};
+  // OBJ: the materials of the labels in these files; without labels that of 0 is that of all triangles.
+  LabelNames label_materials = {};
 };
 
 using Tetrahedron = std::array<Index, 4>;
@@ -53,6 +74,7 @@ struct TetMesh {
   std::vector<std::int32_t> boundary_labels = {};        // of each marked triangle, or empty
   std::vector<std::array<Index, 2>> feature_edges = {};  // edges marked as features
   LabelNames region_names = {}, label_names = {};
+  std::vector<Attribute> attributes = {};  // of vertices and tetrahedra
 };
 
 // Compressed sparse rows: row i is values[offsets[i] .. offsets[i + 1]).

@@ -29,8 +29,8 @@ struct WeldResult {
 // border edge is split at vertices of other borders that lie within the tolerance of its inside, if a border runs along
 // it there and no triangle turns over.
 //
-// Vertices and triangles keep their order; labels, face_of_triangle and feature_edges follow. Throws Error if the
-// tolerance is negative or not finite.
+// Vertices and triangles keep their order; labels, face_of_triangle and feature_edges follow, attributes do not. Throws
+// Error if the tolerance is negative or not finite.
 BISECTOR_API WeldResult weld(const TriangleMesh& mesh, double tolerance);
 
 // Turns triangles over so that neighbours across edges of two triangles run in opposite directions there, wherever that

@@ -25,6 +25,14 @@ class MeshArrays(Structure):
         ("labels", c_void_p), ("label_count", c_size_t),
         ("regions", c_void_p), ("region_count", c_size_t),
         ("feature_edges", c_void_p), ("edge_count", c_size_t),
+        ("attributes", c_void_p), ("attribute_count", c_size_t),
+    ]
+
+
+class Attribute(Structure):
+    _fields_ = [
+        ("name", c_char_p), ("site", c_int32), ("number", c_int32), ("components", c_size_t),
+        ("values", c_void_p), ("count", c_size_t),
     ]
 
 
@@ -69,6 +77,8 @@ _SIGNATURES: "dict[str, list[Any]]" = {
     "cancel_free": [c_void_p],
     "run": [c_void_p, c_void_p, POINTER(Callbacks), POINTER(c_void_p)],
     "result_array": [c_void_p, c_char_p, POINTER(Array)],
+    "result_attribute_count": [c_void_p, POINTER(c_size_t)],
+    "result_attribute": [c_void_p, c_size_t, POINTER(Attribute)],
     "result_report": [c_void_p, POINTER(Callbacks), POINTER(c_char_p)],
     "result_save": [c_void_p, c_char_p, c_char_p, POINTER(Callbacks)],
     "result_free": [c_void_p],

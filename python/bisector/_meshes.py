@@ -5,17 +5,64 @@ from __future__ import annotations
 import ctypes
 import os
 from ctypes import byref
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from ._errors import Error
-from ._library import Handle, MeshArrays, path_bytes
+from ._library import Attribute, Handle, MeshArrays, path_bytes
+
+VERTEX, ELEMENT, CORNER = range(3)  # sites of attributes
+NUMBERS = ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64")
 
 Points = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
+
+
+@dataclass
+class Data:
+    """Numbers of each vertex, face, tetrahedron or corner of a face."""
+
+    name: str
+    site: int
+    values: npt.NDArray[Any]  # (n,) or (n, k)
+
+
+def data_of(name: str, site: int, values: Any) -> Optional[Data]:
+    """None for what is no numbers."""
+    array = np.asarray(values)
+    if array.dtype.kind == "b":
+        array = array.astype(np.uint8)
+    elif array.dtype.kind == "f" and array.dtype.itemsize not in (4, 8):
+        array = array.astype(np.float32 if array.dtype.itemsize < 4 else np.float64)
+    if array.dtype.name not in NUMBERS or array.ndim == 0 or array.size == 0:
+        return None
+    array = array.reshape(array.shape[0], -1) if array.ndim > 2 else array
+    return Data(name, site, array)
+
+
+def all_data(named: Any, site: int, *others: str) -> "list[Data]":
+    """Of all numbers in a mapping but those called as others."""
+    data = [data_of(str(name), site, named[name]) for name in named.keys() if name not in others]
+    return [item for item in data if item is not None]
+
+
+def _given_data(what: str, site: int, named: Any) -> "list[Data]":
+    """Of a caller's dict, where all are numbers."""
+    data = []
+    for name, values in ({} if named is None else named).items():
+        if site == CORNER:
+            values = np.asarray(values)
+            if values.ndim < 2 or values.shape[1] != 3:
+                raise Error(f"{what}['{name}']: the shape {values.shape} is neither (m, 3) nor (m, 3, k)")
+            values = values.reshape(values.shape[0] * 3, -1)
+        item = data_of(str(name), site, values)
+        if item is None:
+            raise Error(f"{what}['{name}']: these are no numbers; give an array of them")
+        data.append(item)
+    return data
 
 
 @dataclass
@@ -29,6 +76,7 @@ class Arrays:
     labels: Optional[Indices] = None    # (m,)
     regions: Optional[Indices] = None   # (t,)
     feature_edges: Optional[Indices] = None  # (k, 2)
+    data: "list[Data]" = field(default_factory=list)
 
 
 def points(values: Any, name: str) -> Points:
@@ -113,6 +161,9 @@ def _from_pyvista(mesh: Any) -> Arrays:
     arrays = Arrays(vertices, corners, offsets)
     if "label" in mesh.cell_data and len(offsets) - 1 == mesh.n_cells:
         arrays.labels = indices(mesh.cell_data["label"], 0, "cell_data['label']")
+    arrays.data = all_data(getattr(mesh, "point_data", {}), VERTEX)
+    if len(offsets) - 1 == mesh.n_cells:
+        arrays.data += all_data(mesh.cell_data, ELEMENT, "label")
     return arrays
 
 
@@ -137,6 +188,9 @@ def _from_grid(mesh: Any) -> Arrays:
         arrays.labels = indices(np.asarray(mesh.cell_data["label"])[~tets], 0, "cell_data['label']")
     if tets.any() and "region" in mesh.cell_data:
         arrays.regions = indices(np.asarray(mesh.cell_data["region"])[tets], 0, "cell_data['region']")
+    chosen = tets if tets.any() else ~tets
+    arrays.data = all_data(getattr(mesh, "point_data", {}), VERTEX) + all_data(
+        {name: np.asarray(mesh.cell_data[name])[chosen] for name in mesh.cell_data.keys()}, ELEMENT, "label", "region")
     return arrays
 
 
@@ -180,6 +234,31 @@ def _from_meshio(mesh: Any) -> Arrays:
             arrays.labels = np.concatenate(labels).astype(np.int64)
         if tets and any(np.any(mark) for mark in regions):
             arrays.regions = np.concatenate(regions).astype(np.int64)
+    elements = [number for number, block in enumerate(mesh.cells)
+                if (block.type == "tetra" if tets else block.type not in ("line", "vertex"))]
+    arrays.data = all_data(getattr(mesh, "point_data", {}), VERTEX) + all_data(
+        {name: np.concatenate([np.asarray(blocks[number]) for number in elements])
+         for name, blocks in mesh.cell_data.items() if name != marks and elements}, ELEMENT)
+    return arrays
+
+
+def _from_faces(mesh: Any) -> Arrays:
+    """Of a trimesh.Trimesh, a result or what else has vertices and faces."""
+    arrays = replace(_ragged(mesh.faces), vertices=points(mesh.vertices, "vertices"))
+    arrays.data = all_data(getattr(mesh, "vertex_attributes", {}), VERTEX) + all_data(
+        getattr(mesh, "face_attributes", {}), ELEMENT, "label")
+    arrays.data += _given_data("vertex_data", VERTEX, getattr(mesh, "vertex_data", None))
+    arrays.data += _given_data("face_data", ELEMENT, getattr(mesh, "face_data", None))
+    arrays.data += _given_data("corner_data", CORNER, getattr(mesh, "corner_data", None))
+    visual = getattr(mesh, "visual", None)
+    for name, values in (("color", visual.vertex_colors if getattr(visual, "kind", None) == "vertex" else None),
+                         ("texcoord", getattr(visual, "uv", None))):
+        item = None if values is None else data_of(name, VERTEX, values)
+        if item is not None:
+            arrays.data.append(item)
+    label = getattr(mesh, "face_attributes", {}).get("label")
+    if label is not None:
+        arrays.labels = indices(label, 0, "face_attributes['label']")
     return arrays
 
 
@@ -195,9 +274,11 @@ def arrays_of(mesh: Any) -> Arrays:
     if hasattr(mesh, "points") and hasattr(mesh, "celltypes"):
         return _from_grid(mesh)
     if hasattr(mesh, "vertices") and hasattr(mesh, "tets"):
-        return Arrays(points(mesh.vertices, "vertices"), tets=indices(mesh.tets, 4, "tets"))
+        return Arrays(points(mesh.vertices, "vertices"), tets=indices(mesh.tets, 4, "tets"),
+                      data=_given_data("vertex_data", VERTEX, getattr(mesh, "vertex_data", None)) +
+                      _given_data("cell_data", ELEMENT, getattr(mesh, "cell_data", None)))
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        return replace(_ragged(mesh.faces), vertices=points(mesh.vertices, "vertices"))
+        return _from_faces(mesh)
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return replace(_ragged(mesh[1]), vertices=points(mesh[0], "vertices"))
     raise Error(f"a {type(mesh).__name__} is no mesh; give the path of a file, (vertices, faces), or a mesh of trimesh, "
@@ -211,12 +292,21 @@ def _address(array: Optional[npt.NDArray[Any]]) -> Optional[int]:
     return None if array is None or array.size == 0 else array.ctypes.data
 
 
-def mesh_handle(mesh: MeshLike, labels: Any = None, feature_edges: Any = None) -> Handle:
+def mesh_handle(mesh: MeshLike, labels: Any = None, feature_edges: Any = None, vertex_data: Any = None,
+                face_data: Any = None, corner_data: Any = None, cell_data: Any = None) -> Handle:
+    extra = {"labels": labels, "feature_edges": feature_edges, "vertex_data": vertex_data, "face_data": face_data,
+             "corner_data": corner_data, "cell_data": cell_data}
     if isinstance(mesh, (str, os.PathLike)):
-        if labels is not None or feature_edges is not None:
-            raise Error("labels and feature_edges belong to a mesh in memory; a file has its own")
+        if any(value is not None for value in extra.values()):
+            raise Error("labels, feature_edges and data belong to a mesh in memory; a file has its own")
         return Handle.made_by("mesh", "mesh_from_file", path_bytes(mesh))
     arrays = replace(arrays_of(mesh))
+    if cell_data is not None and arrays.tets is None or face_data is not None and arrays.tets is not None:
+        raise Error("cell_data are of tetrahedra, face_data of surfaces; give those that fit the mesh")
+    given = (_given_data("vertex_data", VERTEX, vertex_data) + _given_data("face_data", ELEMENT, face_data) +
+             _given_data("corner_data", CORNER, corner_data) + _given_data("cell_data", ELEMENT, cell_data))
+    names = {(item.name, item.site) for item in given}
+    arrays.data = [item for item in arrays.data if (item.name, item.site) not in names] + given
     if labels is not None:
         arrays.labels = indices(labels, 0, "labels")
     if feature_edges is not None:
@@ -241,9 +331,11 @@ def tet_arrays(mesh: Any) -> Arrays:
     return arrays_of(mesh)
 
 
-def tets_handle(mesh: MeshLike, labels: Any = None, feature_edges: Any = None) -> Handle:
+def tets_handle(mesh: MeshLike, labels: Any = None, feature_edges: Any = None, vertex_data: Any = None,
+                cell_data: Any = None) -> Handle:
     """Like mesh_handle, of what tet_arrays takes."""
-    return mesh_handle(mesh if isinstance(mesh, (str, os.PathLike)) else tet_arrays(mesh), labels, feature_edges)
+    return mesh_handle(mesh if isinstance(mesh, (str, os.PathLike)) else tet_arrays(mesh), labels, feature_edges,
+                       vertex_data, cell_data=cell_data)
 
 
 def arrays_handle(arrays: Arrays) -> Handle:
@@ -262,4 +354,11 @@ def arrays_handle(arrays: Arrays) -> Handle:
         array = getattr(arrays, name)
         setattr(given, name, _address(array))
         setattr(given, count, 0 if array is None else len(array))
+    values = [np.ascontiguousarray(item.values, dtype=np.float64) for item in arrays.data]
+    attributes = (Attribute * max(1, len(values)))()
+    for to, item, array in zip(attributes, arrays.data, values):
+        to.name, to.site, to.number = item.name.encode(), item.site, NUMBERS.index(item.values.dtype.name)
+        to.components = array.shape[1] if array.ndim == 2 else 1
+        to.values, to.count = _address(array), array.size
+    given.attributes, given.attribute_count = ctypes.addressof(attributes), len(values)
     return Handle.made_by("mesh", "mesh_from_arrays", byref(given))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any, Optional, Union
+from typing import Any, Mapping, Optional, Union
 
 import numpy as np
 
@@ -79,8 +79,12 @@ def remesh(
     precision: Optional[str] = None,
     neighbors: Optional[str] = None,
     threads: Optional[int] = None,
+    map: bool = False,
     labels: Any = None,
     feature_edges: Any = None,
+    vertex_data: "Optional[Mapping[str, Any]]" = None,
+    face_data: "Optional[Mapping[str, Any]]" = None,
+    corner_data: "Optional[Mapping[str, Any]]" = None,
     progress: Optional[ProgressCallback] = None,
 ) -> RemeshResult:
     """A high-quality triangle mesh of a surface, of n vertices or of a mean edge length.
@@ -92,19 +96,25 @@ def remesh(
     -1/4. `labels` is (m,), a number for each face of a mesh in memory, and `feature_edges` (k, 2), edges of it to keep.
     `keep_vertices` and `keep_faces` are indices of what stays as it is, or files of them.
 
+    Numbers of vertices, faces and their corners come with the mesh or in `vertex_data`, `face_data` and `corner_data`,
+    dicts of arrays of n, m or (m, 3) rows by name, and are those of the result at the same place (docs/cli.md,
+    "Attributes"). `map` asks for where on the input each vertex of the result is.
+
     `progress` is called with a Progress now and then. Ctrl-C, or an exception in `progress`, ends the run within about
     a second. Raises Error for bad input and options, DeviceError if the device asked for is missing or fails, and
     MemoryError; warns with BisectorWarning.
     """
     given = locals()
-    words = _words(given, "mesh", "seeds", "density", "labels", "feature_edges", "progress")
+    words = _words(given, "mesh", "seeds", "density", "labels", "feature_edges", "progress", "vertex_data", "face_data",
+                   "corner_data")
     arrays = {name: words.pop(name) for name in ("keep_vertices", "keep_faces")
               if words[name] is not None and not _is_word(words[name])}
     options = _options("remesh", words, seeds, density)
     for name, kept in arrays.items():
         array = _meshes.indices(kept, 0, name)
         call(f"options_{name}", options.value, array.ctypes.data, len(array))
-    return RemeshResult(_run(options, _meshes.mesh_handle(mesh, labels, feature_edges), progress))
+    return RemeshResult(_run(options, _meshes.mesh_handle(mesh, labels, feature_edges, vertex_data, face_data, corner_data),
+                             progress))
 
 
 def tetrahedralize(
@@ -135,6 +145,8 @@ def tetrahedralize(
     threads: Optional[int] = None,
     labels: Any = None,
     feature_edges: Any = None,
+    vertex_data: "Optional[Mapping[str, Any]]" = None,
+    cell_data: "Optional[Mapping[str, Any]]" = None,
     progress: Optional[ProgressCallback] = None,
 ) -> TetResult:
     """A high-quality tetrahedral mesh of a solid, of about n vertices or of a mean edge length.
@@ -143,17 +155,21 @@ def tetrahedralize(
     tets (t, 4), a TetResult, or a meshio.Mesh. `sizes` are edge lengths: one for each vertex of the mesh, a pair of
     points (k, 3) and lengths (k,), or a file, "FILE:NAME". A density makes edges as long as its power -1/5. The rest,
     what is raised and what is warned of are as for remesh(). Surfaces are filled by TetGen.
+
+    Numbers of vertices and tetrahedra come with the mesh or in `vertex_data` and `cell_data`, and are those of the
+    result at the same place; of a surface vertices inside have those of the nearest point of it.
     """
     given = locals()
     options = _options(
-        "tet", _words(given, "mesh", "seeds", "density", "sizes", "labels", "feature_edges", "progress"), seeds, density)
+        "tet", _words(given, "mesh", "seeds", "density", "sizes", "labels", "feature_edges", "vertex_data", "cell_data",
+                      "progress"), seeds, density)
     if sizes is not None and _is_word(sizes):
         set_options(options, "tet", {"sizes": sizes})
     elif sizes is not None:
         places, lengths, tets = _sizes(mesh, sizes)
         call("options_sizes", options.value, places.ctypes.data, lengths.ctypes.data, len(lengths),
              None if tets is None else tets.ctypes.data, 0 if tets is None else len(tets))
-    return TetResult(_run(options, _meshes.tets_handle(mesh, labels, feature_edges), progress))
+    return TetResult(_run(options, _meshes.tets_handle(mesh, labels, feature_edges, vertex_data, cell_data), progress))
 
 
 def _sizes(mesh: Any, sizes: Any) -> "tuple[Any, Any, Any]":

@@ -11,7 +11,8 @@ from typing import Any, Optional
 import numpy as np
 import numpy.typing as npt
 
-from ._library import Array, Handle, call, path_bytes, text
+from ._library import Array, Attribute, Handle, call, path_bytes, text
+from ._meshes import CORNER, ELEMENT, NUMBERS, VERTEX
 from ._run import interruptible
 
 _TYPES = (np.dtype(np.float64), np.dtype(np.uint32), np.dtype(np.int32))
@@ -75,6 +76,37 @@ class Result:
         interruptible(lambda callbacks: call("result_save", handle.value, what.encode(), name, callbacks))
 
 
+class _WithData(Result):
+    """Results that have the attributes of their input."""
+
+    def __init__(self, handle: Handle) -> None:
+        super().__init__(handle)
+        self._data: "Optional[dict[int, dict[str, npt.NDArray[Any]]]]" = None
+
+    def _all_data(self, site: int) -> "dict[str, npt.NDArray[Any]]":
+        if self._data is None:
+            data: "dict[int, dict[str, npt.NDArray[Any]]]" = {VERTEX: {}, ELEMENT: {}, CORNER: {}}
+            count, at = ctypes.c_size_t(), Attribute()
+            call("result_attribute_count", self._handle.value, byref(count))
+            for index in range(count.value):
+                call("result_attribute", self._handle.value, index, byref(at))
+                values = np.zeros(0)
+                if at.count:
+                    buffer = (ctypes.c_double * at.count).from_address(at.values)
+                    values = np.frombuffer(buffer, dtype=np.float64).astype(NUMBERS[at.number])
+                shape = ((-1, 3) if at.site == CORNER else (-1,)) + ((at.components,) if at.components > 1 else ())
+                values = values.reshape(shape)
+                values.flags.writeable = False
+                data[at.site][at.name.decode("utf-8", "replace")] = values
+            self._data = data
+        return dict(self._data[site])
+
+    @property
+    def vertex_data(self) -> "dict[str, npt.NDArray[Any]]":
+        """The numbers of the input's vertices, by name, at those of the result: (n,) or (n, k), of the input's type."""
+        return self._all_data(VERTEX)
+
+
 class SurfaceResult(Result):
     """Triangles."""
 
@@ -107,21 +139,34 @@ class SurfaceResult(Result):
     def _cells(self) -> "list[tuple[str, npt.NDArray[np.int64]]]":
         return [("triangle", self.faces)]
 
-    def _cell_data(self) -> "dict[str, list[npt.NDArray[np.int64]]]":
+    def _cell_data(self) -> "dict[str, list[npt.NDArray[Any]]]":
         return {} if self.labels is None else {"label": [self.labels]}
 
+    def _point_data(self) -> "dict[str, npt.NDArray[Any]]":
+        return {}
+
+    def _face_data(self) -> "dict[str, npt.NDArray[Any]]":
+        return {}
+
     def to_meshio(self) -> Any:
-        """A meshio.Mesh, with the labels as cell data."""
+        """A meshio.Mesh, with labels and data."""
         import meshio
 
-        return meshio.Mesh(self.vertices.copy(), self._cells(), cell_data=self._cell_data())
+        return meshio.Mesh(self.vertices.copy(), self._cells(), point_data=self._point_data(),
+                           cell_data=self._cell_data())
 
     def to_trimesh(self) -> Any:
-        """A trimesh.Trimesh with the same vertices and faces; labels are its face attribute `label`."""
+        """A trimesh.Trimesh with the same vertices and faces, with data and colours; labels are its face attribute
+        `label`."""
         import trimesh
 
-        attributes = {} if self.labels is None else {"label": self.labels.copy()}
-        return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), face_attributes=attributes, process=False)
+        attributes = self._face_data()
+        if self.labels is not None:
+            attributes["label"] = self.labels.copy()
+        points = self._point_data()
+        colours = points.pop("color", None)
+        return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), face_attributes=attributes,
+                               vertex_attributes=points, vertex_colors=colours, process=False)
 
     def to_pyvista(self) -> Any:
         """A pyvista.PolyData, with the labels as cell data."""
@@ -131,11 +176,51 @@ class SurfaceResult(Result):
         mesh = pyvista.PolyData(self.vertices.copy(), np.hstack([threes, self.faces]).reshape(-1))
         if self.labels is not None:
             mesh.cell_data["label"] = self.labels.copy()
+        _add_data(mesh, self._point_data(), self._face_data())
         return mesh
 
 
-class RemeshResult(SurfaceResult):
-    """A remeshed surface; labels are those of the input at the same place."""
+def _copies(data: "dict[str, npt.NDArray[Any]]") -> "dict[str, npt.NDArray[Any]]":
+    return {name: values.copy() for name, values in data.items()}
+
+
+def _add_data(mesh: Any, points: "dict[str, npt.NDArray[Any]]", cells: "dict[str, npt.NDArray[Any]]") -> None:
+    for to, data in ((mesh.point_data, points), (mesh.cell_data, cells)):
+        for name, values in data.items():
+            to[name] = values
+
+
+class RemeshResult(SurfaceResult, _WithData):
+    """A remeshed surface; labels and data are those of the input at the same place."""
+
+    @property
+    def face_data(self) -> "dict[str, npt.NDArray[Any]]":
+        """The numbers of the input's faces, by name: (m,) or (m, k)."""
+        return self._all_data(ELEMENT)
+
+    @property
+    def corner_data(self) -> "dict[str, npt.NDArray[Any]]":
+        """Those of the corners of its faces, as texture coordinates: (m, 3) or (m, 3, k)."""
+        return self._all_data(CORNER)
+
+    @property
+    def map(self) -> "tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]":
+        """With `map=True`: the face of the input that each vertex is on (n,), and the weights of the corners of a
+        triangle of that face there (n, 3)."""
+        return self._array("map_faces"), self._array("map_weights")
+
+    def save_map(self, path: "str | os.PathLike[str]") -> None:
+        """With `map=True`: writes lines of a face, three of its vertices and their weights, for each vertex."""
+        self._save(path, "map")
+
+    def _point_data(self) -> "dict[str, npt.NDArray[Any]]":
+        return _copies(self.vertex_data)
+
+    def _face_data(self) -> "dict[str, npt.NDArray[Any]]":
+        return _copies(self.face_data)
+
+    def _cell_data(self) -> "dict[str, list[npt.NDArray[Any]]]":
+        return {**super()._cell_data(), **{name: [values] for name, values in self._face_data().items()}}
 
     @property
     def kept(self) -> npt.NDArray[np.int64]:
@@ -153,8 +238,16 @@ class RemeshResult(SurfaceResult):
         self._save(path, "feature-output")
 
 
-class TetResult(SurfaceResult):
+class TetResult(SurfaceResult, _WithData):
     """Tetrahedra. `faces` are the triangles of the boundary, and `labels` theirs; boundary vertices come first."""
+
+    @property
+    def cell_data(self) -> "dict[str, npt.NDArray[Any]]":
+        """The numbers of the input's tetrahedra, by name: (t,) or (t, k)."""
+        return self._all_data(ELEMENT)
+
+    def _point_data(self) -> "dict[str, npt.NDArray[Any]]":
+        return _copies(self.vertex_data)
 
     @property
     def tets(self) -> npt.NDArray[np.int64]:
@@ -178,12 +271,16 @@ class TetResult(SurfaceResult):
     def _cells(self) -> "list[tuple[str, npt.NDArray[np.int64]]]":
         return [("tetra", self.tets), ("triangle", self.faces)]
 
-    def _cell_data(self) -> "dict[str, list[npt.NDArray[np.int64]]]":
+    def _cell_data(self) -> "dict[str, list[npt.NDArray[Any]]]":
+        data = {}
+        for name, values in self.cell_data.items():  # triangles have none
+            none = np.nan if values.dtype.kind == "f" else 0
+            data[name] = [values.copy(), np.full((len(self.faces), *values.shape[1:]), none, values.dtype)]
         if self.labels is None and self.regions is None:
-            return {}
+            return data
         regions = np.zeros(len(self.tets), np.int64) if self.regions is None else self.regions
         labels = np.zeros(len(self.faces), np.int64) if self.labels is None else self.labels
-        return {"label": [regions, labels]}
+        return {"label": [regions, labels], **data}
 
     def to_trimesh(self) -> Any:
         """The boundary as a trimesh.Trimesh, over all vertices."""
@@ -198,6 +295,7 @@ class TetResult(SurfaceResult):
         grid = pyvista.UnstructuredGrid(np.hstack([fours, self.tets]).reshape(-1), kinds, self.vertices.copy())
         if self.regions is not None:
             grid.cell_data["region"] = self.regions.copy()
+        _add_data(grid, self._point_data(), _copies(self.cell_data))
         return grid
 
 

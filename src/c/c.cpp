@@ -1,5 +1,6 @@
 #include "bisector/c.h"
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -496,6 +497,30 @@ bisector_status bisector_result_array(const bisector_result* result, const char*
     if (found == object->arrays.end())
       throw bisector::Error("a result of " + std::string(object->job->command()) + " has no array '" + name + "'");
     *array = {found->rows > 0 ? found->data : nullptr, type_of(found->type), found->rows, found->columns};
+  });
+}
+
+bisector_status bisector_result_attribute_count(const bisector_result* result, size_t* count) {
+  return guarded([&] {
+    const std::shared_ptr<Result> object = result_of(result);
+    require(count, "count");
+    *count = object->job->attributes().size();
+  });
+}
+
+bisector_status bisector_result_attribute(const bisector_result* result, size_t index, bisector_attribute* attribute) {
+  return guarded([&] {
+    const std::shared_ptr<Result> object = result_of(result);
+    require(attribute, "attribute");
+    const std::vector<bisector::Attribute>& all = object->job->attributes();
+    if (index >= all.size()) throw bisector::Error(fmt::format("there is no attribute {}, but {}", index, all.size()));
+    const bisector::Attribute& found = all[index];
+    *attribute = {found.name.c_str(),
+                  static_cast<std::int32_t>(found.site),
+                  static_cast<std::int32_t>(found.type),
+                  found.components,
+                  found.values.data(),
+                  found.values.size()};
   });
 }
 

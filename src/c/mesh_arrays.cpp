@@ -77,6 +77,35 @@ std::vector<Triangle> triangles_of(const Csr<Index>& faces) {
   return triangles;
 }
 
+std::vector<Attribute> attributes_of(const bisector_mesh_arrays& arrays, const Csr<Index>& faces) {
+  require(arrays.attributes, arrays.attribute_count, "attributes");
+  std::vector<Attribute> attributes;
+  for (std::size_t i = 0; i < arrays.attribute_count; ++i) {
+    const bisector_attribute& given = arrays.attributes[i];
+    if (!given.name || !*given.name) throw Misuse(fmt::format("attribute {} has no name", i));
+    require(given.values, given.count, given.name);
+    const bool solid = arrays.tet_count > 0;
+    std::size_t sites = 0;
+    switch (given.site) {
+      case BISECTOR_VERTEX: sites = arrays.vertex_count; break;
+      case BISECTOR_ELEMENT: sites = solid ? arrays.tet_count : faces.rows(); break;
+      case BISECTOR_CORNER: sites = solid ? 0 : faces.values.size(); break;
+      default: throw Misuse(fmt::format("attribute '{}': {} is no bisector_site", given.name, given.site));
+    }
+    if (given.number < BISECTOR_NUMBER_INT8 || given.number > BISECTOR_NUMBER_FLOAT64)
+      throw Misuse(fmt::format("attribute '{}': {} is no bisector_number", given.name, given.number));
+    if (given.components == 0 || given.count != given.components * sites)
+      throw Error(fmt::format("{}: attribute '{}' has {} values, where {} places have {} each; give as many", kName,
+                              given.name, given.count, sites, given.components));
+    attributes.push_back({given.name,
+                          static_cast<Attribute::Site>(given.site),
+                          static_cast<Attribute::Type>(given.number),
+                          given.components,
+                          {given.values, given.values + given.count}});
+  }
+  return attributes;
+}
+
 }  // namespace
 
 std::vector<Vec3> points_of(const char* what, const double* points, std::size_t count) {
@@ -118,14 +147,17 @@ std::shared_ptr<const job::GivenMesh> mesh_of(const bisector_mesh_arrays& arrays
   auto labels = marks_of("labels", arrays.labels, arrays.label_count, faces.rows(), "faces");
   auto edges = rows_of<2>("feature edge", arrays.feature_edges, arrays.edge_count, n);
   auto regions = marks_of("regions", arrays.regions, arrays.region_count, arrays.tet_count, "tetrahedra");
+  auto attributes = attributes_of(arrays, faces);
   if (arrays.tet_count > 0) {
-    mesh->tets = io::mesh_of(kName,
-                             {std::move(vertices), rows_of<4>("tetrahedron", arrays.tets, arrays.tet_count, n),
-                              triangles_of(faces), std::move(edges), std::move(regions), std::move(labels)},
-                             context);
+    io::TetSoup soup{std::move(vertices), rows_of<4>("tetrahedron", arrays.tets, arrays.tet_count, n),
+                     triangles_of(faces), std::move(edges),
+                     std::move(regions),  std::move(labels)};
+    soup.attributes = std::move(attributes);
+    mesh->tets = io::mesh_of(kName, std::move(soup), context);
   } else if (faces.rows() > 0) {
-    mesh->surface =
-        io::mesh_of(kName, {std::move(vertices), std::move(faces), std::move(labels), std::move(edges), ""}, context);
+    io::Soup soup{std::move(vertices), std::move(faces), std::move(labels), std::move(edges), ""};
+    soup.attributes = std::move(attributes);
+    mesh->surface = io::mesh_of(kName, std::move(soup), context);
   } else {
     mesh->points = std::move(vertices);
   }

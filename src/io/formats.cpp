@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "bisector/attributes.h"
+
 namespace bisector {
 
 using namespace io;
@@ -10,19 +12,37 @@ namespace {
 
 using Labels = FileFormat::Labels;
 
+using Site = Attribute::Site;
+
+bool is_shown(const Attribute& attribute) {
+  const AttributeMeaning meaning = meaning_of(attribute);
+  return meaning == AttributeMeaning::texture ||
+         (meaning == AttributeMeaning::colour && attribute.site == Site::vertex);
+}
+
+// What each format has places for.
+bool obj_holds(const Attribute& attribute) { return attribute.site != Site::element && is_shown(attribute); }
+bool ply_holds(const Attribute& attribute) {
+  return attribute.site != Site::corner || meaning_of(attribute) == AttributeMeaning::texture;
+}
+bool glb_holds(const Attribute& attribute) {
+  return obj_holds(attribute) || (attribute.site == Site::vertex && meaning_of(attribute) == AttributeMeaning::normal);
+}
+bool vtk_holds(const Attribute& attribute) { return attribute.site != Site::corner; }
+
 constexpr Format kFormats[] = {
-    {".off", Labels::none, read_off, nullptr, format_off, format_off},
-    {".obj", Labels::all, read_obj, nullptr, format_obj, format_obj},
-    {".ply", Labels::all, read_ply, nullptr, format_ply, format_ply},
-    {".stl", Labels::named, read_stl, nullptr, format_stl},
-    {".3mf", Labels::all, read_3mf, nullptr, format_3mf},
-    {".glb", Labels::all, nullptr, nullptr, format_glb},
-    {".vtp", Labels::all, read_vtp, nullptr, format_vtp, format_vtp},
-    {".mesh", Labels::all, nullptr, read_medit, nullptr, nullptr, format_medit},
-    {".meshb", Labels::all, nullptr, read_medit_binary, nullptr, nullptr, format_medit_binary},
-    {".msh", Labels::all, nullptr, read_gmsh, nullptr, nullptr, format_gmsh},
-    {".vtu", Labels::all, nullptr, read_vtu, nullptr, nullptr, format_vtu},
-    {".vtk", Labels::all, nullptr, read_vtk},
+    {".off", Labels::none, nullptr, read_off, nullptr, format_off, format_off},
+    {".obj", Labels::all, obj_holds, read_obj, nullptr, format_obj, format_obj},
+    {".ply", Labels::all, ply_holds, read_ply, nullptr, format_ply, format_ply},
+    {".stl", Labels::named, nullptr, read_stl, nullptr, format_stl},
+    {".3mf", Labels::all, nullptr, read_3mf, nullptr, format_3mf},
+    {".glb", Labels::all, glb_holds, nullptr, nullptr, format_glb},
+    {".vtp", Labels::all, vtk_holds, read_vtp, nullptr, format_vtp, format_vtp},
+    {".mesh", Labels::all, nullptr, nullptr, read_medit, nullptr, nullptr, format_medit},
+    {".meshb", Labels::all, nullptr, nullptr, read_medit_binary, nullptr, nullptr, format_medit_binary},
+    {".msh", Labels::all, nullptr, nullptr, read_gmsh, nullptr, nullptr, format_gmsh},
+    {".vtu", Labels::all, vtk_holds, nullptr, read_vtu, nullptr, nullptr, format_vtu},
+    {".vtk", Labels::all, nullptr, nullptr, read_vtk},
 };
 
 FileFormat told(const Format& format) {
@@ -53,6 +73,17 @@ std::vector<std::string> extensions_that(bool FileFormat::*use) {
   for (const FileFormat& format : file_formats())
     if (format.*use) extensions.emplace_back(format.extension);
   return extensions;
+}
+
+std::vector<std::string> lost_attributes(const std::string& path, const std::vector<Attribute>& attributes) {
+  const std::string extension = lower_extension(path);
+  bool (*holds)(const Attribute&) = nullptr;
+  for (const Format& format : kFormats)
+    if (format.extension == extension) holds = format.holds;
+  std::vector<std::string> lost;
+  for (const Attribute& attribute : attributes)
+    if (!holds || !holds(attribute)) lost.push_back(attribute.name);
+  return lost;
 }
 
 std::string listed(const std::vector<std::string>& names) {

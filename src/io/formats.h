@@ -14,6 +14,7 @@ namespace bisector::io {
 struct Format {
   std::string_view extension;  // in lower case, with the dot
   FileFormat::Labels labels;
+  bool (*holds)(const Attribute& attribute) = nullptr;  // null: none
   Soup (*read)(const std::string& path, std::string_view bytes) = nullptr;
   TetSoup (*read_tets)(const std::string& path, std::string_view bytes) = nullptr;
   std::string (*bytes_of)(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options) = nullptr;

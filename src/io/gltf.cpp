@@ -7,11 +7,13 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/colour.h"
+#include "io/attributes.h"
 #include "io/bytes.h"
 #include "io/colours.h"
 #include "io/labels.h"
@@ -30,7 +32,22 @@ constexpr std::uint32_t kMagic = 0x46546c67, kVersion = 2, kJsonChunk = 0x4e4f53
 class GlbWriter {
  public:
   GlbWriter(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options)
-      : path_(path), mesh_(mesh), options_(options) {}
+      : path_(path), mesh_(mesh), options_(options) {
+    const auto find = [&](Attribute::Site site, AttributeMeaning meaning) {
+      return find_attribute(mesh.attributes, site, meaning);
+    };
+    colours_ = find(Attribute::Site::vertex, AttributeMeaning::colour);
+    normals_ = find(Attribute::Site::vertex, AttributeMeaning::normal);
+    texture_ = find(Attribute::Site::corner, AttributeMeaning::texture);
+    if (texture_) {
+      table_ = tell_corners_apart(mesh, *texture_);
+      return;
+    }
+    texture_ = find(Attribute::Site::vertex, AttributeMeaning::texture);
+    table_.vertex.resize(mesh.vertices.size());
+    std::iota(table_.vertex.begin(), table_.vertex.end(), Index{0});
+    for (const Triangle& t : mesh.triangles) table_.index.insert(table_.index.end(), t.begin(), t.end());
+  }
 
   std::string write() {
     json_["asset"] = {{"version", "2.0"}, {"generator", "bisector"}};
@@ -41,6 +58,7 @@ class GlbWriter {
     if (mesh_.unit > 0 && mesh_.unit != 1) node["scale"] = {mesh_.unit, mesh_.unit, mesh_.unit};
     json_["nodes"] = Json::array({std::move(node)});
     add_positions();
+    add_attributes();
     add_triangles();
     json_["buffers"] = Json::array({{{"byteLength", buffer_.size()}}});
     return joined();
@@ -51,7 +69,7 @@ class GlbWriter {
     std::array<float, 3> low, high;
     low.fill(std::numeric_limits<float>::max());
     high.fill(std::numeric_limits<float>::lowest());
-    for (std::size_t v = 0; v < mesh_.vertices.size(); ++v)
+    for (const Index v : table_.vertex)
       for (std::size_t k = 0; k < 3; ++k) {
         const double x = mesh_.vertices[v][static_cast<int>(k)];
         if (std::abs(x) > std::numeric_limits<float>::max())
@@ -61,9 +79,39 @@ class GlbWriter {
         high[k] = std::max(high[k], rounded);
         append_bytes(buffer_, rounded);
       }
-    add_accessor(kFloat, "VEC3", mesh_.vertices.size(), 0, kArrayBuffer);
+    attributes_["POSITION"] = 0;
+    add_accessor(kFloat, "VEC3", table_.vertex.size(), 0, kArrayBuffer);
     json_["accessors"].back()["min"] = low;
     json_["accessors"].back()["max"] = high;
+  }
+
+  void add_attributes() {
+    const auto add_floats = [&](const char* name, const char* type, std::size_t components, const auto& value) {
+      const std::size_t start = buffer_.size();
+      for (std::size_t i = 0; i < table_.vertex.size(); ++i)
+        for (std::size_t c = 0; c < components; ++c) append_bytes(buffer_, static_cast<float>(value(i, c)));
+      attributes_[name] = json_["accessors"].size();
+      add_accessor(kFloat, type, table_.vertex.size(), start, kArrayBuffer);
+    };
+    if (normals_)
+      add_floats("NORMAL", "VEC3", 3,
+                 [&](std::size_t i, std::size_t c) { return normals_->values[3 * table_.vertex[i] + c]; });
+    if (texture_) {
+      const bool corners = texture_->site == Attribute::Site::corner;
+      // The origin of a picture is its upper left corner.
+      add_floats("TEXCOORD_0", "VEC2", 2, [&](std::size_t i, std::size_t c) {
+        const double x = texture_->values[2 * (corners ? table_.corner[i] : table_.vertex[i]) + c];
+        return c == 0 ? x : 1 - x;
+      });
+    }
+    if (!colours_) return;
+    // Colours are amounts of light.
+    const std::vector<std::uint8_t> bytes = colour_bytes(*colours_);
+    add_floats("COLOR_0", "VEC4", 4, [&](std::size_t i, std::size_t c) {
+      if (c >= colours_->components) return 1.0;
+      const std::uint8_t x = bytes[colours_->components * table_.vertex[i] + c];
+      return c == 3 ? x / 255.0 : light_of_srgb(x);
+    });
   }
 
   // A primitive for each label, all over the same vertices.
@@ -76,10 +124,9 @@ class GlbWriter {
     for (const auto& [label, triangles] : members) {
       const std::size_t start = buffer_.size();
       for (const std::size_t i : triangles)
-        for (const Index v : mesh_.triangles[i]) append_bytes(buffer_, v);
+        for (std::size_t k = 0; k < 3; ++k) append_bytes(buffer_, table_.index[3 * i + k]);
       add_accessor(kUnsignedInt, "SCALAR", 3 * triangles.size(), start, kElementArrayBuffer);
-      Json primitive{
-          {"attributes", {{"POSITION", 0}}}, {"indices", json_["accessors"].size() - 1}, {"mode", kTriangles}};
+      Json primitive{{"attributes", attributes_}, {"indices", json_["accessors"].size() - 1}, {"mode", kTriangles}};
       if (!names.empty()) {
         primitive["material"] = json_.contains("materials") ? json_["materials"].size() : 0;
         json_["materials"].push_back(material(label, names.at(label)));
@@ -132,7 +179,10 @@ class GlbWriter {
   const std::string& path_;
   const TriangleMesh& mesh_;
   const WriteOptions& options_;
+  const Attribute *colours_ = nullptr, *normals_ = nullptr, *texture_ = nullptr;
+  CornerTable table_;  // vertices with several texture coordinates are several
   Json json_;
+  Json attributes_;  // accessors of the vertices
   std::string buffer_;
 };
 

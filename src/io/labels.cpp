@@ -75,7 +75,12 @@ void GroupLabels::take(Soup& soup) {
   const bool all_told = names.size() == told.size() && std::all_of(names.begin(), names.end(), [&](const auto& entry) {
                           return parse_label(entry.second, told[static_cast<std::size_t>(entry.first)]);
                         });
-  if (all_told && std::set<std::int32_t>(told.begin(), told.end()).size() == told.size()) {
+  const bool renumbered = all_told && std::set<std::int32_t>(told.begin(), told.end()).size() == told.size();
+  if (!soup.material_files.empty())
+    for (const auto& [pair, number] : numbers_)
+      if (!pair.second.empty())
+        soup.label_materials[renumbered ? told[static_cast<std::size_t>(number)] : number] = pair.second;
+  if (renumbered) {
     for (std::int32_t& label : labels_) label = told[static_cast<std::size_t>(label)];
     names.clear();
   } else if (numbers_.size() < 2) {

@@ -35,7 +35,7 @@ class GroupLabels {
   void add_face();
   // Nothing if all faces have the same pair, unless its name tells a label. Where the names of all pairs do, and each
   // another one, these; else numbers from 0 by first face, with the name of the part, of the material or of both,
-  // whichever tells them apart.
+  // whichever tells them apart. Of files that name files of materials also the materials.
   void take(Soup& soup);
 
  private:

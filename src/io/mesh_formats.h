@@ -51,7 +51,10 @@ struct Soup {
   std::vector<std::array<Index, 2>> edges;  // whether or not they are edges of a face
   std::string ignored;                      // what follows the last face, if anything does
   LabelNames label_names = {};
-  double unit = 0;  // of the coordinates, in metres; 0: not known
+  double unit = 0;                         // of the coordinates, in metres; 0: not known
+  std::vector<Attribute> attributes = {};  // of vertices, faces and their corners
+  std::vector<std::string> material_files = {};
+  LabelNames label_materials = {};  // without labels that of label 0 is that of all faces
 
   void end_face() { faces.offsets.push_back(faces.values.size()); }
   std::size_t open_corners() const { return faces.values.size() - faces.offsets.back(); }

@@ -21,10 +21,12 @@
 
 #include "bisector/error.h"
 #include "core/degenerate.h"
+#include "io/attributes.h"
 #include "io/files.h"
 #include "io/formats.h"
 #include "io/mesh_formats.h"
 #include "io/text.h"
+#include "mesh/attribute_sizes.h"
 #include "mesh/polygon.h"
 
 namespace bisector {
@@ -238,7 +240,10 @@ TriangleMesh io::mesh_of(const std::string& path, Soup soup, const Context& cont
   mesh.vertices = std::move(soup.vertices);
   mesh.label_names = std::move(soup.label_names);
   mesh.unit = soup.unit;
+  mesh.material_files = std::move(soup.material_files);
+  mesh.label_materials = std::move(soup.label_materials);
   split_faces(path, soup, mesh, context);
+  split_attributes(soup, mesh);
   keep_mesh_edges(path, std::move(soup.edges), mesh, context);
   warn_of_leftovers(path, mesh, context);
   return mesh;
@@ -258,14 +263,17 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteOp
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.triangles.size())
     fail(path, fmt::format("{} labels for {} triangles; give one each", mesh.labels.size(), mesh.triangles.size()));
   check_label_names(path, mesh.labels, options);
+  check_attributes(mesh);
   for (const Edge& e : mesh.feature_edges)
     if (std::max(e[0], e[1]) >= mesh.vertices.size())
       fail(path, fmt::format("feature edge {} {} is out of range, the mesh has {} vertices; nothing was written", e[0],
                              e[1], mesh.vertices.size()));
   const Format& format = format_of(path, &FileFormat::writes_surfaces, "meshes");
   if (format.bytes_of) return write_file(path, format.bytes_of(path, mesh, options));
-  write_file(path, format.bytes_of_tets(
-                       {mesh.vertices, {}, {}, mesh.triangles, mesh.labels, mesh.feature_edges, {}, mesh.label_names}));
+  TetMesh marks{mesh.vertices, {}, {}, mesh.triangles, mesh.labels, mesh.feature_edges, {}, mesh.label_names};
+  std::copy_if(mesh.attributes.begin(), mesh.attributes.end(), std::back_inserter(marks.attributes),
+               [](const Attribute& attribute) { return attribute.site == Attribute::Site::vertex; });
+  write_file(path, format.bytes_of_tets(marks));
 }
 
 void write_polygons(const std::string& path, const PolygonMesh& mesh, const WriteOptions& options) {

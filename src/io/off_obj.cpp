@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -14,6 +14,7 @@
 
 #include "bisector/error.h"
 #include "bisector/io.h"
+#include "io/attributes.h"
 #include "io/bytes.h"
 #include "io/labels.h"
 #include "io/mesh_formats.h"
@@ -222,16 +223,109 @@ class OffBinary {
   std::size_t whole_;
 };
 
-// The vertex of a corner "v", "v/vt", "v//vn" or "v/vt/vn", counted from 0.
-Index read_obj_corner(TextReader& in, std::string_view corner, std::size_t vertices) {
-  const std::int64_t v = in.integer(corner.substr(0, corner.find('/')));
+// The place of index `text` among `count` that came before, counted from 0; negative ones count from the end.
+Index read_obj_index(TextReader& in, std::string_view text, std::size_t count, const char* one, const char* many) {
+  const std::int64_t v = in.integer(text);
   if (v == 0) in.fail("index 0 is out of range, OBJ counts from 1; mend the line");
-  const std::int64_t index = v > 0 ? v - 1 : static_cast<std::int64_t>(vertices) + v;
+  const std::int64_t index = v > 0 ? v - 1 : static_cast<std::int64_t>(count) + v;
   if (index < 0 || index >= kNone)
-    in.fail(
-        fmt::format("index {} is out of range after {}; mend the line", v, quantity(vertices, "vertex", "vertices")));
+    in.fail(fmt::format("index {} is out of range after {}; mend the line", v, quantity(count, one, many)));
   return static_cast<Index>(index);
 }
+
+// An index beyond all that came before it, to be looked at again at the end.
+class ForwardIndices {
+ public:
+  void note(Index index, std::size_t count, std::size_t line) {
+    if (index >= count && (noted_.empty() || index > noted_.back().first)) noted_.emplace_back(index, line);
+  }
+  void check(const TextReader& in, std::size_t count, const char* one, const char* many) const {
+    for (const auto& [index, line] : noted_)
+      if (index >= count)
+        in.fail_at(line, fmt::format("index {} is out of range, the file has {}; mend the line", std::size_t{index} + 1,
+                                     quantity(count, one, many)));
+  }
+
+ private:
+  std::vector<std::pair<Index, std::size_t>> noted_;
+};
+
+// The numbers that a line goes on with, as far as they are numbers.
+std::vector<double> numbers_left(TextReader& in) {
+  std::vector<double> numbers;
+  for (std::string_view word = in.word(); !word.empty(); word = in.word()) {
+    double x = 0;
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), x);
+    if (error != std::errc{} || stop != word.data() + word.size()) break;
+    numbers.push_back(x);
+  }
+  return numbers;
+}
+
+// Texture coordinates and the colours that many programs put behind coordinates.
+class ObjAttributes {
+ public:
+  void add_vertex(TextReader& in) {
+    const std::vector<double> numbers = numbers_left(in);
+    all_coloured_ = all_coloured_ && (numbers.size() == 3 || numbers.size() == 4);
+    if (all_coloured_) colours_.insert(colours_.end(), numbers.begin(), numbers.begin() + 3);
+  }
+  void add_texture(TextReader& in) {
+    const double u = in.number();
+    const std::vector<double> numbers = numbers_left(in);
+    texture_.push_back({u, numbers.empty() ? 0 : numbers[0]});
+  }
+  // "v", "v/vt", "v//vn" or "v/vt/vn"
+  void add_corner(TextReader& in, std::string_view corner, std::size_t line) {
+    const std::size_t first = corner.find('/');
+    const std::string_view rest = first == std::string_view::npos ? std::string_view{} : corner.substr(first + 1);
+    const std::string_view text = rest.substr(0, rest.find('/'));
+    corners_.push_back(text.empty() ? kNone : read_obj_index(in, text, texture_.size(), kOne, kMany));
+    if (!text.empty()) forward_.note(corners_.back(), texture_.size(), line);
+  }
+  void take(const TextReader& in, Soup& soup) {
+    forward_.check(in, texture_.size(), kOne, kMany);
+    if (all_coloured_ && !colours_.empty()) {
+      // Some programs write bytes.
+      const bool bytes = std::any_of(colours_.begin(), colours_.end(), [](double x) { return x > 1; });
+      soup.attributes.push_back({"color", Attribute::Site::vertex,
+                                 bytes ? Attribute::Type::uint8 : Attribute::Type::float32, 3, std::move(colours_)});
+    }
+    if (std::all_of(corners_.begin(), corners_.end(), [](Index i) { return i == kNone; })) return;
+    if (!take_by_vertices(soup)) take_by_corners(soup);
+  }
+
+ private:
+  static constexpr const char *kOne = "texture coordinate", *kMany = "texture coordinates";
+
+  // Where all corners of each vertex have the same ones, these are the vertices'.
+  bool take_by_vertices(Soup& soup) const {
+    std::vector<Index> of_vertex(soup.vertices.size(), kNone);
+    for (std::size_t c = 0; c < corners_.size(); ++c) {
+      Index& known = of_vertex[soup.faces.values[c]];
+      if (corners_[c] == kNone || (known != kNone && known != corners_[c])) return false;
+      known = corners_[c];
+    }
+    soup.attributes.push_back(texture_at(Attribute::Site::vertex, of_vertex));
+    return true;
+  }
+  void take_by_corners(Soup& soup) const { soup.attributes.push_back(texture_at(Attribute::Site::corner, corners_)); }
+  Attribute texture_at(Attribute::Site site, const std::vector<Index>& indices) const {
+    Attribute attribute{"texcoord", site, Attribute::Type::float32, 2, {}};
+    attribute.values.reserve(2 * indices.size());
+    for (const Index i : indices) {
+      attribute.values.push_back(i == kNone ? 0 : texture_[i][0]);
+      attribute.values.push_back(i == kNone ? 0 : texture_[i][1]);
+    }
+    return attribute;
+  }
+
+  bool all_coloured_ = true;
+  std::vector<double> colours_;  // of the vertices so far, if all have them
+  std::vector<std::array<double, 2>> texture_;
+  std::vector<Index> corners_;  // of faces: an index of texture_, or kNone
+  ForwardIndices forward_;
+};
 
 // The rest of a line, its words one blank apart.
 std::string words_left(TextReader& in) {
@@ -263,10 +357,12 @@ Soup read_obj(const std::string& path, std::string_view bytes) {
   TextReader in(path, bytes, '#', true);
   Soup soup;
   GroupLabels groups;
-  std::vector<std::pair<Index, std::size_t>> forward;  // indices beyond all before them and not yet defined; their line
+  ObjAttributes attributes;
+  ForwardIndices forward;
   const auto read_corner = [&](std::string_view corner, std::size_t line) {
-    const Index v = read_obj_corner(in, corner, soup.vertices.size());
-    if (v >= soup.vertices.size() && (forward.empty() || v > forward.back().first)) forward.emplace_back(v, line);
+    const std::string_view text = corner.substr(0, corner.find('/'));
+    const Index v = read_obj_index(in, text, soup.vertices.size(), "vertex", "vertices");
+    forward.note(v, soup.vertices.size(), line);
     return v;
   };
   while (in.next_line()) {
@@ -275,9 +371,14 @@ Soup read_obj(const std::string& path, std::string_view bytes) {
     if (keyword == "v") {
       if (soup.vertices.size() == kNone - 1) in.fail("too many vertices; split the model");
       soup.vertices.push_back(in.point());
+      attributes.add_vertex(in);
+    } else if (keyword == "vt") {
+      attributes.add_texture(in);
     } else if (keyword == "f") {
-      for (std::string_view corner = in.word(); !corner.empty(); corner = in.word())
+      for (std::string_view corner = in.word(); !corner.empty(); corner = in.word()) {
         soup.faces.values.push_back(read_corner(corner, line));
+        attributes.add_corner(in, corner, line);
+      }
       if (soup.open_corners() < 3)
         in.fail_at(line, fmt::format("a face has {}; remove it", quantity(soup.open_corners(), "corner", "corners")));
       soup.end_face();
@@ -295,12 +396,12 @@ Soup read_obj(const std::string& path, std::string_view bytes) {
       groups.set_part(words_left(in));
     } else if (keyword == "usemtl") {
       groups.set_material(words_left(in));
+    } else if (keyword == "mtllib" && in.at_word()) {
+      soup.material_files.emplace_back(in.rest_of_line());
     }
   }
-  for (const auto& [v, line] : forward)
-    if (v >= soup.vertices.size())
-      in.fail_at(line, fmt::format("index {} is out of range, the file has {}; mend the line", std::size_t{v} + 1,
-                                   quantity(soup.vertices.size(), "vertex", "vertices")));
+  forward.check(in, soup.vertices.size(), "vertex", "vertices");
+  attributes.take(in, soup);
   groups.take(soup);
   return soup;
 }
@@ -330,24 +431,100 @@ std::string off_of(const Mesh& mesh) {
   return out;
 }
 
-const LabelNames& names_in(const TriangleMesh& mesh) { return mesh.label_names; }
-LabelNames names_in(const PolygonMesh&) { return {}; }
+// What an OBJ file has beside points, faces and groups.
+class ObjExtras {
+ public:
+  LabelNames names;  // of the labels
+
+  explicit ObjExtras(const PolygonMesh&) {}
+  explicit ObjExtras(const TriangleMesh& mesh) : names(mesh.label_names), mesh_(&mesh) {
+    for (const std::string& file : mesh.material_files) has_library_ = has_library_ || is_material_library(file);
+    const auto find = [&](Attribute::Site site, AttributeMeaning meaning) {
+      return find_attribute(mesh.attributes, site, meaning);
+    };
+    if (const Attribute* found = find(Attribute::Site::vertex, AttributeMeaning::colour)) {
+      colours_ = found;
+      scale_ = found->type == Attribute::Type::uint8 ? 1.0 / 255 : 1;
+    }
+    texture_ = find(Attribute::Site::corner, AttributeMeaning::texture);
+    if (texture_) table_ = tell_corners_apart(mesh, *texture_);
+    else texture_ = find(Attribute::Site::vertex, AttributeMeaning::texture);
+  }
+
+  std::string libraries() const {
+    std::string lines;
+    if (has_library_)
+      for (const std::string& file : mesh_->material_files)
+        if (is_material_library(file)) lines += "mtllib " + cleaned(file) + '\n';
+    return lines;
+  }
+  // Behind a vertex's coordinates.
+  void append_colour(std::string& out, std::size_t v) const {
+    if (!colours_) return;
+    for (std::size_t c = 0; c < 3; ++c) {
+      out += ' ';
+      append_value(out, scale_ * colours_->values[colours_->components * v + c], Attribute::Type::float32);
+    }
+  }
+  std::string texture_lines() const {
+    std::string lines;
+    if (!texture_) return lines;
+    const bool corners = texture_->site == Attribute::Site::corner;
+    const std::size_t count = corners ? table_.corner.size() : mesh_->vertices.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const double* uv = texture_->values.data() + 2 * (corners ? table_.corner[i] : i);
+      lines += "vt ";
+      append_value(lines, uv[0], texture_->type);
+      lines += ' ';
+      append_value(lines, uv[1], texture_->type);
+      lines += '\n';
+    }
+    return lines;
+  }
+  // Behind the vertex of corner k of face i.
+  void append_texture(std::string& out, std::size_t i, std::size_t k, Index v) const {
+    if (!texture_) return;
+    out += '/';
+    append_index(out, std::size_t{texture_->site == Attribute::Site::corner ? table_.index[3 * i + k] : v} + 1);
+  }
+  void append_material(std::string& out, std::int32_t label) const {
+    if (!has_library_) return;
+    if (const auto found = mesh_->label_materials.find(label); found != mesh_->label_materials.end())
+      out += "usemtl " + cleaned(found->second, "#\\") + '\n';
+  }
+
+ private:
+  const TriangleMesh* mesh_ = nullptr;
+  bool has_library_ = false;
+  const Attribute *colours_ = nullptr, *texture_ = nullptr;
+  double scale_ = 1;  // from colours to 0 .. 1
+  CornerTable table_;
+};
 
 template <class Mesh>
 std::string obj_of(const Mesh& mesh, const WriteOptions& options) {
-  const LabelNames names = names_of_labels({mesh.labels.begin(), mesh.labels.end()}, names_in(mesh), options, "#\\");
-  std::string out;
-  for (const Vec3& p : mesh.vertices) {
+  const ObjExtras extras(mesh);
+  const LabelNames names = names_of_labels({mesh.labels.begin(), mesh.labels.end()}, extras.names, options, "#\\");
+  std::string out = extras.libraries();
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     out += "v ";
-    append_point(out, p);
+    append_coordinates(out, mesh.vertices[v]);
+    extras.append_colour(out, v);
+    out += '\n';
   }
+  out += extras.texture_lines();
+  if (mesh.labels.empty()) extras.append_material(out, 0);
   for (std::size_t i = 0; i < face_count(mesh); ++i) {
-    if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1]))
-      out += "g " + names.at(static_cast<std::int32_t>(mesh.labels[i])) + '\n';
+    if (!mesh.labels.empty() && (i == 0 || mesh.labels[i] != mesh.labels[i - 1])) {
+      const auto label = static_cast<std::int32_t>(mesh.labels[i]);
+      out += "g " + names.at(label) + '\n';
+      extras.append_material(out, label);
+    }
     out += 'f';
-    for (const Index v : face(mesh, i)) {
+    for (std::size_t k = 0; k < face(mesh, i).size(); ++k) {
       out += ' ';
-      append_index(out, std::size_t{v} + 1);
+      append_index(out, std::size_t{face(mesh, i)[k]} + 1);
+      extras.append_texture(out, i, k, face(mesh, i)[k]);
     }
     out += '\n';
   }

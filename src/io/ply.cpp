@@ -6,13 +6,16 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "bisector/io.h"
+#include "io/attributes.h"
 #include "io/bytes.h"
+#include "io/labels.h"
 #include "io/mesh_formats.h"
 #include "io/text.h"
 
@@ -21,6 +24,13 @@ namespace bisector::io {
 namespace {
 
 enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+
+Attribute::Type type_of(Scalar type) {
+  using Type = Attribute::Type;
+  constexpr std::array<Type, 8> kTypes{Type::int8,  Type::uint8,  Type::int16,   Type::uint16,
+                                       Type::int32, Type::uint32, Type::float32, Type::float64};
+  return kTypes[static_cast<std::size_t>(type)];
+}
 
 std::size_t size_of(Scalar type) {
   constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
@@ -72,6 +82,7 @@ struct PlyElement {
 
 struct PlyHeader {
   bool text = false, big_endian = false;
+  std::vector<std::string> textures;  // of comments "TextureFile NAME"
   std::vector<PlyElement> elements;
 
   const PlyElement* find(std::string_view name) const {
@@ -106,6 +117,8 @@ PlyHeader read_ply_header(TextReader& in) {
     if (!in.next_line()) in.fail_truncated("a part of the header");
     const std::string_view keyword = in.word();
     if (keyword == "end_header") break;
+    if (keyword == "comment" && in.word() == "TextureFile" && in.at_word())
+      header.textures.emplace_back(in.rest_of_line());
     if (keyword == "comment" || keyword == "obj_info") continue;
     if (keyword == "format") {
       const std::string_view name = in.word();
@@ -225,26 +238,46 @@ void skip_ply_items(Source& source, const PlyElement& element) {
   }
 }
 
-template <class Source>
-void read_ply_vertices(Source& source, const PlyElement& element, Soup& soup) {
-  std::vector<int> axes;
+// The scalar properties that are attributes: all but those that are something else.
+template <class IsElse>
+AttributeColumns ply_columns(const PlyElement& element, Attribute::Site site, const IsElse& is_else) {
+  AttributeColumns columns(site);
   for (const PlyProperty& p : element.properties)
-    axes.push_back(p.name == "x" ? 0 : p.name == "y" ? 1 : p.name == "z" ? 2 : -1);
+    p.list || is_else(p) ? columns.skip() : columns.add(p.name, type_of(p.type));
+  columns.group();
+  return columns;
+}
+
+void move_attributes(AttributeColumns& columns, Soup& soup) {
+  for (Attribute& attribute : columns.take()) soup.attributes.push_back(std::move(attribute));
+}
+
+int axis_of(const PlyProperty& p) { return p.name == "x" ? 0 : p.name == "y" ? 1 : p.name == "z" ? 2 : -1; }
+
+template <class Source>
+void read_ply_vertices(Source& source, const PlyElement& element, Soup& soup, bool with_attributes) {
+  AttributeColumns columns = ply_columns(element, Attribute::Site::vertex,
+                                         [&](const PlyProperty& p) { return !with_attributes || axis_of(p) >= 0; });
   soup.vertices.reserve(std::min(element.count, source.most_items(element)));
   for (std::size_t i = 0; i < element.count; ++i) {
     source.begin_item(element, i);
     Vec3 p;
-    for (std::size_t j = 0; j < axes.size(); ++j) {
-      const int axis = axes[j];
-      if (axis < 0) {
-        skip_ply_property(source, element.properties[j]);
-        continue;
+    for (std::size_t j = 0; j < element.properties.size(); ++j) {
+      const PlyProperty& property = element.properties[j];
+      const int axis = axis_of(property);
+      if (axis >= 0) {
+        p[axis] = source.value(property.type);
+        if (const char* flaw = coordinate_flaw(p[axis])) source.fail(flaw);
+      } else if (columns.wants(j)) {
+        columns.set(j, source.value(property.type));
+      } else {
+        skip_ply_property(source, property);
       }
-      p[axis] = source.value(element.properties[j].type);
-      if (const char* flaw = coordinate_flaw(p[axis])) source.fail(flaw);
     }
+    columns.end_element();
     soup.vertices.push_back(p);
   }
+  move_attributes(columns, soup);
 }
 
 template <class Source>
@@ -270,17 +303,56 @@ void read_ply_label(Source& source, const PlyProperty& property, Soup& soup) {
   soup.labels.push_back(static_cast<std::int32_t>(static_cast<std::uint32_t>(static_cast<std::int64_t>(label))));
 }
 
+bool is_texture(const PlyProperty& p) { return p.list && p.name == "texcoord" && p.type >= Scalar::float32; }
+
+// Texture coordinates of a face's corners, as MeshLab writes them.
+template <class Source>
+std::vector<double> read_ply_texture(Source& source, const PlyProperty& property) {
+  std::vector<double> values;
+  const std::size_t count = read_ply_count(source, property);
+  for (std::size_t k = 0; k < count; ++k) values.push_back(source.value(property.type));
+  return values;
+}
+
 template <class Source>
 void read_ply_faces(Source& source, const PlyElement& element, std::size_t vertices, Soup& soup) {
   if (std::any_of(element.properties.begin(), element.properties.end(), is_label))
     soup.labels.resize(soup.faces.rows(), 0);  // of strips before
+  AttributeColumns columns = ply_columns(element, Attribute::Site::element, is_label);
+  for (std::size_t i = 0; i < soup.faces.rows(); ++i) columns.end_element();
+  const bool textured = std::any_of(element.properties.begin(), element.properties.end(), is_texture);
+  Attribute corners{"texcoord", Attribute::Site::corner, Attribute::Type::float32, 2, {}};
   for (std::size_t i = 0; i < element.count; ++i) {
     source.begin_item(element, i);
-    for (const PlyProperty& property : element.properties) {
+    std::vector<double> texture;
+    for (std::size_t j = 0; j < element.properties.size(); ++j) {
+      const PlyProperty& property = element.properties[j];
       if (is_index_list(property)) read_ply_face(source, property, vertices, soup);
       else if (is_label(property)) read_ply_label(source, property, soup);
+      else if (is_texture(property)) texture = read_ply_texture(source, property);
+      else if (columns.wants(j)) columns.set(j, source.value(property.type));
       else skip_ply_property(source, property);
     }
+    columns.end_element();
+    if (!textured) continue;
+    const std::size_t degree = soup.faces.size(soup.faces.rows() - 1);
+    if (!texture.empty() && texture.size() != 2 * degree)
+      source.fail(fmt::format("'texcoord' has {} for {} corners; give two each, or none",
+                              quantity(texture.size(), "number", "numbers"), degree));
+    corners.values.resize(2 * (soup.faces.values.size() - degree), 0);  // of faces without
+    corners.values.insert(corners.values.end(), texture.begin(), texture.end());
+  }
+  move_attributes(columns, soup);
+  if (textured) soup.attributes.push_back(std::move(corners));
+}
+
+// Faces at the end may have no values: strips, and those without texture coordinates.
+void fill_attributes(Soup& soup) {
+  for (Attribute& attribute : soup.attributes) {
+    const std::size_t sites = attribute.site == Attribute::Site::vertex    ? soup.vertices.size()
+                              : attribute.site == Attribute::Site::element ? soup.faces.rows()
+                                                                           : soup.faces.values.size();
+    attribute.values.resize(attribute.components * sites, 0);
   }
 }
 
@@ -358,7 +430,7 @@ void read_ply_body(Source& source, const PlyHeader& header, Soup& soup) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty()) continue;
     if (element.name == "vertex") {
-      read_ply_vertices(source, element, soup);
+      read_ply_vertices(source, element, soup, true);
     } else if (element.name == "face") {
       read_ply_faces(source, element, vertices, soup);
     } else if (element.name == "tristrips") {
@@ -370,6 +442,8 @@ void read_ply_body(Source& source, const PlyHeader& header, Soup& soup) {
     }
   }
   if (!soup.labels.empty()) soup.labels.resize(soup.faces.rows(), 0);  // strips have none
+  fill_attributes(soup);
+  soup.material_files = header.textures;
   soup.ignored = source.ignored();
 }
 
@@ -402,7 +476,7 @@ std::vector<Vec3> read_ply_positions(Source& source, const PlyHeader& header) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty()) continue;
     if (element.name == "vertex") {
-      read_ply_vertices(source, element, soup);
+      read_ply_vertices(source, element, soup, false);
       break;
     }
     skip_ply_items(source, element);
@@ -462,6 +536,68 @@ void append_ply_edges(std::string& out, const std::vector<std::array<Index, 2>>&
     for (const Index v : e) append_bytes(out, v);
 }
 
+const char* name_of(Attribute::Type type) {
+  using Type = Attribute::Type;
+  switch (type) {
+    case Type::int8: return "char";
+    case Type::uint8: return "uchar";
+    case Type::int16: return "short";
+    case Type::uint16: return "ushort";
+    case Type::int32: return "int";
+    case Type::uint32: return "uint";
+    case Type::float32: return "float";
+    case Type::int64:
+    case Type::uint64:
+    case Type::float64: break;  // PLY has no integers of 64 bits
+  }
+  return "double";
+}
+
+// The attributes of one kind of element as properties with names of their own.
+class PlyProperties {
+ public:
+  PlyProperties(const TriangleMesh& mesh, Attribute::Site site) {
+    std::set<std::string> taken{"x", "y", "z", "label", "vertex_indices", "texcoord"};
+    for (const Attribute& attribute : mesh.attributes) {
+      if (attribute.site != site) continue;
+      const bool colours = meaning_of(attribute) == AttributeMeaning::colour;
+      const char* type = colours ? "uchar" : name_of(attribute.type);
+      for (const std::string& own : component_names(attribute)) {
+        std::string name = cleaned(own.empty() ? "attribute" : own, " \t");
+        while (!taken.insert(name).second) name += '_';
+        header_ += fmt::format("property {} {}\n", type, name);
+      }
+      if (colours) colours_.push_back(colour_bytes(attribute));
+      attributes_.push_back({&attribute, colours ? colours_.size() - 1 : kNone});
+    }
+  }
+
+  const std::string& header() const { return header_; }
+  // Bytes of one element, at most.
+  std::size_t size() const {
+    std::size_t size = 0;
+    for (const Entry& entry : attributes_) size += sizeof(double) * entry.attribute->components;
+    return size;
+  }
+  void append(std::string& out, std::size_t i) const {
+    for (const auto& [attribute, colours] : attributes_)
+      for (std::size_t k = attribute->components * i; k < attribute->components * (i + 1); ++k) {
+        if (colours != kNone) append_bytes(out, colours_[colours][k]);
+        else if (name_of(attribute->type) == std::string_view("double")) append_bytes(out, attribute->values[k]);
+        else append_value_bytes(out, attribute->values[k], attribute->type);
+      }
+  }
+
+ private:
+  struct Entry {
+    const Attribute* attribute;
+    std::size_t colours;  // or kNone
+  };
+  std::string header_;
+  std::vector<Entry> attributes_;
+  std::vector<std::vector<std::uint8_t>> colours_;
+};
+
 }  // namespace
 
 Soup read_ply(const std::string& path, std::string_view bytes) {
@@ -516,15 +652,33 @@ std::vector<double> read_ply_attribute(const std::string& path, std::string_view
 }
 
 std::string format_ply(const std::string&, const TriangleMesh& mesh, const WriteOptions&) {
-  std::string out = ply_header(mesh.vertices.size(), mesh.triangles.size(), 3);
+  const PlyProperties of_vertices(mesh, Attribute::Site::vertex), of_faces(mesh, Attribute::Site::element);
+  const Attribute* texture = find_attribute(mesh.attributes, Attribute::Site::corner, AttributeMeaning::texture);
+  std::string out = "ply\nformat binary_little_endian 1.0\n";
+  for (const std::string& file : mesh.material_files)
+    if (!is_material_library(file)) out += "comment TextureFile " + cleaned(file) + '\n';
+  out += fmt::format(
+      "element vertex {}\nproperty double x\nproperty double y\nproperty double z\n{}element face {}\n"
+      "property list uchar {} vertex_indices\n",
+      mesh.vertices.size(), of_vertices.header(), mesh.triangles.size(), mesh.vertices.size() >> 31 ? "uint" : "int");
   if (!mesh.labels.empty()) out += "property int label\n";
+  out += of_faces.header();
+  if (texture) out += "property list uchar float texcoord\n";
   out += ply_edge_header(mesh.feature_edges, mesh.vertices.size()) + "end_header\n";
-  out.reserve(out.size() + 24 * mesh.vertices.size() + 17 * mesh.triangles.size() + 8 * mesh.feature_edges.size());
-  append_ply_vertices(out, mesh.vertices);
+  out.reserve(out.size() + (24 + of_vertices.size()) * mesh.vertices.size() +
+              (17 + of_faces.size() + (texture ? 25 : 0)) * mesh.triangles.size() + 8 * mesh.feature_edges.size());
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    for (int k = 0; k < 3; ++k) append_bytes(out, mesh.vertices[v][k]);
+    of_vertices.append(out, v);
+  }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     append_bytes(out, static_cast<std::uint8_t>(3));
     for (const Index v : mesh.triangles[i]) append_bytes(out, v);
     if (!mesh.labels.empty()) append_bytes(out, mesh.labels[i]);
+    of_faces.append(out, i);
+    if (!texture) continue;
+    append_bytes(out, static_cast<std::uint8_t>(6));
+    for (std::size_t k = 0; k < 6; ++k) append_value_bytes(out, texture->values[6 * i + k], Attribute::Type::float32);
   }
   append_ply_edges(out, mesh.feature_edges);
   return out;

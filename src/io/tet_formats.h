@@ -26,6 +26,8 @@ struct TetSoup {
   std::vector<std::array<Index, 2>> edges;
   std::vector<std::int32_t> regions, labels;
   LabelNames region_names = {}, label_names = {};
+  std::vector<Attribute> attributes = {};           // of vertices and tetrahedra
+  std::vector<Attribute> triangle_attributes = {};  // elements are the triangles
 };
 
 // What read_tet_mesh() makes of a file's contents, with its warnings; the path is for these.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <utility>
 
 #include "core/grouping.h"
@@ -10,6 +11,7 @@
 #include "io/files.h"
 #include "io/formats.h"
 #include "io/tet_formats.h"
+#include "mesh/attribute_sizes.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/topology.h"
 
@@ -99,6 +101,7 @@ void check_sound(const std::string& path, const TetMesh& mesh) {
   if (!mesh.boundary_labels.empty() && mesh.boundary_labels.size() != mesh.boundary.size())
     fail(path,
          fmt::format("{} labels for {} triangles; give one each", mesh.boundary_labels.size(), mesh.boundary.size()));
+  check_attributes(mesh);
 }
 
 }  // namespace
@@ -120,6 +123,10 @@ Soup io::surface_of(const std::string& path, TetSoup soup) {
   surface.labels = std::move(soup.labels);
   surface.edges = std::move(soup.edges);
   surface.label_names = std::move(soup.label_names);
+  for (std::vector<Attribute>* attributes : {&soup.attributes, &soup.triangle_attributes})
+    for (Attribute& attribute : *attributes)
+      if (attributes == &soup.triangle_attributes || attribute.site == Attribute::Site::vertex)
+        surface.attributes.push_back(std::move(attribute));
   return surface;
 }
 
@@ -136,6 +143,7 @@ TetMesh io::mesh_of(const std::string& path, TetSoup soup, const Context& contex
   mesh.boundary_labels = std::move(soup.labels);
   mesh.region_names = std::move(soup.region_names);
   mesh.label_names = std::move(soup.label_names);
+  mesh.attributes = std::move(soup.attributes);
   turn_positive(path, mesh, context);
   turn_outward(mesh);
   drop_zero_marks(mesh.regions);
@@ -188,6 +196,8 @@ TriangleMesh surface_of_marks(const TetMesh& mesh) {
   const EdgeTable table = edge_table(surface.triangles, surface.vertices.size());
   for (const Edge& e : mesh.feature_edges)
     if (std::binary_search(table.edges.begin(), table.edges.end(), e)) surface.feature_edges.push_back(e);
+  std::copy_if(mesh.attributes.begin(), mesh.attributes.end(), std::back_inserter(surface.attributes),
+               [](const Attribute& attribute) { return attribute.site == Attribute::Site::vertex; });
   return surface;
 }
 

@@ -194,12 +194,16 @@ inline void append_index(std::string& out, std::size_t i) {
   out.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), i).ptr);
 }
 
-inline void append_point(std::string& out, const Vec3& p) {
+inline void append_coordinates(std::string& out, const Vec3& p) {
   append_number(out, p.x);
   out += ' ';
   append_number(out, p.y);
   out += ' ';
   append_number(out, p.z);
+}
+
+inline void append_point(std::string& out, const Vec3& p) {
+  append_coordinates(out, p);
   out += '\n';
 }
 

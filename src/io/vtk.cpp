@@ -25,7 +25,7 @@ class LegacyReader {
 
   VtkGrid read() {
     read_header();
-    std::size_t cells = 0, items = 0;
+    std::size_t items = 0;
     VtkArrays* data = nullptr;
     for (std::string_view word = in_.word(); !word.empty(); word = in_.word()) {
       if (same_word(word, "POINTS")) {
@@ -38,14 +38,14 @@ class LegacyReader {
             if (const char* flaw = coordinate_flaw(grid_.points[i][k])) in_.fail(fmt::format("vertex {}: {}", i, flaw));
         }
       } else if (same_word(word, "CELLS")) {
-        cells = read_cells();
+        cells_ = read_cells();
       } else if (same_word(word, "CELL_TYPES")) {
         const std::size_t n = in_.count("cell types");
         grid_.types = integers(read_array(n, 1, "int"));
       } else if (same_word(word, "CELL_DATA") || same_word(word, "POINT_DATA")) {
         items = in_.count("values");
         data = same_word(word, "CELL_DATA") ? &grid_.cell_data : &grid_.point_data;
-        const std::size_t expected = data == &grid_.cell_data ? cells : grid_.points.size();
+        const std::size_t expected = data == &grid_.cell_data ? cells_ : grid_.points.size();
         if (items != expected)
           in_.fail(fmt::format("there are data of {} items, but {} items; {}", items, expected, kExportAgain));
       } else if (same_word(word, "FIELD")) {
@@ -90,6 +90,26 @@ class LegacyReader {
       else x = static_cast<double>(in_.value<T>());
     }
     return values;
+  }
+
+  static Attribute::Type type_of(std::string_view type) {
+    using Type = Attribute::Type;
+    if (same_word(type, "FLOAT")) return Type::float32;
+    if (is_one_of(type, {"INT", "VTKTYPEINT32"})) return Type::int32;
+    if (is_one_of(type, {"UNSIGNED_INT", "VTKTYPEUINT32"})) return Type::uint32;
+    if (is_one_of(type, {"LONG", "VTKTYPEINT64", "VTKIDTYPE"})) return Type::int64;
+    if (is_one_of(type, {"UNSIGNED_LONG", "VTKTYPEUINT64"})) return Type::uint64;
+    if (is_one_of(type, {"SHORT", "VTKTYPEINT16"})) return Type::int16;
+    if (is_one_of(type, {"UNSIGNED_SHORT", "VTKTYPEUINT16"})) return Type::uint16;
+    if (is_one_of(type, {"CHAR", "VTKTYPEINT8"})) return Type::int8;
+    if (is_one_of(type, {"UNSIGNED_CHAR", "VTKTYPEUINT8"})) return Type::uint8;
+    return Type::float64;
+  }
+
+  // What an attribute of the current data is: its numbers follow.
+  void put(VtkArrays& data, std::string name, std::size_t n, std::size_t components, std::string_view type) {
+    const Attribute::Type own = type_of(type);
+    put_array(data, {std::move(name), Attribute::Site::vertex, own, components, read_array(n, components, type)});
   }
 
   std::vector<double> read_array(std::size_t n, std::size_t components, std::string_view type) {
@@ -171,8 +191,10 @@ class LegacyReader {
         name = in_.need_word("an array's name");
       }
       const std::size_t components = in_.count("components"), n = in_.count("tuples");
-      std::vector<double> values = read_array(n, components, in_.need_word("the type of an array"));
-      if (data && components == 1) (*data)[decoded(name)] = std::move(values);
+      const std::string_view type = in_.need_word("the type of an array");
+      const std::size_t items = data == &grid_.point_data ? grid_.points.size() : cells_;
+      if (data && components > 0 && n == items) put(*data, decoded(name), n, components, type);
+      else read_array(n, components, type);
     }
   }
 
@@ -189,18 +211,17 @@ class LegacyReader {
       }
       if (!same_word(next, "LOOKUP_TABLE")) in_.fail(std::string("LOOKUP_TABLE is missing; ") + kExportAgain);
       in_.need_word("the table's name");
-      std::vector<double> values = read_array(n, components, type);
-      if (components == 1) data[name] = std::move(values);
+      put(data, name, n, components, type);
     } else if (same_word(kind, "VECTORS") || same_word(kind, "NORMALS")) {
-      read_array(n, 3, in_.need_word("the type of vectors"));
+      put(data, name, n, 3, in_.need_word("the type of vectors"));
     } else if (same_word(kind, "TENSORS")) {
-      read_array(n, 9, in_.need_word("the type of tensors"));
+      put(data, name, n, 9, in_.need_word("the type of tensors"));
     } else if (same_word(kind, "TEXTURE_COORDINATES")) {
       const std::size_t components = in_.count("components");
-      read_array(n, components, in_.need_word("the type of coordinates"));
+      put(data, name, n, components, in_.need_word("the type of coordinates"));
     } else if (same_word(kind, "COLOR_SCALARS")) {
       const std::size_t components = in_.count("components");
-      read_array(n, components, binary_ ? "unsigned_char" : "float");
+      put(data, name, n, components, binary_ ? "unsigned_char" : "float");
     } else if (same_word(kind, "LOOKUP_TABLE")) {
       const std::size_t colours = in_.count("colours");
       read_array(colours, 4, binary_ ? "unsigned_char" : "float");
@@ -211,6 +232,7 @@ class LegacyReader {
 
   MixedReader in_;
   bool binary_ = false;
+  std::size_t cells_ = 0;
   VtkGrid grid_;
 };
 

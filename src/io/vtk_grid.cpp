@@ -24,14 +24,24 @@ std::vector<std::int32_t> marks_of(const std::string& path, const std::string& n
   return marks;
 }
 
+const Attribute* find_scalar(const VtkArrays& arrays, const std::string& name) {
+  for (const Attribute& array : arrays)
+    if (array.name == name && array.components == 1) return &array;
+  return nullptr;
+}
+
+template <std::size_t N>
+const Attribute* first_of(const VtkArrays& arrays, const char* const (&names)[N]) {
+  for (const char* name : names)
+    if (const Attribute* found = find_scalar(arrays, name)) return found;
+  return nullptr;
+}
+
 template <std::size_t N>
 std::vector<std::int32_t> find_marks(const std::string& path, const VtkArrays& cell_data, const char* const (&names)[N],
                                      const std::vector<std::size_t>& cells) {
-  if (cells.empty()) return {};
-  for (const char* name : names)
-    if (const auto found = cell_data.find(name); found != cell_data.end())
-      return marks_of(path, name, found->second, cells);
-  return {};
+  const Attribute* found = cells.empty() ? nullptr : first_of(cell_data, names);
+  return found ? marks_of(path, found->name, found->values, cells) : std::vector<std::int32_t>{};
 }
 
 }  // namespace
@@ -54,6 +64,35 @@ std::vector<Index> corners_of(const std::string& path, const VtkCells& cells, st
 std::vector<std::int32_t> labels_of_cells(const std::string& path, const VtkArrays& cell_data,
                                           const std::vector<std::size_t>& cells) {
   return find_marks(path, cell_data, kLabelNames, cells);
+}
+
+void put_array(VtkArrays& arrays, Attribute array) {
+  const auto same =
+      std::find_if(arrays.begin(), arrays.end(), [&](const Attribute& a) { return a.name == array.name; });
+  if (same == arrays.end()) arrays.push_back(std::move(array));
+  else *same = std::move(array);
+}
+
+std::vector<Attribute> attributes_of_points(VtkArrays point_data) {
+  for (Attribute& array : point_data) array.site = Attribute::Site::vertex;
+  return point_data;
+}
+
+std::vector<Attribute> attributes_of_cells(const VtkArrays& cell_data, const std::vector<std::size_t>& cells,
+                                           bool solid) {
+  std::vector<Attribute> attributes;
+  const Attribute *label = first_of(cell_data, kLabelNames),
+                  *region = solid ? first_of(cell_data, kRegionNames) : label;
+  for (const Attribute& array : cell_data) {
+    // Where there are labels and regions, each has zeros where the other one counts.
+    if (&array == label || &array == region || array.name == "region" || array.name == "label") continue;
+    attributes.push_back({array.name, Attribute::Site::element, array.type, array.components, {}});
+    std::vector<double>& values = attributes.back().values;
+    values.reserve(array.components * cells.size());
+    for (const std::size_t i : cells)
+      for (std::size_t c = 0; c < array.components; ++c) values.push_back(array.values[array.components * i + c]);
+  }
+  return attributes;
 }
 
 TetSoup soup_of_grid(const std::string& path, VtkGrid grid) {
@@ -86,32 +125,37 @@ TetSoup soup_of_grid(const std::string& path, VtkGrid grid) {
       for (std::size_t k = 0; k + 1 < v.size(); ++k) soup.edges.push_back({v[k], v[k + 1]});
     }
   }
-  for (const auto& [name, values] : grid.cell_data)
-    if (values.size() != n)
-      fail(path, fmt::format("the cell data '{}' has {} values for {} cells; {}", printable(name), values.size(), n,
-                             kExportAgain));
+  for (const Attribute& array : grid.cell_data)
+    if (array.values.size() != array.components * n)
+      fail(path, fmt::format("the cell data '{}' has {} values for {} cells; {}", printable(array.name),
+                             array.values.size(), n, kExportAgain));
   soup.regions = find_marks(path, grid.cell_data, kRegionNames, tets);
   soup.labels = labels_of_cells(path, grid.cell_data, triangles);
   soup.vertices = std::move(grid.points);
+  soup.attributes = attributes_of_points(std::move(grid.point_data));
+  for (Attribute& attribute : attributes_of_cells(grid.cell_data, tets, true))
+    soup.attributes.push_back(std::move(attribute));
+  soup.triangle_attributes = attributes_of_cells(grid.cell_data, triangles, true);
   return soup;
 }
 
 std::vector<double> point_data_of(const std::string& path, VtkArrays point_data, std::size_t points,
                                   const std::string& name) {
-  const auto found = point_data.find(name);
-  if (found == point_data.end()) {
+  const Attribute* found = find_scalar(point_data, name);
+  if (!found) {
     std::string known;
-    for (const auto& [other, values] : point_data) known += (known.empty() ? "" : ", ") + printable(other);
+    for (const Attribute& array : point_data)
+      if (array.components == 1) known += (known.empty() ? "" : ", ") + printable(array.name);
     fail(path, fmt::format("there is no scalar point data '{}'; {}", printable(name),
                            known.empty() ? "the file has none" : "use one of " + known));
   }
-  if (found->second.size() != points)
-    fail(path, fmt::format("the point data '{}' has {} values for {} points; {}", printable(name), found->second.size(),
+  if (found->values.size() != points)
+    fail(path, fmt::format("the point data '{}' has {} values for {} points; {}", printable(name), found->values.size(),
                            points, kExportAgain));
-  for (std::size_t i = 0; i < found->second.size(); ++i)
-    if (!std::isfinite(found->second[i]))
+  for (std::size_t i = 0; i < points; ++i)
+    if (!std::isfinite(found->values[i]))
       fail(path, fmt::format("vertex {}: '{}' is not finite; mend the value", i, printable(name)));
-  return std::move(found->second);
+  return found->values;
 }
 
 std::vector<std::int64_t> integers(const std::vector<double>& values) {

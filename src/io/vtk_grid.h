@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -12,8 +11,16 @@ namespace bisector::io {
 
 enum VtkCell { kVertex = 1, kPolyVertex = 2, kLine = 3, kPolyLine = 4, kTriangle = 5, kTetrahedron = 10 };
 
-// Numbers of several arrays by name; each has one component.
-using VtkArrays = std::map<std::string, std::vector<double>>;
+// Arrays of the cells or of the points, in the file's order and with different names; what they are of is not told.
+using VtkArrays = std::vector<Attribute>;
+
+// In place of one of that name.
+void put_array(VtkArrays& arrays, Attribute array);
+// Of all points.
+std::vector<Attribute> attributes_of_points(VtkArrays point_data);
+// Of those cells, without the arrays that mark tetrahedra, if `solid`, and triangles.
+std::vector<Attribute> attributes_of_cells(const VtkArrays& cell_data, const std::vector<std::size_t>& cells,
+                                           bool solid);
 
 // Cells, of which i has the corners connectivity[offsets[i] .. offsets[i + 1]).
 struct VtkCells {

@@ -4,18 +4,32 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <utility>
 
 #include "core/base64.h"
 #include "core/grouping.h"
+#include "io/attributes.h"
+#include "io/labels.h"
 #include "io/vtk_grid.h"
 #include "io/xml.h"
 
 namespace bisector::io {
 
 namespace {
+
+// Names of the types of numbers, in the order of Attribute::Type.
+constexpr std::array<std::string_view, 10> kTypes{"Int8",   "UInt8", "Int16",  "UInt16",  "Int32",
+                                                  "UInt32", "Int64", "UInt64", "Float32", "Float64"};
+
+Attribute::Type type_of(std::string_view name) {
+  const auto at = std::find(kTypes.begin(), kTypes.end(), name);
+  return at == kTypes.end() ? Attribute::Type::float64 : static_cast<Attribute::Type>(at - kTypes.begin());
+}
 
 int base64_value(char c) {
   if (c >= 'A' && c <= 'Z') return c - 'A';
@@ -134,10 +148,12 @@ class VtkXmlReader {
     const std::size_t components = tag["NumberOfComponents"].empty() ? 1 : number(tag, "NumberOfComponents");
     if (section == "Points") {
       take_points(read_array(tag, 3, points_));
-    } else if (section == "PointData") {
-      if (components <= 1) piece_.point_data[name] = read_array(tag, 1, points_);
-    } else if (section == "CellData") {
-      if (components <= 1) piece_.cell_data[name] = read_array(tag, 1, cells_);
+    } else if (section == "PointData" || section == "CellData") {
+      const bool points = section == "PointData";
+      const std::size_t columns = std::max<std::size_t>(1, components);
+      put_array(points ? piece_.point_data : piece_.cell_data,
+                {name, Attribute::Site::vertex, type_of(tag["type"]), columns,
+                 read_array(tag, columns, points ? points_ : cells_)});
     } else if (name == "types") {
       piece_.types = integers(read_array(tag, 1, counts_[section]));
     } else if (name == "offsets") {
@@ -313,6 +329,9 @@ class PolyDataReader {
     if (std::all_of(soup_.labels.begin(), soup_.labels.end(), [](std::int32_t label) { return label == 0; }))
       soup_.labels.clear();
     soup_.vertices = std::move(piece_.points);
+    soup_.attributes = attributes_of_points(std::move(piece_.point_data));
+    for (Attribute& attribute : attributes_of_cells(piece_.cell_data, cell_of_face_, false))
+      soup_.attributes.push_back(std::move(attribute));
     return std::move(soup_);
   }
 
@@ -337,18 +356,60 @@ class PolyDataReader {
   std::vector<std::size_t> cell_of_face_;
 };
 
-template <class T>
-void append_array(std::string& out, const char* type, const char* name, int components, const std::vector<T>& values) {
+void append_array_of_bytes(std::string& out, std::string_view type, std::string_view name, std::size_t components,
+                           std::string_view values) {
   // meshio takes an explicit 1 for a matrix of one column.
   const std::string shape = components == 1 ? "" : fmt::format(" NumberOfComponents=\"{}\"", components);
   fmt::format_to(std::back_inserter(out), "<DataArray type=\"{}\" Name=\"{}\"{} format=\"binary\">\n", type, name,
                  shape);
   std::string bytes;
-  bytes.reserve(8 + sizeof(T) * values.size());
-  append_bytes(bytes, static_cast<std::uint64_t>(sizeof(T) * values.size()));
-  for (const T x : values) append_bytes(bytes, x);
+  bytes.reserve(8 + values.size());
+  append_bytes(bytes, static_cast<std::uint64_t>(values.size()));
+  bytes += values;
   out += base64(bytes);
   out += "\n</DataArray>\n";
+}
+
+template <class T>
+void append_array(std::string& out, const char* type, const char* name, std::size_t components,
+                  const std::vector<T>& values) {
+  std::string bytes;
+  bytes.reserve(sizeof(T) * values.size());
+  for (const T x : values) append_bytes(bytes, x);
+  append_array_of_bytes(out, type, name, components, bytes);
+}
+
+// Attributes of some elements, between `before` and `after` others that have none: 0 there, or no number. Arrays that
+// mark cells have names of their own.
+void append_attributes(std::string& out, const std::vector<Attribute>& attributes, Attribute::Site site,
+                       std::size_t before, std::size_t after) {
+  std::set<std::string> taken{"label", "region"};
+  for (const Attribute& attribute : attributes) {
+    if (attribute.site != site) continue;
+    std::string name = cleaned(attribute.name, "<>&\"'"), bytes;
+    while (!taken.insert(name).second) name += '_';
+    const double none = attribute.type >= Attribute::Type::float32 ? std::numeric_limits<double>::quiet_NaN() : 0;
+    const auto append = [&](double value) { append_value_bytes(bytes, value, attribute.type); };
+    for (std::size_t i = 0; i < attribute.components * before; ++i) append(none);
+    for (const double value : attribute.values) append(value);
+    for (std::size_t i = 0; i < attribute.components * after; ++i) append(none);
+    append_array_of_bytes(out, kTypes[static_cast<std::size_t>(attribute.type)], name, attribute.components, bytes);
+  }
+}
+
+// The section of the points' data, which tells programs what to show.
+void append_point_data(std::string& out, const std::vector<Attribute>& attributes) {
+  const auto active = [&](const char* key, AttributeMeaning meaning) {
+    const Attribute* found = find_attribute(attributes, Attribute::Site::vertex, meaning);
+    return found ? fmt::format(" {}=\"{}\"", key, cleaned(found->name, "<>&\"'")) : "";
+  };
+  const bool any = std::any_of(attributes.begin(), attributes.end(),
+                               [](const Attribute& a) { return a.site == Attribute::Site::vertex; });
+  if (!any) return;
+  out += fmt::format("<PointData{}{}{}>\n", active("Scalars", AttributeMeaning::colour),
+                     active("Normals", AttributeMeaning::normal), active("TCoords", AttributeMeaning::texture));
+  append_attributes(out, attributes, Attribute::Site::vertex, 0, 0);
+  out += "</PointData>\n";
 }
 
 void append_points(std::string& out, const std::vector<Vec3>& vertices) {
@@ -370,13 +431,15 @@ std::string file_start(const char* kind) {
 
 // Faces and lines as PolyData. `labels`: one per face, or none.
 std::string polydata_of(const std::vector<Vec3>& vertices, const Csr<Index>& faces,
-                        const std::vector<std::int32_t>& labels, const std::vector<std::array<Index, 2>>& edges) {
+                        const std::vector<std::int32_t>& labels, const std::vector<std::array<Index, 2>>& edges,
+                        const std::vector<Attribute>& attributes) {
   std::string out = file_start("PolyData");
   out += fmt::format(
       "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"{}\" NumberOfStrips=\"0\" "
       "NumberOfPolys=\"{}\">\n",
       vertices.size(), edges.size(), faces.rows());
   append_points(out, vertices);
+  append_point_data(out, attributes);
   const auto append_cells = [&](const char* section, const std::vector<std::int64_t>& connectivity,
                                 const std::vector<std::int64_t>& offsets) {
     out += fmt::format("<{}>\n", section);
@@ -397,6 +460,7 @@ std::string polydata_of(const std::vector<Vec3>& vertices, const Csr<Index>& fac
     of_cells.insert(of_cells.end(), labels.begin(), labels.end());
     append_array(out, "Int32", "label", 1, of_cells);
   }
+  append_attributes(out, attributes, Attribute::Site::element, edges.size(), 0);
   return out + "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>\n";
 }
 
@@ -419,11 +483,11 @@ std::vector<double> read_vtp_attribute(const std::string& path, std::string_view
 }
 
 std::string format_vtp(const std::string&, const TriangleMesh& mesh, const WriteOptions&) {
-  return polydata_of(mesh.vertices, rows_of(mesh.triangles), mesh.labels, mesh.feature_edges);
+  return polydata_of(mesh.vertices, rows_of(mesh.triangles), mesh.labels, mesh.feature_edges, mesh.attributes);
 }
 
 std::string format_vtp(const PolygonMesh& mesh, const WriteOptions&) {
-  return polydata_of(mesh.vertices, mesh.polygons, {mesh.labels.begin(), mesh.labels.end()}, mesh.feature_edges);
+  return polydata_of(mesh.vertices, mesh.polygons, {mesh.labels.begin(), mesh.labels.end()}, mesh.feature_edges, {});
 }
 
 std::string format_vtu(const TetMesh& mesh) {
@@ -444,6 +508,7 @@ std::string format_vtu(const TetMesh& mesh) {
   std::string out = file_start("UnstructuredGrid");
   out += fmt::format("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", mesh.vertices.size(), cells);
   append_points(out, mesh.vertices);
+  append_point_data(out, mesh.attributes);
   out += "<Cells>\n";
   append_array(out, "Int64", "connectivity", 1, connectivity);
   append_array(out, "Int64", "offsets", 1, offsets);
@@ -460,6 +525,7 @@ std::string format_vtu(const TetMesh& mesh) {
     labels.resize(cells, 0);
     append_array(out, "Int32", "label", 1, labels);
   }
+  append_attributes(out, mesh.attributes, Attribute::Site::element, 0, cells - mesh.tets.size());
   return out + "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
 }
 

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <utility>
 
+#include "bisector/attributes.h"
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "bisector/repair.h"
 #include "core/geometry.h"
 #include "job/messages.h"
+#include "job/outputs.h"
 #include "mesh/tet_topology.h"
 #include "remesh/sizing.h"
 
@@ -23,6 +25,24 @@ double default_alpha(const TriangleMesh& mesh, double edge) {
   constexpr double kFinest = 1.0 / 500, kCoarsest = 1.0 / 20;  // in diagonals of the bounding box
   const double diagonal = bounding_box(mesh.vertices).diagonal();
   return std::clamp(edge, kFinest * diagonal, kCoarsest * diagonal);
+}
+
+std::vector<std::string> names_of(const std::vector<Attribute>& attributes) {
+  std::vector<std::string> names;
+  for (const Attribute& attribute : attributes) names.push_back(attribute.name);
+  return names;
+}
+
+// The numbers of a mesh in memory.
+std::vector<double> given_density(const GivenMesh& mesh, const std::string& name) {
+  std::vector<std::string> known;
+  for (const Attribute& attribute : mesh.tets ? mesh.tets->attributes : mesh.surface->attributes) {
+    if (attribute.site != Attribute::Site::vertex || attribute.components != 1) continue;
+    if (attribute.name == name) return attribute.values;
+    known.push_back(attribute.name);
+  }
+  throw Error(fmt::format("--density: the mesh's vertices have no numbers '{}'{}", name,
+                          known.empty() ? "; give some" : ", use one of " + fmt::format("{}", fmt::join(known, ", "))));
 }
 
 void repeat_warnings(const GivenMesh& mesh, Journal& journal) {
@@ -67,7 +87,7 @@ std::vector<Vec3> read_seeds(const std::string& path, const Given& given, std::s
 std::vector<double> read_density(const std::string& path, const std::string& attribute, const Given& given,
                                  std::size_t vertices) {
   if (given.density.empty()) {
-    if (given.mesh) throw Error("--density: a mesh in memory has no attributes by name; give the values instead");
+    if (given.mesh) return given_density(*given.mesh, attribute);
     return is_tet_format(path) ? read_tet_attribute(path, attribute) : read_vertex_attribute(path, attribute);
   }
   if (given.density.size() != vertices)
@@ -85,6 +105,22 @@ std::vector<Index> read_kept(const std::string& path, const std::vector<Index>& 
   if (!kept.empty() && kept.back() >= count)
     throw Error(fmt::format("{}: there is no {} {}, the mesh has {}; leave it out", option, what, kept.back(), count));
   return kept;
+}
+
+void warn_of_lost_attributes(const std::string& path, const TriangleMesh& surface, Journal& journal) {
+  const std::string lost = loss_of_attributes(path, carried_attributes(surface));
+  if (!lost.empty()) journal.warn(lost);
+}
+
+void warn_of_lost_attributes(const std::string& path, const Domain& domain, Journal& journal) {
+  std::vector<Attribute> kept, left;
+  for (const Attribute& attribute : domain.tets ? domain.tets->attributes : domain.surface->attributes)
+    (domain.tets || attribute.site == Attribute::Site::vertex ? kept : left).push_back(attribute);
+  if (!left.empty())
+    journal.warn(fmt::format("attributes of faces do not become those of tetrahedra: {} {} lost",
+                             fmt::join(names_of(left), ", "), left.size() == 1 ? "is" : "are"));
+  const std::string lost = loss_of_attributes(path, kept);
+  if (!lost.empty()) journal.warn(lost);
 }
 
 void leave_out_folds(const WrapOption& wrap, FeatureOptions& features) {

@@ -36,6 +36,11 @@ std::vector<double> read_density(const std::string& path, const std::string& att
 std::vector<Index> read_kept(const std::string& path, const std::vector<Index>& given, std::size_t count,
                              const char* what, const char* option);
 
+// Warns of attributes of the input that a file of a result has no place for, and of those that tetrahedra do not get
+// from a surface.
+void warn_of_lost_attributes(const std::string& path, const TriangleMesh& surface, Journal& journal);
+void warn_of_lost_attributes(const std::string& path, const Domain& domain, Journal& journal);
+
 // Folds of a wrap are those of its own triangles: creases are not looked for by themselves there.
 void leave_out_folds(const WrapOption& wrap, FeatureOptions& features);
 

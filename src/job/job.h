@@ -130,6 +130,11 @@ class Job {
   virtual view::Scene scene(const std::string& output) = 0;
   // What the result consists of.
   virtual std::vector<ArrayView> arrays() { return {}; }
+  // What it has from the input's.
+  virtual const std::vector<Attribute>& attributes() const {
+    static const std::vector<Attribute> none;
+    return none;
+  }
 
   Json seconds = {{"total", 0.0}};  // of the report
 

@@ -8,6 +8,7 @@
 #include "bisector/preview.h"
 #include "core/geometry.h"
 #include "core/stopwatch.h"
+#include "io/files.h"
 #include "job/inputs.h"
 #include "job/messages.h"
 #include "job/outputs.h"
@@ -89,7 +90,16 @@ std::vector<OutputKind> RemeshJob::outputs() const {
            "FILE",
            "write the result's feature edges, as lines of two vertex\n"
            "numbers; an .obj output then holds them too, as lines l",
-           {}}};
+           {}},
+          {"map",
+           "--map",
+           "FILE",
+           "write where on the input each vertex of the result is:\n"
+           "lines of a face, its triangle's three vertices and their\n"
+           "weights",
+           {},
+           false,
+           true}};
 }
 
 void RemeshJob::add_options(CLI::App* app) {
@@ -195,16 +205,15 @@ void RemeshJob::keep() {
   options_.keep_vertices =
       read_kept(keep_vertices_, given.keep_vertices, surface->vertices.size(), "vertex", "--keep-vertices");
   // Faces of more than three corners were split.
-  const std::vector<Index>& face_of = surface->face_of_triangle;
+  const std::vector<Index>& faces_of = surface->face_of_triangle;
   const std::size_t triangles = surface->triangles.size();
   const std::size_t faces =
-      face_of.empty() ? triangles : std::size_t{*std::max_element(face_of.begin(), face_of.end())} + 1;
+      faces_of.empty() ? triangles : std::size_t{*std::max_element(faces_of.begin(), faces_of.end())} + 1;
   const std::vector<Index> kept = read_kept(keep_faces_, given.keep_faces, faces, "face", "--keep-faces");
   if (wrap_.on && !(kept.empty() && options_.keep_vertices.empty()))
     throw Error("--wrap: a wrap has other vertices than its input; keep none of them, or leave --wrap out");
   for (Index t = 0; t < triangles; ++t)
-    if (std::binary_search(kept.begin(), kept.end(), face_of.empty() ? t : face_of[t]))
-      options_.keep_triangles.push_back(t);
+    if (std::binary_search(kept.begin(), kept.end(), face_of(t))) options_.keep_triangles.push_back(t);
 }
 
 // What the options say, with the files that they name.
@@ -225,6 +234,7 @@ void RemeshJob::complete_options() {
 
 void RemeshJob::plan(std::string_view output, const std::string&) {
   if (output == "feature-output") wants_feature_edges_ = true;
+  if (output == "map") wants_map_ = true;
 }
 
 void RemeshJob::read(Journal& journal) {
@@ -236,7 +246,9 @@ void RemeshJob::read(Journal& journal) {
 }
 
 void RemeshJob::check_format(std::string_view output, const std::string& path, Journal& journal) const {
-  if (output != "output" || remeshed_surface().labels.empty()) return;
+  if (output != "output") return;
+  warn_of_lost_attributes(path, *surface, journal);
+  if (remeshed_surface().labels.empty()) return;
   const std::string lost = lost_labels(path, !remeshed_surface().label_names.empty(), "the input's");
   if (!lost.empty()) journal.warn(lost);
 }
@@ -251,7 +263,32 @@ void RemeshJob::compute(Journal& journal) {
   const Stopwatch measuring;
   quality = measure_quality(result.mesh);
   seconds["quality"] = measuring.seconds();
+  carry(journal);
   seconds["io"] = io_;
+}
+
+void RemeshJob::carry(Journal& journal) {
+  const Stopwatch carrying;
+  result.mesh.material_files = surface->material_files;
+  if (wrapped_.is_null()) result.mesh.label_materials = surface->label_materials;
+  if (wants_map_ || !surface->attributes.empty()) {
+    journal.phase("carrying attributes");
+    map_ = map_to_surface(result.mesh.vertices, *surface, journal.context());
+    carry_attributes(*surface, map_, result.mesh, journal.context());
+  }
+  seconds["attributes"] = carrying.seconds();
+}
+
+// Faces are those of the file, which may have had more than three corners.
+std::string RemeshJob::map_text() const {
+  std::string text = "# face, three of its vertices, their weights: of each vertex of the result\n";
+  for (std::size_t v = 0; v < map_.triangles.size(); ++v) {
+    const Index t = map_.triangles[v];
+    const Triangle& corners = surface->triangles[t];
+    const std::array<double, 3>& w = map_.weights[v];
+    text += fmt::format("{} {} {} {} {} {} {}\n", face_of(t), corners[0], corners[1], corners[2], w[0], w[1], w[2]);
+  }
+  return text;
 }
 
 Json RemeshJob::report(Journal& journal) {
@@ -283,6 +320,7 @@ Json RemeshJob::report(Journal& journal) {
                       {"faces", result.kept_triangles}};
   report["features"] = features_json(result.features, result.mesh.feature_edges.size());
   report["detail"] = detail_json(result.detail, result.features.curves);
+  report["attributes"] = attributes_json(result.mesh.attributes);
   report["sizing"] = {{"wanted", result.wanted}, {"edge_length", result.edge_length}};
   report["noisy"] = result.noisy;
   report["weld"] = weld_json(result.welded);
@@ -314,13 +352,21 @@ void RemeshJob::write(std::string_view output, const std::string& path, const st
   options.lines = wants_feature_edges_;
   if (output == "output") write_mesh(path, result.mesh, options);
   else if (output == "preview") write_preview(path, result.mesh);
+  else if (output == "map") write_file(path, map_text());
   else write_feature_edges(path, result.mesh.feature_edges);
 }
 
 std::vector<ArrayView> RemeshJob::arrays() {
-  return {array_of("vertices", result.mesh.vertices), array_of("faces", result.mesh.triangles),
-          array_of("labels", result.mesh.labels), array_of("feature_edges", result.mesh.feature_edges),
-          array_of("kept", result.kept)};
+  map_faces_.clear();
+  if (wants_map_)
+    for (const Index t : map_.triangles) map_faces_.push_back(face_of(t));
+  return {array_of("vertices", result.mesh.vertices),
+          array_of("faces", result.mesh.triangles),
+          array_of("labels", result.mesh.labels),
+          array_of("feature_edges", result.mesh.feature_edges),
+          array_of("kept", result.kept),
+          array_of("map_faces", map_faces_),
+          {"map_weights", ArrayView::Type::double_, map_.weights.data(), map_.weights.size(), 3}};
 }
 
 }  // namespace bisector::job

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bisector/attributes.h"
 #include "bisector/quality.h"
 #include "bisector/remesh.h"
 #include "job/job.h"
@@ -30,6 +31,7 @@ class RemeshJob final : public Job {
   view::Scene scene(const std::string& output) override;
   void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
   std::vector<ArrayView> arrays() override;
+  const std::vector<Attribute>& attributes() const override { return result.mesh.attributes; }
 
   std::shared_ptr<const TriangleMesh> surface;  // the input
   RemeshResult result;
@@ -38,6 +40,11 @@ class RemeshJob final : public Job {
  private:
   void complete_options();
   void keep();
+  void carry(Journal& journal);
+  std::string map_text() const;
+  Index face_of(Index triangle) const {
+    return surface->face_of_triangle.empty() ? triangle : surface->face_of_triangle[triangle];
+  }
   const TriangleMesh& remeshed_surface() const { return wrapped_.is_null() ? *surface : wrap_mesh_; }
 
   std::string seeds_, feature_file_;
@@ -46,6 +53,9 @@ class RemeshJob final : public Job {
   double edge_length_relative_ = 0;   // of the input's diagonal; 0: not given
   double weld_ = -1;                  // not given
   bool wants_feature_edges_ = false;  // --feature-output is given
+  bool wants_map_ = false;            // --map is
+  SurfaceMap map_;                    // of the result's vertices, where it is wanted or there are attributes
+  std::vector<Index> map_faces_;      // for arrays()
   WrapOption wrap_;
   RemeshOptions options_;
   TriangleMesh wrap_mesh_;

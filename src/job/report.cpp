@@ -97,6 +97,17 @@ Json output_json(const TriangleMesh& mesh) {
   return {{"vertices", mesh.vertices.size()}, {"faces", mesh.triangles.size()}};
 }
 
+Json attributes_json(const std::vector<Attribute>& attributes) {
+  Json list = Json::array();
+  for (const Attribute& attribute : attributes)
+    list.push_back({{"name", attribute.name},
+                    {"of", attribute.site == Attribute::Site::vertex    ? "vertices"
+                           : attribute.site == Attribute::Site::element ? "elements"
+                                                                        : "corners"},
+                    {"components", attribute.components}});
+  return list;
+}
+
 Json size_json(const TetMesh& mesh) {
   return {{"vertices", mesh.vertices.size()}, {"faces", mesh.boundary.size()}, {"tets", mesh.tets.size()}};
 }

@@ -26,6 +26,7 @@ void add_device(Json& report, const BackendDescription& device, const DeviceSeco
                 int evaluations);
 Json input_json(const TriangleMesh& mesh);  // faces as in the file
 Json output_json(const TriangleMesh& mesh);
+Json attributes_json(const std::vector<Attribute>& attributes);
 Json size_json(const TetMesh& mesh);  // faces: marked triangles
 Json certification_json(const Certification& certification);
 Json topology_json(const MeshTopology& topology);

@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "bisector/attributes.h"
 #include "bisector/io.h"
 #include "bisector/preview.h"
 #include "core/geometry.h"
@@ -221,6 +222,22 @@ void TetJob::read(Journal& journal) {
   wrapped_ = wrap_if_asked(wrap_, *domain.surface, options_.vertices, options_.edge_length, true, journal, wrap_mesh_);
 }
 
+void TetJob::check_format(std::string_view output, const std::string& path, Journal& journal) const {
+  if (output == "output") warn_of_lost_attributes(path, domain, journal);
+}
+
+void TetJob::carry(Journal& journal) {
+  const Stopwatch carrying;
+  const Context context = journal.context();
+  TetMesh& mesh = result.mesh;
+  if (!(domain.tets ? domain.tets->attributes : domain.surface->attributes).empty()) {
+    journal.phase("carrying attributes");
+    if (domain.tets) carry_attributes(*domain.tets, map_to_solid(mesh.vertices, *domain.tets, context), mesh, context);
+    else carry_attributes(*domain.surface, map_to_surface(mesh.vertices, *domain.surface, context), mesh, context);
+  }
+  seconds["attributes"] = carrying.seconds();
+}
+
 void TetJob::compute(Journal& journal) {
   const Context context = journal.context();
   result = !wrapped_.is_null() ? tetrahedralise(wrap_mesh_, options_, context)
@@ -235,6 +252,7 @@ void TetJob::compute(Journal& journal) {
   measures.boundary = measure_quality(boundary_mesh(result.mesh));
   measures.topology = analyse_tet_topology(result.mesh);
   seconds["quality"] = measuring.seconds();
+  carry(journal);
   seconds["io"] = io_;
   warn_of(journal, options_, result, measures);
 }
@@ -264,6 +282,7 @@ Json TetJob::report(Journal& journal) {
   report["topology"]["ball_property"] = result.boundary.ball_property;
   report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
   report["detail"] = detail_json(result.detail, result.boundary.features.curves);
+  report["attributes"] = attributes_json(result.mesh.attributes);
   report["sizing"] = {
       {"wanted", result.wanted}, {"edge_length", result.edge_length}, {"boundary_vertices", result.boundary_vertices}};
   report["conform"] = {{"delaunay", result.delaunay},

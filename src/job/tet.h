@@ -27,11 +27,13 @@ class TetJob final : public Job {
   void check_usage(const Usage& usage) override;
   std::vector<std::string> input_files() const override;
   void read(Journal& journal) override;
+  void check_format(std::string_view output, const std::string& path, Journal& journal) const override;
   void compute(Journal& journal) override;
   Json report(Journal& journal) override;
   view::Scene scene(const std::string& output) override;
   void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
   std::vector<ArrayView> arrays() override;
+  const std::vector<Attribute>& attributes() const override { return result.mesh.attributes; }
 
   Domain domain;  // the input
   TetResult result;
@@ -39,6 +41,7 @@ class TetJob final : public Job {
 
  private:
   void complete_options();
+  void carry(Journal& journal);
 
   std::string seeds_, sizes_, feature_file_;
   std::string attribute_;            // of the input's vertices, a density

@@ -12,8 +12,8 @@ namespace bisector {
 std::vector<Triangle> boundary_facets(const std::vector<Tetrahedron>& tets);
 
 // The boundary as a surface of its own: the vertices that it uses, ascending, the labels of marked triangles (0
-// elsewhere, none if all are 0), and those feature edges that are edges of it. `vertices`, if not null, gets the mesh's
-// vertex of each.
+// elsewhere, none if all are 0), those feature edges that are edges of it, and the attributes of vertices. `vertices`,
+// if not null, gets the mesh's vertex of each.
 TriangleMesh boundary_surface(const TetMesh& mesh, std::vector<Index>* vertices = nullptr);
 
 }  // namespace bisector

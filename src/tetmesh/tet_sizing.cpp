@@ -17,7 +17,7 @@
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "features/size_field.h"
-#include "tetmesh/locate.h"
+#include "mesh/locate.h"
 
 namespace bisector {
 namespace {

@@ -183,6 +183,52 @@ static void test_arrays(void) {
   EXPECT(bisector_mesh_from_file("", &mesh) == BISECTOR_FAILED);
 }
 
+static void test_attributes(void) {
+  bisector_mesh* mesh = NULL;
+  bisector_options* options = options_for("remesh", "100");
+  bisector_result* result = NULL;
+  bisector_mesh_arrays arrays = cube_arrays();
+  bisector_attribute given[2] = {{"place", BISECTOR_VERTEX, BISECTOR_NUMBER_FLOAT64, 3, vertices, 3 * VERTICES},
+                                 {"side", BISECTOR_ELEMENT, BISECTOR_NUMBER_INT32, 1, NULL, FACES}};
+  bisector_attribute got;
+  bisector_array points;
+  double sides[FACES];
+  size_t count = 0;
+  for (int f = 0; f < FACES; ++f) sides[f] = f;
+  given[1].values = sides;
+  arrays.attributes = given;
+  arrays.attribute_count = 2;
+  EXPECT(bisector_mesh_from_arrays(&arrays, &mesh) == BISECTOR_OK);
+  EXPECT(bisector_run(options, mesh, NULL, &result) == BISECTOR_OK);
+  EXPECT(bisector_result_attribute_count(result, &count) == BISECTOR_OK && count == 2);
+  EXPECT(bisector_result_array(result, "vertices", &points) == BISECTOR_OK);
+  EXPECT(bisector_result_attribute(result, 0, &got) == BISECTOR_OK);
+  EXPECT(strcmp(got.name, "place") == 0 && got.site == BISECTOR_VERTEX && got.number == BISECTOR_NUMBER_FLOAT64);
+  EXPECT(got.components == 3 && got.count == 3 * points.rows);
+  for (size_t i = 0; i < got.count; ++i) EXPECT(fabs(got.values[i] - ((const double*)points.data)[i]) < 1e-9);
+  EXPECT(bisector_result_attribute(result, 1, &got) == BISECTOR_OK && got.site == BISECTOR_ELEMENT);
+  for (size_t i = 0; i < got.count; ++i) EXPECT(got.values[i] >= 0 && got.values[i] < FACES);
+  EXPECT(bisector_result_attribute(result, 2, &got) == BISECTOR_FAILED && says("attribute 2"));
+  EXPECT(bisector_result_attribute(NULL, 0, &got) == BISECTOR_MISUSE);
+  EXPECT(bisector_result_attribute_count(result, NULL) == BISECTOR_MISUSE);
+  EXPECT(bisector_result_free(result) == BISECTOR_OK);
+  EXPECT(bisector_mesh_free(mesh) == BISECTOR_OK);
+  EXPECT(bisector_options_free(options) == BISECTOR_OK);
+
+  given[0].count = 5;
+  EXPECT(bisector_mesh_from_arrays(&arrays, &mesh) == BISECTOR_FAILED && says("'place' has 5 values"));
+  given[0].count = 3 * VERTICES;
+  given[0].site = 7;
+  EXPECT(bisector_mesh_from_arrays(&arrays, &mesh) == BISECTOR_MISUSE && says("bisector_site"));
+  given[0].site = BISECTOR_VERTEX;
+  given[1].number = -1;
+  EXPECT(bisector_mesh_from_arrays(&arrays, &mesh) == BISECTOR_MISUSE && says("bisector_number"));
+  given[1].name = NULL;
+  EXPECT(bisector_mesh_from_arrays(&arrays, &mesh) == BISECTOR_MISUSE && says("no name"));
+  arrays.attributes = NULL;
+  EXPECT(bisector_mesh_from_arrays(&arrays, &mesh) == BISECTOR_MISUSE);
+}
+
 static void test_options(void) {
   bisector_mesh* mesh = cube();
   bisector_options* options = NULL;
@@ -249,6 +295,7 @@ int main(int argc, char** argv) {
   test_run(argc > 1 ? argv[1] : ".");
   test_handles();
   test_arrays();
+  test_attributes();
   test_options();
   test_cancel();
   if (failures) fprintf(stderr, "c_test: %d failures\n", failures);

@@ -999,6 +999,72 @@ TEST_F(CliRemesh, SoupIsWrapped) {
   refused(2, {"--wrap", "0.1", "--keep-faces", in("edges.txt")}, "--keep-faces");
 }
 
+// Coordinates are their own attributes, and the map puts the vertices together from the input's.
+TEST_F(CliRemesh, AttributesComeThrough) {
+  TriangleMesh ball = test::icosphere(4);
+  Attribute xyz{"place", Attribute::Site::vertex, Attribute::Type::float64, 3};
+  for (const Vec3& p : ball.vertices) xyz.values.insert(xyz.values.end(), {p.x, p.y, p.z});
+  Attribute half{"half", Attribute::Site::element, Attribute::Type::int32, 1};
+  for (const Triangle& t : ball.triangles) half.values.push_back(ball.vertices[t[0]].z > 0 ? 1 : 0);
+  ball.attributes = {xyz, half};
+  write_mesh(in("ball.ply"), ball);
+  const Json report = remesh("ball.ply", {"-n", "300", "--map", in("map.txt")});
+  ASSERT_EQ(report["attributes"].size(), 2u);
+  EXPECT_EQ(report["attributes"][0]["name"], "place");
+  EXPECT_EQ(report["attributes"][0]["of"], "vertices");
+  EXPECT_EQ(report["attributes"][1]["of"], "elements");
+  EXPECT_TRUE(report["seconds"]["attributes"].is_number());
+  const TriangleMesh result = output();
+  ASSERT_EQ(result.attributes.size(), 2u);
+  std::ifstream map(in("map.txt"));
+  std::string line;
+  std::getline(map, line);
+  EXPECT_TRUE(line.starts_with('#'));
+  for (std::size_t v = 0; v < result.vertices.size(); ++v) {
+    const Vec3& p = result.vertices[v];
+    std::size_t face = 0;
+    std::array<std::size_t, 3> corners{};
+    std::array<double, 3> weights{};
+    map >> face >> corners[0] >> corners[1] >> corners[2] >> weights[0] >> weights[1] >> weights[2];
+    ASSERT_TRUE(map) << v;
+    const Triangle& t = ball.triangles.at(face);
+    Vec3 q;
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(t[k], corners[k]);
+      q += weights[k] * ball.vertices[t[k]];
+    }
+    EXPECT_LT(norm(q - p), 1e-12);
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(result.attributes[0].values[3 * v + static_cast<std::size_t>(k)], p[k], 1e-12);
+  }
+  for (std::size_t t = 0; t < result.triangles.size(); ++t) {
+    double z = 0;
+    for (const Index v : result.triangles[t]) z += result.vertices[v].z / 3;
+    if (std::abs(z) > 0.1) {
+      EXPECT_EQ(result.attributes[1].values[t], z > 0 ? 1 : 0);
+    }
+  }
+
+  const Result lost = run({"remesh", in("ball.ply"), "-o", in("ball.stl"), "-n", "300"});
+  EXPECT_EQ(lost.code, 0);
+  EXPECT_NE(lost.err.find("no place for place, half, which are lost; write .ply or .vtp"), std::string::npos)
+      << lost.err;
+  const Result solid = run({"tet", in("ball.ply"), "-o", in("ball.vtu"), "-n", "200"});
+  EXPECT_EQ(solid.code, 0);
+  EXPECT_NE(solid.err.find("half is lost"), std::string::npos) << solid.err;
+  const TetMesh filled = read_tet_mesh(in("ball.vtu"));
+  ASSERT_EQ(filled.attributes.size(), 1u);
+  std::size_t inside = 0;
+  for (std::size_t v = 0; v < filled.vertices.size(); ++v) {
+    const double* at = filled.attributes[0].values.data() + 3 * v;
+    const Vec3 place{at[0], at[1], at[2]}, p = filled.vertices[v];
+    EXPECT_NEAR(norm(place), 1, 0.01);
+    EXPECT_NEAR(norm(place - p), 1 - norm(p), 0.02);
+    inside += norm(p) < 0.9;
+  }
+  EXPECT_GT(inside, 0u);
+}
+
 TEST_F(CliRemesh, ReportHasWhatIsDocumented) {
   write_mesh(in("box.off"), test::box(2));
   const Json report = remesh("box.off", {"-n", "100", "--fit"});

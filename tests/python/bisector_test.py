@@ -214,6 +214,53 @@ class Arrays(unittest.TestCase):
         without = bs.remesh((flat, faces), n=200, features=89)
         self.assertGreater(len(kept.feature_edges), len(without.feature_edges))
 
+    def test_data(self):
+        vertices, faces = cube()
+        triangles = triangle_fan(faces)
+        part = (vertices[triangles][:, :, 2].mean(axis=1) > 0.5).astype(np.int16)
+        corners = vertices[triangles][:, :, :2].astype(np.float32)
+        r = bs.remesh((vertices, triangles), n=200, map=True,
+                      vertex_data={"place": vertices, "warm": vertices[:, 2] > 0.5}, face_data={"part": part},
+                      corner_data={"texcoord": corners, "height": vertices[triangles][:, :, 2]})
+        self.assertTrue(np.allclose(r.vertex_data["place"], r.vertices, atol=1e-12))
+        self.assertEqual(r.vertex_data["warm"].dtype, np.uint8)
+        self.assertEqual(set(r.vertex_data["warm"]), {0, 1})
+        middles = r.vertices[r.faces].mean(axis=1)[:, 2]
+        sure = np.abs(middles - 0.5) > 0.25
+        self.assertEqual(r.face_data["part"].dtype, np.int16)
+        self.assertTrue(np.array_equal(r.face_data["part"][sure], middles[sure] > 0.5))
+        self.assertEqual(r.corner_data["texcoord"].dtype, np.float32)
+        self.assertTrue(np.allclose(r.corner_data["texcoord"], r.vertices[r.faces][:, :, :2], atol=1e-6))
+        self.assertEqual(r.corner_data["height"].shape, r.faces.shape)
+        on, weights = r.map
+        self.assertTrue(np.allclose(np.einsum("nk,nkd->nd", weights, vertices[triangles[on]]), r.vertices, atol=1e-12))
+        with self.assertRaises(ValueError):
+            r.vertex_data["place"][0] = 0
+        again = bs.remesh(r, n=100)  # a result brings its own
+        self.assertTrue(np.allclose(again.vertex_data["place"], again.vertices, atol=1e-12))
+        self.assertEqual(set(again.face_data), {"part"})
+        dense = bs.remesh((vertices, triangles), n=200, density="attribute:rho",
+                          vertex_data={"rho": np.exp(4 * vertices[:, 2])})
+        self.assertGreater(np.mean(dense.vertices[:, 2] > 0.5), 0.6)
+        with self.assertRaisesRegex(bs.Error, "no numbers 'none', use one of rho"):
+            bs.remesh((vertices, triangles), n=200, density="attribute:none", vertex_data={"rho": vertices[:, 2]})
+        for data in ({"place": vertices[1:]}, {"name": np.array(["a"] * len(vertices))}):
+            with self.assertRaises(bs.Error):
+                bs.remesh((vertices, triangles), n=200, vertex_data=data)
+        with self.assertRaisesRegex(bs.Error, "a file has its own"):
+            bs.remesh(SMOOTH, n=200, vertex_data={"place": vertices})
+
+        t = bs.tetrahedralize((vertices, triangles), n=200, iterations=3, vertex_data={"place": vertices})
+        depth = np.min(np.minimum(t.vertices, 1 - t.vertices), axis=1)
+        self.assertTrue(np.allclose(np.linalg.norm(t.vertex_data["place"] - t.vertices, axis=1), depth, atol=1e-12))
+        cells = t.vertices[t.tets].mean(axis=1)
+        u = bs.tetrahedralize((t.vertices, t.tets), n=150, iterations=3, vertex_data={"place": t.vertices},
+                              cell_data={"above": (cells[:, 2] > 0.5).astype(np.uint8)})
+        self.assertLess(np.abs(u.vertex_data["place"] - u.vertices).max(), 1e-3 * np.sqrt(3))
+        middles = u.vertices[u.tets].mean(axis=1)[:, 2]
+        sure = np.abs(middles - 0.5) > 0.3
+        self.assertTrue(np.array_equal(u.cell_data["above"][sure], middles[sure] > 0.5))
+
     def test_density_and_sizes(self):
         vertices, faces = read_off(SMOOTH)
         density = np.exp(vertices[:, 0] / 20)
@@ -295,7 +342,8 @@ class Arrays(unittest.TestCase):
             self.assertEqual(len(set(accessor(given).segment(6).cell_data["label"])), 6)
 
     def test_packages(self):
-        r = bs.remesh(cube(), n=60)
+        vertices, faces = cube()
+        r = bs.remesh((vertices, faces), n=60, vertex_data={"place": vertices}, face_data={"number": np.arange(len(faces))})
         expected = bs.remesh(r, n=40).vertices
         for package, convert in (("meshio", r.to_meshio), ("trimesh", r.to_trimesh), ("pyvista", r.to_pyvista)):
             with self.subTest(package):
@@ -303,7 +351,10 @@ class Arrays(unittest.TestCase):
                     __import__(package)
                 except ImportError:
                     self.skipTest(f"{package} is not installed")
-                self.assertTrue(np.array_equal(bs.remesh(convert(), n=40).vertices, expected))
+                back = bs.remesh(convert(), n=40)
+                self.assertTrue(np.array_equal(back.vertices, expected))
+                self.assertTrue(np.allclose(back.vertex_data["place"], back.vertices, atol=1e-12))
+                self.assertEqual(back.face_data["number"].dtype, np.int64)
         t = bs.tetrahedralize(r, n=60, iterations=3)
         with contextlib.suppress(ImportError):
             mesh = t.to_meshio()
@@ -451,7 +502,6 @@ class Running(unittest.TestCase):
         between = np.diff([start, *ticks])
         self.assertLess(between.max(), 0.5)
 
-    @unittest.skipUnless(hasattr(ctypes.CDLL(None), "mallinfo2"), "needs glibc's count of what is allocated")
     def test_kept(self):
         vertices, faces = cube()
         r = bs.remesh((vertices, faces), n=200, keep_vertices=[7], keep_faces=np.array([0, 1, 5]))
@@ -461,6 +511,7 @@ class Running(unittest.TestCase):
         with self.assertRaisesRegex(bs.Error, "face 999"):
             bs.remesh((vertices, faces), n=200, keep_faces=[999])
 
+    @unittest.skipUnless(hasattr(ctypes.CDLL(None), "mallinfo2"), "needs glibc's count of what is allocated")
     def test_a_thousand_calls_leak_nothing(self):
         mesh = cube(3)
         bad = (mesh[0], mesh[1] + 5)

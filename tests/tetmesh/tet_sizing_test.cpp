@@ -8,9 +8,9 @@
 #include "bisector/error.h"
 #include "core/parallel.h"
 #include "features/size_field.h"
+#include "mesh/locate.h"
 #include "mesh/tet_adjacency.h"
 #include "support/solids.h"
-#include "tetmesh/locate.h"
 #include "tetmesh/sample_solid.h"
 #include "tetmesh/tet_sizing.h"
 

@@ -1,4 +1,4 @@
-#include "tetmesh/locate.h"
+#include "mesh/locate.h"
 
 #include <algorithm>
 #include <array>
