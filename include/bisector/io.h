@@ -11,6 +11,7 @@
 #include "bisector/context.h"
 #include "bisector/export.h"
 #include "bisector/mesh.h"
+#include "bisector/second_order.h"
 
 namespace bisector {
 
@@ -22,7 +23,7 @@ struct FileFormat {
 
   std::string_view extension;  // in lower case, with the dot
   bool reads_surfaces = false, writes_surfaces = false, writes_polygons = false;
-  bool reads_tets = false, writes_tets = false;
+  bool reads_tets = false, writes_tets = false, writes_second_order = false;
   Labels labels = Labels::none;
 };
 
@@ -166,18 +167,20 @@ BISECTOR_API bool is_tet_format(const std::string& path);
 //
 // Throws Error, naming the file and the line, byte, vertex or cell, for: a missing, empty, damaged or truncated file,
 // other formats and versions, NaN or infinite coordinates and those beyond 1e100, an index out of range, a repeated
-// corner, and elements that are curved or neither tetrahedra, triangles, edges nor points. Memory is bounded by the
-// file's size.
-// Attributes are what else VTK's files have of points and tetrahedra.
+// corner, and elements that are neither tetrahedra, triangles, edges nor points. Elements of second order (not of
+// Medit) are read by their corners, with a warning; their nodes stay as vertices that nothing uses. Memory is bounded
+// by the file's size. Attributes are what else VTK's files have of points and tetrahedra.
 BISECTOR_API TetMesh read_tet_mesh(const std::string& path, const Context& context = {});
 
 // Writes Medit .mesh (ASCII) or .meshb (binary, version 2, beyond 2 GiB 3 or 4), Gmsh .msh (4.1, ASCII) or .vtu
 // (base64) by extension; read_tet_mesh brings back the same bits. In Gmsh each region is a volume, each label a
 // surface, and feature edges are curves between their branches, with physical groups of the mesh's names, region_K and
 // label_K where it has none, and features (volume and boundary where there are no numbers). Groups have the marks as
-// tags, or, if some mark is not positive, the next number from 1. The file appears under its name only when complete.
-// Throws Error, also for a mesh whose indices, coordinates or numbers of marks are unsound.
-BISECTOR_API void write_tet_mesh(const std::string& path, const TetMesh& mesh);
+// tags, or, if some mark is not positive, the next number from 1. With an `order` that is not empty elements are of
+// second order, in .msh and .vtu; the nodes follow the vertices in its order. The file appears under its name only when
+// complete. Throws Error, also for a mesh whose indices, coordinates or numbers of marks are unsound, and for an order
+// that is not that of the mesh.
+BISECTOR_API void write_tet_mesh(const std::string& path, const TetMesh& mesh, const SecondOrder& order = {});
 
 // A number for each vertex: the scalar point data `name` of a .vtk or .vtu file, or, for a .mesh or .meshb file, the
 // first scalar of the Medit solution beside it (NAME.sol; for NAME.meshb NAME.solb, if it is there; `name` does not

@@ -40,8 +40,8 @@ constexpr Format kFormats[] = {
     {".vtp", Labels::all, vtk_holds, read_vtp, nullptr, format_vtp, format_vtp},
     {".mesh", Labels::all, nullptr, nullptr, read_medit, nullptr, nullptr, format_medit},
     {".meshb", Labels::all, nullptr, nullptr, read_medit_binary, nullptr, nullptr, format_medit_binary},
-    {".msh", Labels::all, nullptr, nullptr, read_gmsh, nullptr, nullptr, format_gmsh},
-    {".vtu", Labels::all, vtk_holds, nullptr, read_vtu, nullptr, nullptr, format_vtu},
+    {".msh", Labels::all, nullptr, nullptr, read_gmsh, nullptr, nullptr, format_gmsh, true},
+    {".vtu", Labels::all, vtk_holds, nullptr, read_vtu, nullptr, nullptr, format_vtu, true},
     {".vtk", Labels::all, nullptr, nullptr, read_vtk},
 };
 
@@ -53,6 +53,7 @@ FileFormat told(const Format& format) {
   told.writes_polygons = format.bytes_of_polygons;
   told.reads_tets = format.read_tets;
   told.writes_tets = format.bytes_of_tets;
+  told.writes_second_order = format.has_second_order;
   told.labels = format.labels;
   return told;
 }

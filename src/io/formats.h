@@ -19,7 +19,8 @@ struct Format {
   TetSoup (*read_tets)(const std::string& path, std::string_view bytes) = nullptr;
   std::string (*bytes_of)(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options) = nullptr;
   std::string (*bytes_of_polygons)(const PolygonMesh& mesh, const WriteOptions& options) = nullptr;
-  std::string (*bytes_of_tets)(const TetMesh& mesh) = nullptr;
+  std::string (*bytes_of_tets)(const TetMesh& mesh, const SecondOrder& order) = nullptr;
+  bool has_second_order = false;
 };
 
 // The format of a file's extension. Throws Error, listing what `use` is true of, if there is none or it lacks that use;

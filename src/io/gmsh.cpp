@@ -9,6 +9,7 @@
 
 #include "core/grouping.h"
 #include "io/labels.h"
+#include "io/nodes.h"
 #include "io/tet_formats.h"
 
 namespace bisector::io {
@@ -18,6 +19,9 @@ namespace {
 constexpr const char* kRegionPrefix = "region_";
 constexpr const char* kLabelPrefix = "label_";
 constexpr const char* kUnmarked[] = {"volume", "boundary", "features"};
+
+// Types of elements.
+enum { kEdge = 1, kTriangle = 2, kTetrahedron = 4, kEdge3 = 8, kTriangle6 = 9, kTetrahedron10 = 11, kPoint = 15 };
 
 using EntityKey = std::pair<int, int>;  // dimension, tag
 
@@ -87,6 +91,7 @@ class GmshReader {
     soup.tets = std::move(tets_.elements);
     soup.triangles = std::move(triangles_.elements);
     soup.edges = std::move(edges_.elements);
+    soup.curved = curved_;
     return soup;
   }
 
@@ -225,15 +230,32 @@ class GmshReader {
     return static_cast<Index>(at);
   }
 
-  // Corners of a type of element, as far as it is read; 0: the element is passed over.
-  std::size_t corners_of(std::int64_t type) const {
+  // How many nodes a type of element has, and how many of these, the first ones, are corners.
+  struct Shape {
+    std::size_t corners, nodes;
+  };
+  Shape shape_of(std::int64_t type) const {
     switch (type) {
-      case 1: return 2;
-      case 2: return 3;
-      case 4: return 4;
-      case 15: return 1;
-      default: in_.fail(fmt::format("an element has type {}; {}", type, kLinearOnly));
+      case kEdge: return {2, 2};
+      case kTriangle: return {3, 3};
+      case kTetrahedron: return {4, 4};
+      case kEdge3: return {2, 3};
+      case kTriangle6: return {3, 6};
+      case kTetrahedron10: return {4, 10};
+      case kPoint: return {1, 1};
+      default: in_.fail(fmt::format("an element has type {}; {}", type, kUpToSecondOrder));
     }
+  }
+  // Reads the nodes of an element; `next` gives the next tag of one.
+  template <class Next>
+  std::array<Index, 4> read_corners(const Shape& shape, const Next& next) {
+    std::array<Index, 4> corners{};
+    for (std::size_t k = 0; k < shape.nodes; ++k) {
+      const Index v = vertex(next());
+      if (k < shape.corners) corners[k] = v;
+    }
+    curved_ += shape.nodes > shape.corners;
+    return corners;
   }
 
   void add(std::uint64_t tag, std::int64_t type, const std::array<Index, 4>& v, std::int32_t physical,
@@ -244,9 +266,9 @@ class GmshReader {
       marked.elementary.push_back(elementary);
       marked.tags.push_back(tag);
     };
-    if (type == 1) append(edges_, std::array<Index, 2>{v[0], v[1]});
-    if (type == 2) append(triangles_, Triangle{v[0], v[1], v[2]});
-    if (type == 4) append(tets_, v);
+    if (type == kEdge || type == kEdge3) append(edges_, std::array<Index, 2>{v[0], v[1]});
+    if (type == kTriangle || type == kTriangle6) append(triangles_, Triangle{v[0], v[1], v[2]});
+    if (type == kTetrahedron || type == kTetrahedron10) append(tets_, v);
   }
 
   void read_elements_2() {
@@ -271,15 +293,14 @@ class GmshReader {
         in_.value<std::int32_t>();
       }
       if (tags < 0) in_.fail(std::string("an element has a negative number of tags; ") + kExportAgain);
-      const std::size_t corners = corners_of(type);
+      const Shape shape = shape_of(type);
       std::int32_t mark[2] = {0, 0};
       for (std::int32_t k = 0; k < tags; ++k) {
         const auto tag = in_.value<std::int32_t>();
         if (k < 2) mark[k] = tag;
       }
-      std::array<Index, 4> v{};
-      for (std::size_t k = 0; k < corners; ++k) v[k] = vertex(static_cast<std::uint32_t>(in_.value<std::int32_t>()));
-      add(i, type, v, mark[0], mark[1]);
+      const auto next = [&] { return static_cast<std::uint32_t>(in_.value<std::int32_t>()); };
+      add(i, type, read_corners(shape, next), mark[0], mark[1]);
     }
   }
 
@@ -294,14 +315,14 @@ class GmshReader {
     for (std::size_t b = 0; b < blocks; ++b) {
       const int dimension = in_.value<std::int32_t>(), entity = in_.value<std::int32_t>();
       const std::int64_t type = in_.value<std::int32_t>();
-      const std::size_t size = in_.value<std::uint64_t>(), corners = corners_of(type);
-      in_.need_room(size, 1 + corners, 8, "elements");
+      const std::size_t size = in_.value<std::uint64_t>();
+      const Shape shape = shape_of(type);
+      in_.need_room(size, 1 + shape.nodes, 8, "elements");
       const auto group = physical_of_.find({dimension, entity});
       for (std::size_t i = 0; i < size; ++i) {
         const auto tag = in_.value<std::uint64_t>();
-        std::array<Index, 4> v{};
-        for (std::size_t k = 0; k < corners; ++k) v[k] = vertex(in_.value<std::uint64_t>());
-        add(tag, type, v, group == physical_of_.end() ? 0 : group->second, entity);
+        const auto corners = read_corners(shape, [&] { return in_.value<std::uint64_t>(); });
+        add(tag, type, corners, group == physical_of_.end() ? 0 : group->second, entity);
       }
       read += size;
     }
@@ -343,6 +364,7 @@ class GmshReader {
   }
 
   const std::string& path_;
+  std::size_t curved_ = 0;  // elements of second order
   MixedReader in_;
   bool old_ = false, binary_ = false;
   std::map<EntityKey, std::string> names_;
@@ -419,8 +441,8 @@ std::vector<std::vector<Index>> chain_edges(const std::vector<std::array<Index, 
 
 class GmshWriter {
  public:
-  explicit GmshWriter(const TetMesh& mesh)
-      : mesh_(mesh), volumes_(group_by_mark(mesh.tets.size(), mesh.regions)),
+  GmshWriter(const TetMesh& mesh, const SecondOrder& order)
+      : mesh_(mesh), order_(order), volumes_(group_by_mark(mesh.tets.size(), mesh.regions)),
         surfaces_(group_by_mark(mesh.boundary.size(), mesh.boundary_labels)),
         curves_(chain_edges(mesh.feature_edges, mesh.vertices.size(), corners_)) {}
 
@@ -499,18 +521,22 @@ class GmshWriter {
     out_ += "$EndEntities\n";
   }
 
-  // Every vertex belongs to the entity of lowest dimension that has it; one of no element to the first there is.
+  // Every vertex and node belongs to the entity of lowest dimension that has it; one of no element to the first there
+  // is.
   void write_nodes() {
-    std::vector<EntityKey> owner(mesh_.vertices.size(), {4, 0});
+    const std::vector<Vec3> points = vertices_and_nodes(mesh_, order_);
+    std::vector<EntityKey> owner(points.size(), {4, 0});
+    const auto claim_element = [&](const auto& element, const EntityKey& entity) {
+      for (const Index v : corners_and_nodes(element, order_, mesh_.vertices.size()))
+        owner[v] = std::min(owner[v], entity);
+    };
     const auto claim = [&](const Entities& entities, const auto& elements, int dimension) {
       for (std::size_t e = 0; e < entities.tags.size(); ++e)
-        for (const std::size_t i : entities.members[e])
-          for (const Index v : elements[i]) owner[v] = std::min(owner[v], {dimension, entities.tags[e]});
+        for (const std::size_t i : entities.members[e]) claim_element(elements[i], {dimension, entities.tags[e]});
     };
     claim(volumes_, mesh_.tets, 3);
     claim(surfaces_, mesh_.boundary, 2);
-    for (std::size_t c = 0; c < curves_.size(); ++c)
-      for (const Index v : curves_[c]) owner[v] = std::min(owner[v], {1, static_cast<int>(c) + 1});
+    each_edge([&](std::size_t c, const std::array<Index, 2>& e) { claim_element(e, {1, static_cast<int>(c) + 1}); });
     for (const Index v : corners_) owner[v] = {0, point_tag(v)};
     const EntityKey first = !volumes_.tags.empty()    ? EntityKey{3, volumes_.tags[0]}
                             : !surfaces_.tags.empty() ? EntityKey{2, surfaces_.tags[0]}
@@ -521,23 +547,34 @@ class GmshWriter {
     for (const auto& [entity, vertices] : blocks) {
       print("{} {} 0 {}\n", entity.first, entity.second, vertices.size());
       for (const Index v : vertices) print("{}\n", std::size_t{v} + 1);
-      for (const Index v : vertices) append_point(out_, mesh_.vertices[v]);
+      for (const Index v : vertices) append_point(out_, points[v]);
     }
     out_ += "$EndNodes\n";
   }
 
-  template <class Corners>
-  void write_element(std::size_t tag, const Corners& corners) {
+  // Calls visit(curve, edge) for the edges of all curves.
+  template <class Visit>
+  void each_edge(const Visit& visit) const {
+    for (std::size_t c = 0; c < curves_.size(); ++c)
+      for (std::size_t i = 0; i + 1 < curves_[c].size(); ++i)
+        visit(c, std::array<Index, 2>{curves_[c][i], curves_[c][i + 1]});
+  }
+
+  template <std::size_t N>
+  void write_element(std::size_t tag, const std::array<Index, N>& corners) {
+    std::vector<Index> nodes = corners_and_nodes(corners, order_, mesh_.vertices.size());
+    if (nodes.size() == 10) std::swap(nodes[8], nodes[9]);  // VTK has the last two edges the other way round
     append_index(out_, tag);
-    for (const Index v : corners) {
+    for (const Index v : nodes) {
       out_ += ' ';
       append_index(out_, std::size_t{v} + 1);
     }
     out_ += '\n';
   }
   template <class Elements>
-  void write_elements(int dimension, int type, const Entities& entities, const Elements& elements,
+  void write_elements(int dimension, int straight, int curved, const Entities& entities, const Elements& elements,
                       std::size_t first_tag) {
+    const int type = order_.empty() ? straight : curved;
     for (std::size_t e = 0; e < entities.tags.size(); ++e) {
       print("{} {} {} {}\n", dimension, entities.tags[e], type, entities.members[e].size());
       for (const std::size_t i : entities.members[e]) write_element(first_tag + i, elements[i]);
@@ -550,16 +587,17 @@ class GmshWriter {
     print("$Elements\n{} {} {} {}\n", blocks, elements, elements == 0 ? 0 : 1, elements);
     std::size_t tag = 1;
     for (std::size_t c = 0; c < curves_.size(); ++c) {
-      print("1 {} 1 {}\n", c + 1, curves_[c].size() - 1);
+      print("1 {} {} {}\n", c + 1, order_.empty() ? +kEdge : +kEdge3, curves_[c].size() - 1);
       for (std::size_t i = 0; i + 1 < curves_[c].size(); ++i)
         write_element(tag++, std::array<Index, 2>{curves_[c][i], curves_[c][i + 1]});
     }
-    write_elements(2, 2, surfaces_, mesh_.boundary, tag);
-    write_elements(3, 4, volumes_, mesh_.tets, tag + mesh_.boundary.size());
+    write_elements(2, kTriangle, kTriangle6, surfaces_, mesh_.boundary, tag);
+    write_elements(3, kTetrahedron, kTetrahedron10, volumes_, mesh_.tets, tag + mesh_.boundary.size());
     out_ += "$EndElements\n";
   }
 
   const TetMesh& mesh_;
+  const SecondOrder& order_;
   Entities volumes_, surfaces_;
   std::vector<Index> corners_;  // ends of curves, ascending
   std::vector<std::vector<Index>> curves_;
@@ -570,6 +608,6 @@ class GmshWriter {
 
 TetSoup read_gmsh(const std::string& path, std::string_view bytes) { return GmshReader(path, bytes).read(); }
 
-std::string format_gmsh(const TetMesh& mesh) { return GmshWriter(mesh).write(); }
+std::string format_gmsh(const TetMesh& mesh, const SecondOrder& order) { return GmshWriter(mesh, order).write(); }
 
 }  // namespace bisector::io

@@ -260,7 +260,7 @@ TetSoup read_medit(const std::string& path, std::string_view bytes) {
   for (std::string_view keyword = in.word(); !keyword.empty() && keyword != "End"; keyword = in.word()) {
     if (read_keyword(medit, keyword, soup, vertices_seen)) continue;
     if (is_other_element(keyword)) {
-      if (in.count("elements") > 0) in.fail("the file has " + printable(keyword) + "; " + kLinearOnly);
+      if (in.count("elements") > 0) in.fail("the file has " + printable(keyword) + "; " + kStraightOnly);
     } else if (const int numbers = numbers_of(keyword); numbers > -2) {
       skip_items(in, keyword, numbers);
     } else {
@@ -280,7 +280,7 @@ TetSoup read_medit_binary(const std::string& path, std::string_view bytes) {
     const std::string_view keyword = keyword_of(code);
     if (read_keyword(medit, keyword, soup, vertices_seen)) continue;
     if (is_other_element(keyword) && medit.integer() > 0)
-      medit.in.fail("the file has " + std::string(keyword) + "; " + kLinearOnly);
+      medit.in.fail("the file has " + std::string(keyword) + "; " + kStraightOnly);
   }
   if (!vertices_seen) medit.in.fail(std::string("there are no 'Vertices'; ") + kExportAgain);
   return soup;
@@ -303,7 +303,7 @@ std::vector<double> read_medit_solution_binary(const std::string& path, std::str
   chain.medit().in.fail("there is no 'SolAtVertices'; give values at vertices");
 }
 
-std::string format_medit(const TetMesh& mesh) {
+std::string format_medit(const TetMesh& mesh, const SecondOrder&) {
   std::string out = fmt::format("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", mesh.vertices.size());
   for (const Vec3& p : mesh.vertices) {
     append_point(out, p);
@@ -407,6 +407,6 @@ class GmfWriter {
 
 }  // namespace
 
-std::string format_medit_binary(const TetMesh& mesh) { return GmfWriter(mesh).write(); }
+std::string format_medit_binary(const TetMesh& mesh, const SecondOrder&) { return GmfWriter(mesh).write(); }
 
 }  // namespace bisector::io

@@ -273,7 +273,7 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteOp
   TetMesh marks{mesh.vertices, {}, {}, mesh.triangles, mesh.labels, mesh.feature_edges, {}, mesh.label_names};
   std::copy_if(mesh.attributes.begin(), mesh.attributes.end(), std::back_inserter(marks.attributes),
                [](const Attribute& attribute) { return attribute.site == Attribute::Site::vertex; });
-  write_file(path, format.bytes_of_tets(marks));
+  write_file(path, format.bytes_of_tets(marks, {}));
 }
 
 void write_polygons(const std::string& path, const PolygonMesh& mesh, const WriteOptions& options) {

@@ -28,6 +28,7 @@ struct TetSoup {
   LabelNames region_names = {}, label_names = {};
   std::vector<Attribute> attributes = {};           // of vertices and tetrahedra
   std::vector<Attribute> triangle_attributes = {};  // elements are the triangles
+  std::size_t curved = 0;                           // elements of second order, of which the corners were taken
 };
 
 // What read_tet_mesh() makes of a file's contents, with its warnings; the path is for these.
@@ -49,10 +50,10 @@ std::vector<double> read_medit_solution(const std::string& path, std::string_vie
 std::vector<double> read_medit_solution_binary(const std::string& path, std::string_view bytes);
 
 // The bytes of a file; the mesh must be sound.
-std::string format_medit(const TetMesh& mesh);
-std::string format_medit_binary(const TetMesh& mesh);
-std::string format_gmsh(const TetMesh& mesh);
-std::string format_vtu(const TetMesh& mesh);
+std::string format_medit(const TetMesh& mesh, const SecondOrder& order);
+std::string format_medit_binary(const TetMesh& mesh, const SecondOrder& order);
+std::string format_gmsh(const TetMesh& mesh, const SecondOrder& order);
+std::string format_vtu(const TetMesh& mesh, const SecondOrder& order);
 
 // Words and bytes of a file that has both. Words may be spread over lines in any way.
 class MixedReader {
@@ -179,7 +180,9 @@ class MixedReader {
                          vertices));
 }
 
-inline constexpr const char* kLinearOnly =
+inline constexpr const char* kStraightOnly =
     "only tetrahedra, triangles and edges of straight sides are read; convert the mesh";
+inline constexpr const char* kUpToSecondOrder =
+    "only tetrahedra, triangles and edges of first or second order are read; convert the mesh";
 
 }  // namespace bisector::io

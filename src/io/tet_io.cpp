@@ -104,6 +104,24 @@ void check_sound(const std::string& path, const TetMesh& mesh) {
   check_attributes(mesh);
 }
 
+// Every edge has its node.
+void check_order(const std::string& path, const TetMesh& mesh, const SecondOrder& order) {
+  if (order.empty()) return;
+  if (order.nodes.size() != order.edges.size())
+    fail(path, fmt::format("{} nodes for {} edges; give one each", order.nodes.size(), order.edges.size()));
+  const auto check = [&](const auto& elements) {
+    for (const auto& element : elements)
+      for (std::size_t i = 0; i < element.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j)
+          if (order.node_of(element[i], element[j]) == kNone)
+            fail(path, fmt::format("the edge of vertices {} and {} has no node; nothing was written", element[j],
+                                   element[i]));
+  };
+  check(mesh.tets);
+  check(mesh.boundary);
+  check(mesh.feature_edges);
+}
+
 }  // namespace
 
 bool is_tet_format(const std::string& path) {
@@ -144,6 +162,9 @@ TetMesh io::mesh_of(const std::string& path, TetSoup soup, const Context& contex
   mesh.region_names = std::move(soup.region_names);
   mesh.label_names = std::move(soup.label_names);
   mesh.attributes = std::move(soup.attributes);
+  if (soup.curved > 0)
+    context.warn(fmt::format("{}: {} of second order taken by their corners", name_of(path),
+                             quantity(soup.curved, "element", "elements")));
   turn_positive(path, mesh, context);
   turn_outward(mesh);
   drop_zero_marks(mesh.regions);
@@ -163,10 +184,13 @@ TetMesh read_tet_mesh(const std::string& path, const Context& context) {
   return mesh_of(path, format.read_tets(path, read_bytes(path)), context);
 }
 
-void write_tet_mesh(const std::string& path, const TetMesh& mesh) {
-  const Format& format = format_of(path, &FileFormat::writes_tets, "tetrahedral meshes");
+void write_tet_mesh(const std::string& path, const TetMesh& mesh, const SecondOrder& order) {
+  const Format& format = order.empty()
+                             ? format_of(path, &FileFormat::writes_tets, "tetrahedral meshes")
+                             : format_of(path, &FileFormat::writes_second_order, "tetrahedra of second order");
   check_sound(path, mesh);
-  write_file(path, format.bytes_of_tets(mesh));
+  check_order(path, mesh, order);
+  write_file(path, format.bytes_of_tets(mesh, order));
 }
 
 std::vector<double> read_tet_attribute(const std::string& path, const std::string& name) {

@@ -103,27 +103,37 @@ TetSoup soup_of_grid(const std::string& path, VtkGrid grid) {
   std::vector<std::size_t> tets, triangles;
   for (std::size_t i = 0; i < n; ++i) {
     const std::int64_t type = grid.types[i];
-    const bool read = type == kTetrahedron || type == kTriangle || type == kLine || type == kPolyLine;
-    if (!read && type != kVertex && type != kPolyVertex)
-      fail(path, fmt::format("cell {}: its type is {}; {}", i, type, kLinearOnly));
-    if (!read) continue;
+    if (type == kVertex || type == kPolyVertex) continue;
     const std::vector<Index> v = corners_of(path, grid.cells, i, grid.points.size());
     const auto need = [&](std::size_t corners) {
       if (v.size() != corners)
         fail(path, fmt::format("cell {}: it has {} vertices where its type {} has {}; {}", i, v.size(), type, corners,
                                kExportAgain));
     };
-    if (type == kTetrahedron) {
-      need(4);
-      soup.tets.push_back({v[0], v[1], v[2], v[3]});
-      tets.push_back(i);
-    } else if (type == kTriangle) {
-      need(3);
-      soup.triangles.push_back({v[0], v[1], v[2]});
-      triangles.push_back(i);
-    } else {
-      for (std::size_t k = 0; k + 1 < v.size(); ++k) soup.edges.push_back({v[k], v[k + 1]});
+    switch (type) {
+      case kQuadraticTetrahedron:
+      case kTetrahedron:
+        need(type == kTetrahedron ? 4 : 10);
+        soup.tets.push_back({v[0], v[1], v[2], v[3]});
+        tets.push_back(i);
+        break;
+      case kQuadraticTriangle:
+      case kTriangle:
+        need(type == kTriangle ? 3 : 6);
+        soup.triangles.push_back({v[0], v[1], v[2]});
+        triangles.push_back(i);
+        break;
+      case kQuadraticEdge:
+        need(3);
+        soup.edges.push_back({v[0], v[1]});
+        break;
+      case kLine:
+      case kPolyLine:
+        for (std::size_t k = 0; k + 1 < v.size(); ++k) soup.edges.push_back({v[k], v[k + 1]});
+        break;
+      default: fail(path, fmt::format("cell {}: its type is {}; {}", i, type, kUpToSecondOrder));
     }
+    soup.curved += type >= kQuadraticEdge;
   }
   for (const Attribute& array : grid.cell_data)
     if (array.values.size() != array.components * n)

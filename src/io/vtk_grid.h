@@ -9,7 +9,17 @@
 
 namespace bisector::io {
 
-enum VtkCell { kVertex = 1, kPolyVertex = 2, kLine = 3, kPolyLine = 4, kTriangle = 5, kTetrahedron = 10 };
+enum VtkCell {
+  kVertex = 1,
+  kPolyVertex = 2,
+  kLine = 3,
+  kPolyLine = 4,
+  kTriangle = 5,
+  kTetrahedron = 10,
+  kQuadraticEdge = 21,
+  kQuadraticTriangle = 22,
+  kQuadraticTetrahedron = 24
+};
 
 // Arrays of the cells or of the points, in the file's order and with different names; what they are of is not told.
 using VtkArrays = std::vector<Attribute>;

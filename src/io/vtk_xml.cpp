@@ -15,6 +15,7 @@
 #include "core/grouping.h"
 #include "io/attributes.h"
 #include "io/labels.h"
+#include "io/nodes.h"
 #include "io/vtk_grid.h"
 #include "io/xml.h"
 
@@ -490,25 +491,28 @@ std::string format_vtp(const PolygonMesh& mesh, const WriteOptions&) {
   return polydata_of(mesh.vertices, mesh.polygons, {mesh.labels.begin(), mesh.labels.end()}, mesh.feature_edges, {});
 }
 
-std::string format_vtu(const TetMesh& mesh) {
+std::string format_vtu(const TetMesh& mesh, const SecondOrder& order) {
   const std::size_t cells = mesh.tets.size() + mesh.boundary.size() + mesh.feature_edges.size();
   std::vector<std::int64_t> connectivity, offsets;
   std::vector<std::uint8_t> types;
-  const auto append = [&](const auto& elements, int type) {
+  const auto append = [&](const auto& elements, VtkCell straight, VtkCell curved) {
+    const VtkCell type = order.empty() ? straight : curved;
     for (const auto& element : elements) {
-      connectivity.insert(connectivity.end(), element.begin(), element.end());
+      const std::vector<Index> nodes = corners_and_nodes(element, order, mesh.vertices.size());
+      connectivity.insert(connectivity.end(), nodes.begin(), nodes.end());
       offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
       types.push_back(static_cast<std::uint8_t>(type));
     }
   };
-  append(mesh.tets, kTetrahedron);
-  append(mesh.boundary, kTriangle);
-  append(mesh.feature_edges, kLine);
+  append(mesh.tets, kTetrahedron, kQuadraticTetrahedron);
+  append(mesh.boundary, kTriangle, kQuadraticTriangle);
+  append(mesh.feature_edges, kLine, kQuadraticEdge);
 
   std::string out = file_start("UnstructuredGrid");
-  out += fmt::format("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", mesh.vertices.size(), cells);
-  append_points(out, mesh.vertices);
-  append_point_data(out, mesh.attributes);
+  out += fmt::format("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", mesh.vertices.size() + order.nodes.size(),
+                     cells);
+  append_points(out, vertices_and_nodes(mesh, order));
+  append_point_data(out, attributes_with_nodes(mesh.attributes, order));
   out += "<Cells>\n";
   append_array(out, "Int64", "connectivity", 1, connectivity);
   append_array(out, "Int64", "offsets", 1, offsets);

@@ -1,5 +1,6 @@
 #include "spatial/nearest.h"
 
+#include <CGAL/AABB_segment_primitive.h>
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>
@@ -61,6 +62,27 @@ NearestPoint NearestOnMesh::nearest(const Vec3& p, const NearestPoint& hint) con
   if (!known || !std::isfinite(norm2(hint.point))) return nearest(p);
   const Iterator primitive = tree_->triangles.cbegin() + (found - tree_->triangle_of.begin());
   return tree_->convert(tree_->tree.closest_point_and_primitive(point(p), {point(hint.point), primitive}));
+}
+
+struct NearestOnEdges::Tree {
+  using Primitive = CGAL::AABB_segment_primitive<Kernel, std::vector<Kernel::Segment_3>::const_iterator>;
+
+  std::vector<Kernel::Segment_3> segments;
+  CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree;
+};
+
+NearestOnEdges::NearestOnEdges(const std::vector<Vec3>& vertices, const std::vector<std::array<Index, 2>>& edges)
+    : tree_(std::make_unique<Tree>()) {
+  for (const auto& [a, b] : edges) tree_->segments.emplace_back(point(vertices[a]), point(vertices[b]));
+  tree_->tree.insert(tree_->segments.cbegin(), tree_->segments.cend());
+  tree_->tree.build();
+}
+
+NearestOnEdges::~NearestOnEdges() = default;
+
+Vec3 NearestOnEdges::nearest(const Vec3& p) const {
+  const Kernel::Point_3 found = tree_->tree.closest_point(point(p));
+  return {found.x(), found.y(), found.z()};
 }
 
 }  // namespace bisector

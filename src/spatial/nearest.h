@@ -1,7 +1,9 @@
-// Nearest points on a mesh, through an AABB tree.
+// Nearest points on triangles and edges, through AABB trees.
 #pragma once
 
+#include <array>
 #include <memory>
+#include <vector>
 
 #include "core/geometry.h"
 
@@ -25,6 +27,23 @@ class NearestOnMesh {
   // The same, faster the nearer `hint` is to p. `hint` must be a point of its triangle, up to
   // rounding; one that is not finite, or whose triangle was left out, is not used.
   NearestPoint nearest(const Vec3& p, const NearestPoint& hint) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+// Nearest points on edges between vertices, through an AABB tree.
+class NearestOnEdges {
+ public:
+  // There are some.
+  NearestOnEdges(const std::vector<Vec3>& vertices, const std::vector<std::array<Index, 2>>& edges);
+  ~NearestOnEdges();
+  NearestOnEdges(const NearestOnEdges&) = delete;
+  NearestOnEdges& operator=(const NearestOnEdges&) = delete;
+
+  // May be called from many threads at once.
+  Vec3 nearest(const Vec3& p) const;
 
  private:
   struct Tree;
