@@ -137,6 +137,7 @@ def tetrahedralize(
     wrap: Union[bool, Number, None] = None,
     min_angle: Optional[Number] = None,
     min_dihedral: Optional[Number] = None,
+    order: Optional[int] = None,
     iterations: Optional[int] = None,
     tolerance: Optional[Number] = None,
     device: Optional[str] = None,

@@ -264,6 +264,44 @@ class TetResult(SurfaceResult, _WithData):
         """(k, 2) int64: the edges along the boundary's features."""
         return self._array("feature_edges")
 
+    @property
+    def node_edges(self) -> npt.NDArray[np.int64]:
+        """With `order=2`: (k, 2) int64, the edges of all tetrahedra, the lower vertex first, sorted."""
+        return self._array("node_edges")
+
+    @property
+    def edge_nodes(self) -> npt.NDArray[np.float64]:
+        """With `order=2`: (k, 3) float64, the node on each of `node_edges`."""
+        return self._array("edge_nodes")
+
+    def _nodes_of(self, cells: npt.NDArray[np.int64], pairs: "list[tuple[int, int]]") -> npt.NDArray[np.int64]:
+        """Cells with their nodes behind the corners, numbered from the last vertex on."""
+        edges = self.node_edges
+        keys = edges[:, 0] * len(self.vertices) + edges[:, 1]  # ascending
+        nodes = []
+        for a, b in pairs:
+            ends = np.sort(cells[:, [a, b]], axis=1)
+            nodes.append(np.searchsorted(keys, ends[:, 0] * len(self.vertices) + ends[:, 1]) + len(self.vertices))
+        return np.column_stack([cells, *nodes])
+
+    def to_meshio(self) -> Any:
+        """A meshio.Mesh, with labels and data; with `order=2` of cells "tetra10" and "triangle6"."""
+        mesh = super().to_meshio()
+        if len(self.node_edges) == 0:
+            return mesh
+        import meshio
+
+        ends = self.node_edges
+        data = {}
+        for name, values in self._point_data().items():
+            first, second = values[ends[:, 0]], values[ends[:, 1]]
+            data[name] = np.concatenate([values, (first + second) / 2 if values.dtype.kind == "f" else first])
+        threes = [(0, 1), (1, 2), (2, 0)]
+        cells = [("tetra10", self._nodes_of(self.tets, [*threes, (0, 3), (1, 3), (2, 3)])),
+                 ("triangle6", self._nodes_of(self.faces, threes))]
+        return meshio.Mesh(np.concatenate([self.vertices, self.edge_nodes]), cells, point_data=data,
+                           cell_data=mesh.cell_data)
+
     def save_boundary(self, path: "str | os.PathLike[str]") -> None:
         """Writes the boundary as a surface."""
         self._save(path, "boundary")

@@ -174,6 +174,12 @@ void TetJob::add_options(CLI::App* app) {
       ->type_name("A")
       ->check(number_below(55))
       ->group("Optimisation");
+  app->add_option("--order", order_,
+                  "1 (straight edges; default) or 2: a node on each edge,\n"
+                  "those of the boundary on the surface (.msh, .vtu)")
+      ->type_name("N")
+      ->check(whole_number(1, 2))
+      ->group("Size");
   add_iterations(app, options_.iterations, "steps, of which each phase may make a share; default 100");
   add_tolerance(app, options_.tolerance,
                 "end a phase when the energy falls by less than this\n"
@@ -223,7 +229,12 @@ void TetJob::read(Journal& journal) {
 }
 
 void TetJob::check_format(std::string_view output, const std::string& path, Journal& journal) const {
-  if (output == "output") warn_of_lost_attributes(path, domain, journal);
+  if (output != "output") return;
+  const std::vector<std::string> holders = extensions_that(&FileFormat::writes_second_order);
+  if (order_ == 2 && std::find(holders.begin(), holders.end(), extension_of(path)) == holders.end())
+    throw Error(fmt::format("{}: {} files are not written with nodes on edges (--order 2); write {}", path,
+                            extension_of(path), listed(holders)));
+  warn_of_lost_attributes(path, domain, journal);
 }
 
 void TetJob::carry(Journal& journal) {
@@ -236,6 +247,18 @@ void TetJob::carry(Journal& journal) {
     else carry_attributes(*domain.surface, map_to_surface(mesh.vertices, *domain.surface, context), mesh, context);
   }
   seconds["attributes"] = carrying.seconds();
+}
+
+// The features that the boundary's feature edges follow are among those of the surface that was filled.
+void TetJob::curve(Journal& journal) {
+  const Stopwatch curving;
+  if (order_ == 2) {
+    journal.phase("placing nodes on edges");
+    const TriangleMesh& surface = wrapped_.is_null() ? *domain.surface : wrap_mesh_;
+    order = second_order(result.mesh, surface, detect_features(surface, options_.features).edges, &curved_,
+                         journal.context());
+  }
+  seconds["second_order"] = curving.seconds();
 }
 
 void TetJob::compute(Journal& journal) {
@@ -253,6 +276,7 @@ void TetJob::compute(Journal& journal) {
   measures.topology = analyse_tet_topology(result.mesh);
   seconds["quality"] = measuring.seconds();
   carry(journal);
+  curve(journal);
   seconds["io"] = io_;
   warn_of(journal, options_, result, measures);
 }
@@ -283,6 +307,16 @@ Json TetJob::report(Journal& journal) {
   report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
   report["detail"] = detail_json(result.detail, result.boundary.features.curves);
   report["attributes"] = attributes_json(result.mesh.attributes);
+  if (order_ == 2)
+    report["second_order"] = {{"nodes", order.nodes.size()},
+                              {"boundary_nodes", curved_.boundary_nodes},
+                              {"curved", curved_.curved},
+                              {"held_back", curved_.held_back},
+                              {"node_distance_mean", curved_.node_distance_mean},
+                              {"node_distance_max", curved_.node_distance_max},
+                              {"middle_distance_mean", curved_.middle_distance_mean},
+                              {"middle_distance_max", curved_.middle_distance_max},
+                              {"jacobian_min", curved_.jacobian_min}};
   report["sizing"] = {
       {"wanted", result.wanted}, {"edge_length", result.edge_length}, {"boundary_vertices", result.boundary_vertices}};
   report["conform"] = {{"delaunay", result.delaunay},
@@ -308,7 +342,7 @@ view::Scene TetJob::scene(const std::string& output) {
 }
 
 void TetJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
-  if (output == "output") write_tet_mesh(path, result.mesh);
+  if (output == "output") write_tet_mesh(path, result.mesh, order);
   else if (output == "boundary") write_mesh(path, boundary_surface(result.mesh));
   else write_tet_preview(path, result.mesh);
 }
@@ -317,7 +351,8 @@ std::vector<ArrayView> TetJob::arrays() {
   const TetMesh& mesh = result.mesh;
   return {array_of("vertices", mesh.vertices),      array_of("tets", mesh.tets),
           array_of("faces", mesh.boundary),         array_of("regions", mesh.regions),
-          array_of("labels", mesh.boundary_labels), array_of("feature_edges", mesh.feature_edges)};
+          array_of("labels", mesh.boundary_labels), array_of("feature_edges", mesh.feature_edges),
+          array_of("node_edges", order.edges),      array_of("edge_nodes", order.nodes)};
 }
 
 }  // namespace bisector::job

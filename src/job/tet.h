@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bisector/quality.h"
+#include "bisector/second_order.h"
 #include "bisector/tetmesh.h"
 #include "job/inputs.h"
 #include "job/job.h"
@@ -37,11 +38,13 @@ class TetJob final : public Job {
 
   Domain domain;  // the input
   TetResult result;
+  SecondOrder order;  // of the result, if that is asked for
   Measures measures;  // of the result
 
  private:
   void complete_options();
   void carry(Journal& journal);
+  void curve(Journal& journal);
 
   std::string seeds_, sizes_, feature_file_;
   std::string attribute_;            // of the input's vertices, a density
@@ -51,6 +54,8 @@ class TetJob final : public Job {
   TetOptions options_;
   TriangleMesh wrap_mesh_;
   Json wrapped_;  // null: no wrap
+  int order_ = 1;
+  SecondOrderReport curved_;
 };
 
 Json size_json(const Domain& domain);

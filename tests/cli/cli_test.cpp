@@ -1065,6 +1065,21 @@ TEST_F(CliRemesh, AttributesComeThrough) {
   EXPECT_GT(inside, 0u);
 }
 
+TEST_F(CliRemesh, TetrahedraOfSecondOrder) {
+  write_mesh(in("torus.off"), test::torus(48, 24));
+  const Json report =
+      report_of({"tet", in("torus.off"), "-o", in("out.vtu"), "-n", "300", "--order", "2", "--quiet", "--report", "-"});
+  const Json& order = report["second_order"];
+  EXPECT_GT(order["jacobian_min"].get<double>(), 0);
+  EXPECT_EQ(order["boundary_nodes"].get<int>(), 3 * report["output"]["faces"].get<int>() / 2);
+  EXPECT_LT(order["node_distance_mean"].get<double>(), 0.3 * order["middle_distance_mean"].get<double>());
+  EXPECT_TRUE(report["seconds"]["second_order"].is_number());
+  const TetMesh mesh = read_tet_mesh(in("out.vtu"));
+  EXPECT_EQ(mesh.vertices.size(), report["output"]["vertices"].get<std::size_t>() + order["nodes"].get<std::size_t>());
+  expect_failure(1, {"tet", in("torus.off"), "-o", in("out.mesh"), "-n", "300", "--order", "2"}, "write .msh or .vtu");
+  expect_failure(1, {"tet", in("torus.off"), "-o", in("out.vtu"), "-n", "300", "--order", "3"}, "--order");
+}
+
 TEST_F(CliRemesh, ReportHasWhatIsDocumented) {
   write_mesh(in("box.off"), test::box(2));
   const Json report = remesh("box.off", {"-n", "100", "--fit"});

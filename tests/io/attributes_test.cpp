@@ -11,6 +11,7 @@
 #include "bisector/io.h"
 #include "io/bytes.h"
 #include "mesh/attribute_sizes.h"
+#include "mesh/tet_topology.h"
 #include "support/files.h"
 #include "support/models.h"
 #include "support/solids.h"
@@ -124,6 +125,37 @@ TEST_F(AttributeFiles, OfTetrahedra) {
   EXPECT_EQ(read.regions, mesh.regions);
   EXPECT_EQ(read_tet_attribute(path("solid.vtu"), "heat"), mesh.attributes[0].values);
   EXPECT_EQ(lost_attributes("a.msh", mesh.attributes).size(), 4u);
+}
+
+// Corners come back with a warning; nodes stay as vertices, and have the mean of their edge's ends.
+TEST_F(AttributeFiles, OfNodesOnEdges) {
+  TetMesh mesh = marked_cube(2);
+  mesh.attributes = {random_attribute("heat", Site::vertex, Type::float64, 1, mesh.vertices.size()),
+                     random_attribute("part", Site::vertex, Type::int32, 1, mesh.vertices.size())};
+  const SecondOrder order = second_order(mesh, boundary_surface(mesh), {});
+  for (const char* name : {"nodes.vtu", "nodes.msh"}) {
+    write_tet_mesh(path(name), mesh, order);
+    const TetMesh read = read_tet_mesh(path(name), collecting());
+    ASSERT_EQ(warnings_.size(), 1u);
+    EXPECT_NE(warnings_[0].find("of second order taken by their corners"), std::string::npos);
+    EXPECT_EQ(read.tets, mesh.tets);
+    EXPECT_EQ(read.boundary, mesh.boundary);
+    EXPECT_EQ(read.feature_edges, mesh.feature_edges);
+    ASSERT_EQ(read.vertices.size(), mesh.vertices.size() + order.nodes.size());
+    if (read.attributes.empty()) continue;
+    for (std::size_t e = 0; e < order.edges.size(); ++e) {
+      const auto [a, b] = order.edges[e];
+      const std::vector<double>&heat = read.attributes[0].values, &part = read.attributes[1].values;
+      EXPECT_EQ(heat[mesh.vertices.size() + e], 0.5 * (heat[a] + heat[b]));
+      EXPECT_EQ(part[mesh.vertices.size() + e], part[a]);
+    }
+  }
+  EXPECT_THROW(write_tet_mesh(path("nodes.mesh"), mesh, order), Error);
+  SecondOrder part = order;
+  part.edges.pop_back();
+  EXPECT_THROW(write_tet_mesh(path("nodes.vtu"), mesh, part), Error);
+  part.nodes.pop_back();
+  EXPECT_THROW(write_tet_mesh(path("nodes.vtu"), mesh, part), Error);
 }
 
 TEST_F(AttributeFiles, LegacyVtkHasVectorsAndColours) {

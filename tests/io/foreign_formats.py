@@ -94,6 +94,22 @@ def run_meshio():
         mesh = seen(f"{kind}-named.msh", kind, "gmsh:physical", "gmsh:physical")
         names = {int(v[0]): k for k, v in mesh.field_data.items() if v[1] == 2}
         assert names == {int(k): v for k, v in expected[kind]["names"]["triangles"].items()}, names
+    # Of second order: each node is where the edge's is that this place in a cell belongs to.
+    pairs = {"tetra10": [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], "triangle6": [(0, 1), (1, 2), (2, 0)],
+             "line3": [(0, 1)]}
+    nodes = {tuple(edge): tuple(node) for edge, node in expected["nodes"]}
+    corners = {tuple(p): v for v, p in enumerate(expected["tets"]["points"])}
+    for name in ["curved.msh", "curved.vtu"]:
+        mesh = meshio.read(path(name))
+        for (cell, ends), key in zip(pairs.items(), ("tets", "triangles", "edges")):
+            found = mesh.cells_dict[cell]
+            assert len(found) == len(expected["tets"][key]), f"{name}: {len(found)} {cell}"
+            for element in found.tolist():
+                v = [corners[tuple(mesh.points[c])] for c in element[:len(element) - len(ends)]]
+                for (a, b), node in zip(ends, element[-len(ends):]):
+                    assert tuple(mesh.points[node]) == nodes[min(v[a], v[b]), max(v[a], v[b])], f"{name}: {element}"
+    assert mesh.point_data["heat"].shape == (len(mesh.points),)
+
     seen("surface.off", "surface", edges=False)
     seen("surface.obj", "surface", edges=False)
     seen("bare.ply", "surface", edges=False)

@@ -54,6 +54,14 @@ Json rows_of(const std::vector<std::array<Index, N>>& rows) {
   return Json(rows);
 }
 
+// Nodes in no two of which anything is alike.
+SecondOrder shaken_nodes(const TetMesh& mesh) {
+  SecondOrder order = second_order(mesh, boundary_surface(mesh), {});
+  SplitMix64 random(5);
+  for (Vec3& p : order.nodes) p += Vec3{random.range(0, 0.01), random.range(0, 0.01), random.range(0, 0.01)};
+  return order;
+}
+
 class ForeignFormats : public FileTest {
  protected:
   void SetUp() override {
@@ -89,7 +97,17 @@ class ForeignFormats : public FileTest {
       for (const Vec3& p : vertices) points.push_back({p.x, p.y, p.z});
       return points;
     };
-    const Json expected{{"surface",
+    TetMesh warm = solid_;
+    warm.attributes = {
+        {"heat", Attribute::Site::vertex, Attribute::Type::float64, 1, std::vector<double>(warm.vertices.size(), 1)}};
+    const SecondOrder order = shaken_nodes(solid_);
+    Json nodes;
+    for (std::size_t e = 0; e < order.edges.size(); ++e)
+      nodes.push_back({order.edges[e], {order.nodes[e].x, order.nodes[e].y, order.nodes[e].z}});
+    write_tet_mesh(path("curved.msh"), warm, order);
+    write_tet_mesh(path("curved.vtu"), warm, order);
+    const Json expected{{"nodes", nodes},
+                        {"surface",
                          {{"points", points_of(surface_.vertices)},
                           {"triangles", rows_of(surface_.triangles)},
                           {"edges", rows_of(surface_.feature_edges)},
@@ -239,7 +257,8 @@ TEST_F(ForeignFormats, AreThoseOfTheManual) {
     EXPECT_EQ(says(row[3], "written"), format.writes_polygons) << format.extension;
     EXPECT_EQ(says(row[4], "read"), format.reads_tets) << format.extension;
     EXPECT_EQ(says(row[4], "written"), format.writes_tets) << format.extension;
-    EXPECT_EQ(row[5].find_first_not_of(' ') != std::string::npos, format.labels != FileFormat::Labels::none);
+    EXPECT_EQ(says(row[5], "written"), format.writes_second_order) << format.extension;
+    EXPECT_EQ(row[6].find_first_not_of(' ') != std::string::npos, format.labels != FileFormat::Labels::none);
   }
 }
 

@@ -261,6 +261,22 @@ class Arrays(unittest.TestCase):
         sure = np.abs(middles - 0.5) > 0.3
         self.assertTrue(np.array_equal(u.cell_data["above"][sure], middles[sure] > 0.5))
 
+    def test_nodes_on_edges(self):
+        t = bs.tetrahedralize(SMOOTH, n=300, order=2, iterations=5)
+        self.assertGreater(t.report["second_order"]["jacobian_min"], 0)
+        edges, nodes = t.node_edges, t.edge_nodes
+        self.assertEqual(len(edges), len(nodes))
+        middles = t.vertices[edges].mean(axis=1)
+        lengths = np.linalg.norm(np.diff(t.vertices[edges], axis=1)[:, 0], axis=1)
+        self.assertTrue(np.all(np.linalg.norm(nodes - middles, axis=1) <= 0.3 * lengths))
+        with contextlib.suppress(ImportError):
+            mesh = t.to_meshio()
+            tens = mesh.cells_dict["tetra10"]
+            self.assertTrue(np.array_equal(tens[:, :4], t.tets))
+            for k, (a, b) in enumerate([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]):
+                between = mesh.points[tens[:, [a, b]]].mean(axis=1)
+                self.assertTrue(np.all(np.linalg.norm(mesh.points[tens[:, 4 + k]] - between, axis=1) < lengths.max() / 3))
+
     def test_density_and_sizes(self):
         vertices, faces = read_off(SMOOTH)
         density = np.exp(vertices[:, 0] / 20)
