@@ -42,9 +42,9 @@ BISECTOR_API AttributeMeaning meaning_of(const Attribute& attribute);
 //   vertices   Numbers with a fraction and colours are interpolated, normals made as long as 1 again. Other integers
 //              are those of the corner with the greatest weight: what lies between two numbers of parts means nothing.
 //   triangles  Those of the triangle nearest to the centroid.
-//   corners    Triangles between whose corners along an edge the numbers agree make a chart. A triangle of `to` takes
-//              all of its corners' from one chart, the one nearest to its centroid, at the points of that chart nearest
-//              to the corners, so that no triangle is stretched across a seam of a texture.
+//   corners    A seam is an edge along which the numbers of its triangles' corners differ. A triangle of `to` takes all
+//              of its corners' from what lies around the point nearest to its centroid without a seam between, at the
+//              points of that nearest to the corners, so that no triangle is stretched across a seam of a texture.
 // Texture coordinates of vertices become those of corners where `from` has vertices at one place that differ in them,
 // as files have it whose seams are doubled vertices.
 // Throws Error if an attribute's values are not as many as it takes, or the map's sizes are not those of `to`;

@@ -251,7 +251,8 @@ def _from_faces(mesh: Any) -> Arrays:
     arrays.data += _given_data("face_data", ELEMENT, getattr(mesh, "face_data", None))
     arrays.data += _given_data("corner_data", CORNER, getattr(mesh, "corner_data", None))
     visual = getattr(mesh, "visual", None)
-    for name, values in (("color", visual.vertex_colors if getattr(visual, "kind", None) == "vertex" else None),
+    coloured = getattr(visual, "kind", None) == "vertex"
+    for name, values in (("color", getattr(visual, "vertex_colors", None) if coloured else None),
                          ("texcoord", getattr(visual, "uv", None))):
         item = None if values is None else data_of(name, VERTEX, values)
         if item is not None:

@@ -185,9 +185,10 @@ def _copies(data: "dict[str, npt.NDArray[Any]]") -> "dict[str, npt.NDArray[Any]]
 
 
 def _add_data(mesh: Any, points: "dict[str, npt.NDArray[Any]]", cells: "dict[str, npt.NDArray[Any]]") -> None:
-    for to, data in ((mesh.point_data, points), (mesh.cell_data, cells)):
-        for name, values in data.items():
-            to[name] = values
+    for name, values in points.items():
+        mesh.point_data[name] = values
+    for name, values in cells.items():
+        mesh.cell_data[name] = values
 
 
 class RemeshResult(SurfaceResult, _WithData):

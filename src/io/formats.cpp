@@ -41,7 +41,7 @@ constexpr Format kFormats[] = {
     {".mesh", Labels::all, nullptr, nullptr, read_medit, nullptr, nullptr, format_medit},
     {".meshb", Labels::all, nullptr, nullptr, read_medit_binary, nullptr, nullptr, format_medit_binary},
     {".msh", Labels::all, nullptr, nullptr, read_gmsh, nullptr, nullptr, format_gmsh, true},
-    {".vtu", Labels::all, vtk_holds, nullptr, read_vtu, nullptr, nullptr, format_vtu, true},
+    {".vtu", Labels::all, vtk_holds, nullptr, read_vtu, format_vtu, nullptr, format_vtu, true},
     {".vtk", Labels::all, nullptr, nullptr, read_vtk},
 };
 

@@ -270,10 +270,9 @@ void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteOp
                              e[1], mesh.vertices.size()));
   const Format& format = format_of(path, &FileFormat::writes_surfaces, "meshes");
   if (format.bytes_of) return write_file(path, format.bytes_of(path, mesh, options));
-  TetMesh marks{mesh.vertices, {}, {}, mesh.triangles, mesh.labels, mesh.feature_edges, {}, mesh.label_names};
-  std::copy_if(mesh.attributes.begin(), mesh.attributes.end(), std::back_inserter(marks.attributes),
-               [](const Attribute& attribute) { return attribute.site == Attribute::Site::vertex; });
-  write_file(path, format.bytes_of_tets(marks, {}));
+  write_file(path,
+             format.bytes_of_tets(
+                 {mesh.vertices, {}, {}, mesh.triangles, mesh.labels, mesh.feature_edges, {}, mesh.label_names}, {}));
 }
 
 void write_polygons(const std::string& path, const PolygonMesh& mesh, const WriteOptions& options) {

@@ -280,18 +280,20 @@ class ObjAttributes {
     const std::size_t first = corner.find('/');
     const std::string_view rest = first == std::string_view::npos ? std::string_view{} : corner.substr(first + 1);
     const std::string_view text = rest.substr(0, rest.find('/'));
-    corners_.push_back(text.empty() ? kNone : read_obj_index(in, text, texture_.size(), kOne, kMany));
-    if (!text.empty()) forward_.note(corners_.back(), texture_.size(), line);
+    // Some programs write indices of coordinates that they leave out.
+    const bool none = text.empty() || (text[0] == '-' && texture_.empty());
+    corners_.push_back(none ? kNone : read_obj_index(in, text, texture_.size(), kOne, kMany));
+    if (!none) forward_.note(corners_.back(), texture_.size(), line);
   }
   void take(const TextReader& in, Soup& soup) {
-    forward_.check(in, texture_.size(), kOne, kMany);
     if (all_coloured_ && !colours_.empty()) {
       // Some programs write bytes.
       const bool bytes = std::any_of(colours_.begin(), colours_.end(), [](double x) { return x > 1; });
       soup.attributes.push_back({"color", Attribute::Site::vertex,
-                                 bytes ? Attribute::Type::uint8 : Attribute::Type::float32, 3, std::move(colours_)});
+                                 bytes ? Attribute::Type::uint8 : Attribute::Type::float64, 3, std::move(colours_)});
     }
-    if (std::all_of(corners_.begin(), corners_.end(), [](Index i) { return i == kNone; })) return;
+    if (texture_.empty() || std::all_of(corners_.begin(), corners_.end(), [](Index i) { return i == kNone; })) return;
+    forward_.check(in, texture_.size(), kOne, kMany);
     if (!take_by_vertices(soup)) take_by_corners(soup);
   }
 
@@ -311,7 +313,7 @@ class ObjAttributes {
   }
   void take_by_corners(Soup& soup) const { soup.attributes.push_back(texture_at(Attribute::Site::corner, corners_)); }
   Attribute texture_at(Attribute::Site site, const std::vector<Index>& indices) const {
-    Attribute attribute{"texcoord", site, Attribute::Type::float32, 2, {}};
+    Attribute attribute{"texcoord", site, Attribute::Type::float64, 2, {}};
     attribute.values.reserve(2 * indices.size());
     for (const Index i : indices) {
       attribute.values.push_back(i == kNone ? 0 : texture_[i][0]);
@@ -461,9 +463,11 @@ class ObjExtras {
   // Behind a vertex's coordinates.
   void append_colour(std::string& out, std::size_t v) const {
     if (!colours_) return;
+    const bool exact = colours_->type == Attribute::Type::float64;
+    const Attribute::Type type = exact ? Attribute::Type::float64 : Attribute::Type::float32;
     for (std::size_t c = 0; c < 3; ++c) {
       out += ' ';
-      append_value(out, scale_ * colours_->values[colours_->components * v + c], Attribute::Type::float32);
+      append_value(out, scale_ * colours_->values[colours_->components * v + c], type);
     }
   }
   std::string texture_lines() const {

@@ -465,33 +465,8 @@ std::string polydata_of(const std::vector<Vec3>& vertices, const Csr<Index>& fac
   return out + "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>\n";
 }
 
-}  // namespace
-
-TetSoup read_vtu(const std::string& path, std::string_view bytes) { return soup_of_grid(path, read_grid(path, bytes)); }
-
-Soup read_vtp(const std::string& path, std::string_view bytes) {
-  return PolyDataReader(path, VtkXmlReader(path, bytes).read("PolyData")).read();
-}
-
-std::vector<double> read_vtu_attribute(const std::string& path, std::string_view bytes, const std::string& name) {
-  VtkGrid grid = read_grid(path, bytes);
-  return point_data_of(path, std::move(grid.point_data), grid.points.size(), name);
-}
-
-std::vector<double> read_vtp_attribute(const std::string& path, std::string_view bytes, const std::string& name) {
-  VtkPiece piece = VtkXmlReader(path, bytes).read("PolyData");
-  return point_data_of(path, std::move(piece.point_data), piece.points.size(), name);
-}
-
-std::string format_vtp(const std::string&, const TriangleMesh& mesh, const WriteOptions&) {
-  return polydata_of(mesh.vertices, rows_of(mesh.triangles), mesh.labels, mesh.feature_edges, mesh.attributes);
-}
-
-std::string format_vtp(const PolygonMesh& mesh, const WriteOptions&) {
-  return polydata_of(mesh.vertices, mesh.polygons, {mesh.labels.begin(), mesh.labels.end()}, mesh.feature_edges, {});
-}
-
-std::string format_vtu(const TetMesh& mesh, const SecondOrder& order) {
+// Cells as an UnstructuredGrid; `of_triangles`: attributes of the boundary's.
+std::string grid_of(const TetMesh& mesh, const SecondOrder& order, const std::vector<Attribute>& of_triangles) {
   const std::size_t cells = mesh.tets.size() + mesh.boundary.size() + mesh.feature_edges.size();
   std::vector<std::int64_t> connectivity, offsets;
   std::vector<std::uint8_t> types;
@@ -530,7 +505,46 @@ std::string format_vtu(const TetMesh& mesh, const SecondOrder& order) {
     append_array(out, "Int32", "label", 1, labels);
   }
   append_attributes(out, mesh.attributes, Attribute::Site::element, 0, cells - mesh.tets.size());
+  append_attributes(out, of_triangles, Attribute::Site::element, mesh.tets.size(), mesh.feature_edges.size());
   return out + "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+}
+
+}  // namespace
+
+TetSoup read_vtu(const std::string& path, std::string_view bytes) { return soup_of_grid(path, read_grid(path, bytes)); }
+
+Soup read_vtp(const std::string& path, std::string_view bytes) {
+  return PolyDataReader(path, VtkXmlReader(path, bytes).read("PolyData")).read();
+}
+
+std::vector<double> read_vtu_attribute(const std::string& path, std::string_view bytes, const std::string& name) {
+  VtkGrid grid = read_grid(path, bytes);
+  return point_data_of(path, std::move(grid.point_data), grid.points.size(), name);
+}
+
+std::vector<double> read_vtp_attribute(const std::string& path, std::string_view bytes, const std::string& name) {
+  VtkPiece piece = VtkXmlReader(path, bytes).read("PolyData");
+  return point_data_of(path, std::move(piece.point_data), piece.points.size(), name);
+}
+
+std::string format_vtp(const std::string&, const TriangleMesh& mesh, const WriteOptions&) {
+  return polydata_of(mesh.vertices, rows_of(mesh.triangles), mesh.labels, mesh.feature_edges, mesh.attributes);
+}
+
+std::string format_vtp(const PolygonMesh& mesh, const WriteOptions&) {
+  return polydata_of(mesh.vertices, mesh.polygons, {mesh.labels.begin(), mesh.labels.end()}, mesh.feature_edges, {});
+}
+
+std::string format_vtu(const TetMesh& mesh, const SecondOrder& order) { return grid_of(mesh, order, {}); }
+
+std::string format_vtu(const std::string&, const TriangleMesh& mesh, const WriteOptions&) {
+  TetMesh marks{mesh.vertices, {}, {}, mesh.triangles, mesh.labels, mesh.feature_edges};
+  std::vector<Attribute> of_triangles;
+  for (const Attribute& attribute : mesh.attributes) {
+    if (attribute.site == Attribute::Site::vertex) marks.attributes.push_back(attribute);
+    else if (attribute.site == Attribute::Site::element) of_triangles.push_back(attribute);
+  }
+  return grid_of(marks, {}, of_triangles);
 }
 
 }  // namespace bisector::io

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <memory>
+#include <limits>
 #include <numeric>
 #include <string_view>
+#include <unordered_set>
 #include <utility>
 
-#include "core/disjoint_sets.h"
 #include "core/geometry.h"
-#include "core/grouping.h"
 #include "core/parallel.h"
 #include "mesh/attribute_sizes.h"
 #include "mesh/locate.h"
@@ -149,9 +147,10 @@ struct CornerValues {
   }
 };
 
-// The chart of each triangle, called by its lowest triangle.
-std::vector<Index> find_charts(const TriangleMesh& mesh, const std::vector<CornerValues>& values) {
-  DisjointSets<Index> sets(mesh.triangles.size());
+// For each side 3 t + k of a triangle, from corner k to the next, the triangle on the other side, if the numbers agree
+// along it; else, at seams and borders and where more triangles meet, kNone.
+std::vector<Index> find_neighbours(const TriangleMesh& mesh, const std::vector<CornerValues>& values) {
+  std::vector<Index> neighbours(3 * mesh.triangles.size(), kNone);
   const auto corner_at = [&](std::size_t t, Index vertex) {
     const Triangle& v = mesh.triangles[t];
     return static_cast<std::size_t>(std::find(v.begin(), v.end(), vertex) - v.begin());
@@ -159,16 +158,16 @@ std::vector<Index> find_charts(const TriangleMesh& mesh, const std::vector<Corne
   const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
   for (std::size_t e = 0; e < table.edges.size(); ++e) {
     if (table.half_edges.size(e) != 2) continue;
-    const std::size_t t = table.half_edges.begin(e)[0] / 3, u = table.half_edges.begin(e)[1] / 3;
+    const std::size_t a = table.half_edges.begin(e)[0], b = table.half_edges.begin(e)[1], t = a / 3, u = b / 3;
     const bool joined = std::all_of(values.begin(), values.end(), [&](const CornerValues& v) {
       return std::all_of(table.edges[e].begin(), table.edges[e].end(),
                          [&](Index end) { return v.same(t, corner_at(t, end), u, corner_at(u, end)); });
     });
-    if (joined) sets.join(static_cast<Index>(t), static_cast<Index>(u));
+    if (!joined) continue;
+    neighbours[a] = static_cast<Index>(u);
+    neighbours[b] = static_cast<Index>(t);
   }
-  std::vector<Index> charts(mesh.triangles.size());
-  for (std::size_t t = 0; t < charts.size(); ++t) charts[t] = sets.root(static_cast<Index>(t));
-  return charts;
+  return neighbours;
 }
 
 // Whether vertices at one place have other values.
@@ -192,48 +191,71 @@ bool differs_at_doubles(const TriangleMesh& mesh, const Attribute& attribute) {
   return false;
 }
 
-// Where the corners of a mesh's triangles lie in charts of another one.
+// Where the corners of a mesh's triangles lie on another one, those of a triangle on the same side of all seams: on
+// what can be reached from the place of its centroid without crossing one, within a ball about it.
 class CornerPlaces {
  public:
-  CornerPlaces(const TriangleMesh& from, const std::vector<Index>& charts, const SurfaceMap& map,
-               const TriangleMesh& to, const std::vector<Index>& nearest)
-      : places_{std::vector<Index>(3 * to.triangles.size()),
-                std::vector<std::array<double, 3>>(3 * to.triangles.size())} {
-    std::map<Index, std::vector<std::size_t>> strangers;  // corners of triangles of a chart whose vertex is in another
-    for (std::size_t t = 0; t < to.triangles.size(); ++t)
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Index v = to.triangles[t][k];
-        if (charts[map.triangles[v]] == charts[nearest[t]]) {
-          places_.triangles[3 * t + k] = map.triangles[v];
-          places_.weights[3 * t + k] = map.weights[v];
-        } else {
-          strangers[charts[nearest[t]]].push_back(3 * t + k);
-        }
-      }
-    if (strangers.empty()) return;
-    const Csr<Index> members = items_of_labels<Index>(charts, charts.size());
-    for (const auto& [chart, corners] : strangers) place(from, {members.begin(chart), members.end(chart)}, to, corners);
+  CornerPlaces(const TriangleMesh& from, const std::vector<Index>& neighbours, const SurfaceMap& map,
+               const TriangleMesh& to)
+      : from_(from), neighbours_(neighbours), map_(map),
+        to_(to), places_{std::vector<Index>(3 * to.triangles.size()),
+                         std::vector<std::array<double, 3>>(3 * to.triangles.size())} {}
+
+  SurfaceMap find(const std::vector<Index>& nearest_to_centroids, const Context& context) {
+    ThreadLocal<std::vector<Index>> reached;
+    each_cancellable(to_.triangles.size(), context, [&](std::size_t t) {
+      std::vector<Index>& patch = reached.local();
+      reach(t, nearest_to_centroids[t], patch);
+      for (std::size_t k = 0; k < 3; ++k) place(t, k, patch);
+    });
+    return std::move(places_);
   }
 
-  const SurfaceMap& places() const { return places_; }
-
  private:
-  void place(const TriangleMesh& from, const std::vector<Index>& members, const TriangleMesh& to,
-             const std::vector<std::size_t>& corners) {
-    TriangleMesh part;
-    part.triangles.reserve(members.size());
-    for (const Index t : members)
-      for (const Vec3& p : corners_of(from, t)) part.vertices.push_back(p);
-    for (Index i = 0; i < members.size(); ++i) part.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
-    std::vector<Vec3> points;
-    for (const std::size_t c : corners) points.push_back(to.vertices[to.triangles[c / 3][c % 3]]);
-    const SurfaceMap found = map_to_surface(points, part);
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-      places_.triangles[corners[i]] = members[found.triangles[i]];
-      places_.weights[corners[i]] = found.weights[i];
+  // The triangles, in the order of their numbers.
+  void reach(std::size_t t, Index start, std::vector<Index>& patch) const {
+    constexpr double kReach = 1.5;  // of the farthest corner: a bent surface is longer than its chord
+    const auto [a, b, c] = corners_of(to_, t);
+    const Vec3 centre = (1.0 / 3) * (a + b + c);
+    const double farthest = std::max({norm2(a - centre), norm2(b - centre), norm2(c - centre)});
+    const double limit = kReach * kReach * farthest;
+    std::unordered_set<Index> known{start};
+    patch.assign(1, start);
+    for (std::size_t i = 0; i < patch.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index next = neighbours_[3 * std::size_t{patch[i]} + k];
+        if (next == kNone || !known.insert(next).second) continue;
+        const auto [p, q, r] = corners_of(from_, next);
+        if (norm2(nearest_on_triangle(centre, p, q, r) - centre) <= limit) patch.push_back(next);
+      }
+    std::sort(patch.begin(), patch.end());
+  }
+
+  void place(std::size_t t, std::size_t k, const std::vector<Index>& patch) {
+    const Index v = to_.triangles[t][k];
+    const std::size_t corner = 3 * t + k;
+    if (std::binary_search(patch.begin(), patch.end(), map_.triangles[v])) {
+      places_.triangles[corner] = map_.triangles[v];
+      places_.weights[corner] = map_.weights[v];
+      return;
+    }
+    const Vec3& p = to_.vertices[v];
+    double least = std::numeric_limits<double>::infinity();
+    for (const Index u : patch) {
+      const auto [a, b, c] = corners_of(from_, u);
+      const Vec3 q = nearest_on_triangle(p, a, b, c);
+      const double distance = norm2(q - p);
+      if (!(distance < least)) continue;
+      least = distance;
+      places_.triangles[corner] = u;
+      places_.weights[corner] = weights_in(q, a, b, c);
     }
   }
 
+  const TriangleMesh& from_;
+  const std::vector<Index>& neighbours_;
+  const SurfaceMap& map_;
+  const TriangleMesh& to_;
   SurfaceMap places_;
 };
 
@@ -375,9 +397,9 @@ void carry_attributes(const TriangleMesh& from, const SurfaceMap& map, TriangleM
     for (std::size_t i = 0; i < carried.size(); ++i)
       if (carried[i].site == Site::element) carried[i] = carry_elements(from.attributes[i], nearest.triangles);
     if (!corners.empty()) {
-      const CornerPlaces places(from, find_charts(from, corners), map, to, nearest.triangles);
-      for (std::size_t k = 0; k < corners.size(); ++k)
-        carried[corner_slots[k]] = carry_corners(corners[k], places.places());
+      const std::vector<Index> neighbours = find_neighbours(from, corners);
+      const SurfaceMap places = CornerPlaces(from, neighbours, map, to).find(nearest.triangles, context);
+      for (std::size_t k = 0; k < corners.size(); ++k) carried[corner_slots[k]] = carry_corners(corners[k], places);
     }
   }
   to.attributes = std::move(carried);

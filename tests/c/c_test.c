@@ -199,6 +199,7 @@ static void test_attributes(void) {
   arrays.attributes = given;
   arrays.attribute_count = 2;
   EXPECT(bisector_mesh_from_arrays(&arrays, &mesh) == BISECTOR_OK);
+  EXPECT(bisector_options_set(options, "energy", "ccvt") == BISECTOR_OK); /* vertices on the surface */
   EXPECT(bisector_run(options, mesh, NULL, &result) == BISECTOR_OK);
   EXPECT(bisector_result_attribute_count(result, &count) == BISECTOR_OK && count == 2);
   EXPECT(bisector_result_array(result, "vertices", &points) == BISECTOR_OK);

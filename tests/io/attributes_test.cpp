@@ -68,18 +68,18 @@ TEST_F(AttributeFiles, WhatAFormatHoldsComesBack) {
       mesh.attributes = {attribute};
       write_mesh(name, mesh);
       const TriangleMesh read = read_mesh(name);
-      // A solid's file has tetrahedra's in place of triangles'.
-      const bool held =
-          lost_attributes(name, mesh.attributes).empty() && !(format.writes_tets && attribute.site == Site::element);
+      const bool held = lost_attributes(name, mesh.attributes).empty();
       ASSERT_EQ(read.attributes.size(), held ? 1u : 0u);
       if (!held) continue;
       const Attribute& back = read.attributes[0];
       EXPECT_EQ(back.name, attribute.name);
       EXPECT_EQ(back.site, attribute.site);
       EXPECT_EQ(back.components, attribute.components);
-      if (format.extension == ".obj" && attribute.name == "color") {  // shares of 1
+      if (format.extension == ".obj") {  // texts of floats, and colours from 0 to 1
+        const double scale = attribute.name == "color" ? 255 : 1;
+        EXPECT_EQ(back.type, Type::float64);
         for (std::size_t i = 0; i < attribute.values.size(); ++i)
-          EXPECT_EQ(std::round(255 * back.values[i]), attribute.values[i]);
+          EXPECT_NEAR(scale * back.values[i], attribute.values[i], scale * 1e-7);
         continue;
       }
       EXPECT_EQ(back.type, attribute.type);
@@ -210,6 +210,7 @@ TEST_F(AttributeFiles, ObjTextureOfVerticesOrCorners) {
   EXPECT_EQ(several.attributes[0].site, Site::corner);
   EXPECT_EQ(several.attributes[0].values, (std::vector<double>{0.25, 0, 1, 0, 1, 1, 0.5, 0.5, 1, 1, 0, 0}));
   EXPECT_TRUE(read_mesh(store("none.obj", square + "f 1 2 3//2\n")).attributes.empty());
+  EXPECT_TRUE(read_mesh(store("left-out.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1/1 2/-2 3/3\n")).attributes.empty());
   expect_error_line([&] { read_mesh(store("far.obj", square + "f 1/1 2/2 3/9\n")); }, path("far.obj") + ":10",
                     "index 9 is out of range, the file has 5 texture coordinates");
   expect_error_line([&] { read_mesh(store("zero.obj", square + "f 1/0 2/2 3/3\n")); }, path("zero.obj") + ":10",
@@ -223,7 +224,7 @@ TEST_F(AttributeFiles, ObjColours) {
   };
   const Attribute shares = colours_of("a.obj", "v 0 0 0 1 0 0.5\nv 1 0 0 0 0 0\nv 0 1 0 0 1 0\nf 1 2 3\n");
   EXPECT_EQ(shares.name, "color");
-  EXPECT_EQ(shares.type, Type::float32);
+  EXPECT_EQ(shares.type, Type::float64);
   EXPECT_EQ(shares.values, (std::vector<double>{1, 0, 0.5, 0, 0, 0, 0, 1, 0}));
   EXPECT_EQ(colours_of("b.obj", "v 0 0 0 255 0 9\nv 1 0 0 0 0 0\nv 0 1 0 0 1 0\nf 1 2 3\n").type, Type::uint8);
   EXPECT_EQ(colours_of("c.obj", "v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").name, "");        // a weight

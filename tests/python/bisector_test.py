@@ -236,7 +236,7 @@ class Arrays(unittest.TestCase):
         self.assertTrue(np.allclose(np.einsum("nk,nkd->nd", weights, vertices[triangles[on]]), r.vertices, atol=1e-12))
         with self.assertRaises(ValueError):
             r.vertex_data["place"][0] = 0
-        again = bs.remesh(r, n=100)  # a result brings its own
+        again = bs.remesh(r, n=100, energy="ccvt")  # a result brings its own
         self.assertTrue(np.allclose(again.vertex_data["place"], again.vertices, atol=1e-12))
         self.assertEqual(set(again.face_data), {"part"})
         dense = bs.remesh((vertices, triangles), n=200, density="attribute:rho",
@@ -360,14 +360,14 @@ class Arrays(unittest.TestCase):
     def test_packages(self):
         vertices, faces = cube()
         r = bs.remesh((vertices, faces), n=60, vertex_data={"place": vertices}, face_data={"number": np.arange(len(faces))})
-        expected = bs.remesh(r, n=40).vertices
+        expected = bs.remesh(r, n=40, energy="ccvt").vertices
         for package, convert in (("meshio", r.to_meshio), ("trimesh", r.to_trimesh), ("pyvista", r.to_pyvista)):
             with self.subTest(package):
                 try:
                     __import__(package)
                 except ImportError:
                     self.skipTest(f"{package} is not installed")
-                back = bs.remesh(convert(), n=40)
+                back = bs.remesh(convert(), n=40, energy="ccvt")
                 self.assertTrue(np.array_equal(back.vertices, expected))
                 self.assertTrue(np.allclose(back.vertex_data["place"], back.vertices, atol=1e-12))
                 self.assertEqual(back.face_data["number"].dtype, np.int64)
@@ -429,7 +429,8 @@ class Errors(unittest.TestCase):
 
 class Signatures(unittest.TestCase):
     def test_keywords_are_the_options(self):
-        mine = {"mesh", "points", "labels", "feature_edges", "progress"}
+        mine = {"mesh", "points", "labels", "feature_edges", "progress", "vertex_data", "face_data", "corner_data",
+                "cell_data"}
         for command, function in (("remesh", bs.remesh), ("tet", bs.tetrahedralize), ("segment", bs.segment),
                                   ("tree", bs.reconstruct_tree), ("rvd", bs.rvd), ("quality", bs.quality)):
             options = json.loads(_library.text("describe", command.encode()))
