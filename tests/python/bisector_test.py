@@ -359,7 +359,8 @@ class Arrays(unittest.TestCase):
 
     def test_packages(self):
         vertices, faces = cube()
-        r = bs.remesh((vertices, faces), n=60, vertex_data={"place": vertices}, face_data={"number": np.arange(len(faces))})
+        r = bs.remesh((vertices, faces), n=60, energy="ccvt", vertex_data={"place": vertices},
+                      face_data={"number": np.arange(len(faces))})
         expected = bs.remesh(r, n=40, energy="ccvt").vertices
         for package, convert in (("meshio", r.to_meshio), ("trimesh", r.to_trimesh), ("pyvista", r.to_pyvista)):
             with self.subTest(package):
