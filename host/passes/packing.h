@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/geometry.h"
+#include "core/single.h"
 #include "host/device/buffer.h"
 #include "host/device/commands.h"
 #include "kernels/layout/elements.h"
@@ -42,7 +43,7 @@ class RealWords {
 
 // A number as a high and a low float, which hold 48 bits of it or more.
 inline std::array<float, 2> split(double x) {
-  const float high = static_cast<float>(x);
+  const float high = to_single(x);
   return {high, static_cast<float>(x - static_cast<double>(high))};
 }
 

@@ -104,6 +104,16 @@ struct PolygonMesh {
 // with labels, OFF with neither. Throws Error as write_mesh does, and for other formats.
 BISECTOR_API void write_polygons(const std::string& path, const PolygonMesh& mesh, const WriteOptions& options = {});
 
+// Polyhedra with vertices of their own, each told which cell of a diagram and which tetrahedron it is a part of.
+struct PolyhedronMesh {
+  std::vector<Vec3> vertices;
+  Csr<Index> faces;                // corners, counter-clockwise seen from outside
+  Csr<Index> polyhedra;            // their faces
+  std::vector<Index> cells, tets;  // of each polyhedron
+};
+// Writes them as VTU, with cell data `cell` and `tet`. Throws Error as write_mesh does.
+BISECTOR_API void write_polyhedra(const std::string& path, const PolyhedronMesh& mesh);
+
 // Reads a number for each vertex from a scalar property of a PLY file's element `vertex` or from a VTP file's point
 // data. Throws Error, listing what is there, if `name` is not among it, and for other formats and values that are not
 // finite.

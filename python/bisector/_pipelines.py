@@ -258,9 +258,10 @@ def rvd(
     threads: Optional[int] = None,
     progress: Optional[ProgressCallback] = None,
 ) -> DiagramResult:
-    """The restricted Voronoi diagram of seeds on a surface: (n, 3) points, a file of them, or n random ones.
+    """The Voronoi diagram of seeds on a surface or in a solid: (n, 3) points, a file of them, or n random ones.
 
-    `mesh`, `progress` and what is raised are as for remesh().
+    `mesh` is a surface as for remesh(), or tetrahedra: a file of them, a TetResult or a meshio.Mesh. `progress` and what
+    is raised are as for remesh().
     """
     given = locals()
     options = _options("rvd", _words(given, "mesh", "seeds", "progress"), seeds)

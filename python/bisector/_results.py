@@ -438,8 +438,13 @@ class DiagramResult(Result):
         return self._array("rdt")
 
     @property
+    def dual_tets(self) -> npt.NDArray[np.int64]:
+        """(l, 4) int64: of a solid, four seeds whose cells meet in a point inside, each ascending, sorted."""
+        return self._array("dual_tets")
+
+    @property
     def pairs(self) -> npt.NDArray[np.int64]:
-        """(p, 2) int64: each face of the input and cell that meet, sorted."""
+        """(p, 2) int64: each face of the input, or tetrahedron, and cell that meet, sorted."""
         return self._array("pairs")
 
     @property
@@ -449,7 +454,7 @@ class DiagramResult(Result):
         return self._array("polygon_vertices"), self._array("polygon_offsets"), self._array("polygon_cells")
 
     def save(self, path: "str | os.PathLike[str]") -> None:
-        """Writes the cells as coloured polygons, as .ply."""
+        """Writes the cells as coloured polygons, as .ply, or those of a solid as polyhedra, as .vtu."""
         self._save(path, "output")
 
     def save_pairs(self, path: "str | os.PathLike[str]") -> None:

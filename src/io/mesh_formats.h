@@ -84,6 +84,7 @@ std::string format_vtp(const std::string& path, const TriangleMesh& mesh, const 
 std::string format_vtu(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
 std::string format_3mf(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
 std::string format_glb(const std::string& path, const TriangleMesh& mesh, const WriteOptions& options);
+std::string format_vtu(const PolyhedronMesh& mesh);
 std::string format_off(const PolygonMesh& mesh, const WriteOptions& options);
 std::string format_obj(const PolygonMesh& mesh, const WriteOptions& options);
 std::string format_ply(const PolygonMesh& mesh, const WriteOptions& options);

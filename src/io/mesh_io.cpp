@@ -288,6 +288,22 @@ void write_polygons(const std::string& path, const PolygonMesh& mesh, const Writ
   write_file(path, format.bytes_of_polygons(mesh, options));
 }
 
+void write_polyhedra(const std::string& path, const PolyhedronMesh& mesh) {
+  if (lower_extension(path) != ".vtu")
+    fail(path, fmt::format("unknown format '{}' of polyhedra; use .vtu", printable(lower_extension(path))));
+  const std::size_t n = mesh.polyhedra.rows();
+  if (mesh.cells.size() != n || mesh.tets.size() != n)
+    fail(path, fmt::format("{} cells and {} tetrahedra for {} polyhedra; give one each", mesh.cells.size(),
+                           mesh.tets.size(), n));
+  check_points(path, mesh.vertices);
+  for (std::size_t f = 0; f < mesh.faces.rows(); ++f)
+    check_face(path, f, mesh.faces.begin(f), mesh.faces.end(f), mesh.vertices.size());
+  for (const Index f : mesh.polyhedra.values)
+    if (f >= mesh.faces.rows())
+      fail(path, fmt::format("face {} is out of range, the mesh has {}; nothing was written", f, mesh.faces.rows()));
+  write_file(path, format_vtu(mesh));
+}
+
 std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name) {
   const std::string extension = lower_extension(path);
   if (extension == ".vtp") return read_vtp_attribute(path, read_bytes(path), name);

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/single.h"
 #include "io/bytes.h"
 #include "io/labels.h"
 #include "io/mesh_formats.h"
@@ -175,7 +176,7 @@ StlFacet facet_of(const std::string& path, const TriangleMesh& mesh, const Trian
       const double x = mesh.vertices[t[i]][k];
       if (std::abs(x) > std::numeric_limits<float>::max())
         fail(path, fmt::format("vertex {}: a coordinate is beyond STL's range; write OFF, OBJ or PLY", t[i]));
-      facet.corners[i][k] = static_cast<float>(x);
+      facet.corners[i][k] = to_single(x);
     }
   const Vec3 normal = twice_area_normal(facet.corners[0], facet.corners[1], facet.corners[2]);
   const double length = norm(normal);

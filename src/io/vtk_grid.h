@@ -18,7 +18,8 @@ enum VtkCell {
   kTetrahedron = 10,
   kQuadraticEdge = 21,
   kQuadraticTriangle = 22,
-  kQuadraticTetrahedron = 24
+  kQuadraticTetrahedron = 24,
+  kPolyhedron = 42
 };
 
 // Arrays of the cells or of the points, in the file's order and with different names; what they are of is not told.

@@ -547,4 +547,37 @@ std::string format_vtu(const std::string&, const TriangleMesh& mesh, const Write
   return grid_of(marks, {}, of_triangles);
 }
 
+std::string format_vtu(const PolyhedronMesh& mesh) {
+  const std::size_t n = mesh.polyhedra.rows();
+  // Of each polyhedron its points; and how many faces it has, of each how many corners, and these.
+  std::vector<std::int64_t> connectivity, offsets, faces, face_offsets;
+  for (std::size_t i = 0; i < n; ++i) {
+    std::vector<Index> points;
+    faces.push_back(static_cast<std::int64_t>(mesh.polyhedra.size(i)));
+    for (const Index* f = mesh.polyhedra.begin(i); f != mesh.polyhedra.end(i); ++f) {
+      faces.push_back(static_cast<std::int64_t>(mesh.faces.size(*f)));
+      faces.insert(faces.end(), mesh.faces.begin(*f), mesh.faces.end(*f));
+      points.insert(points.end(), mesh.faces.begin(*f), mesh.faces.end(*f));
+    }
+    std::sort(points.begin(), points.end());
+    points.erase(std::unique(points.begin(), points.end()), points.end());
+    connectivity.insert(connectivity.end(), points.begin(), points.end());
+    offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
+    face_offsets.push_back(static_cast<std::int64_t>(faces.size()));
+  }
+  std::string out = file_start("UnstructuredGrid");
+  out += fmt::format("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", mesh.vertices.size(), n);
+  append_points(out, mesh.vertices);
+  out += "<Cells>\n";
+  append_array(out, "Int64", "connectivity", 1, connectivity);
+  append_array(out, "Int64", "offsets", 1, offsets);
+  append_array(out, "UInt8", "types", 1, std::vector<std::uint8_t>(n, kPolyhedron));
+  append_array(out, "Int64", "faces", 1, faces);
+  append_array(out, "Int64", "faceoffsets", 1, face_offsets);
+  out += "</Cells>\n<CellData>\n";
+  append_array(out, "UInt32", "cell", 1, mesh.cells);
+  append_array(out, "UInt32", "tet", 1, mesh.tets);
+  return out + "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+}
+
 }  // namespace bisector::io

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <numeric>
+#include <stdexcept>
 
 #include "core/random.h"
 
@@ -65,6 +66,41 @@ PolygonMesh coloured_cells(const RestrictedPolygons& polygons, std::size_t seeds
   for (const RestrictedPolygons::Pair& pair : polygons.pairs) {
     mesh.labels.push_back(pair.cell);
     mesh.colours.push_back(colours[pair.cell]);
+  }
+  return mesh;
+}
+
+// At a vertex three planes meet, counter-clockwise seen from outside. Around the face of the first one the next corner
+// is where the third comes second.
+PolyhedronMesh polyhedra_of(const ClippedPolyhedra& polyhedra) {
+  PolyhedronMesh mesh;
+  for (std::size_t k = 0; k < polyhedra.pairs.size(); ++k) {
+    const std::size_t labels = polyhedra.label_offsets[k + 1] - polyhedra.label_offsets[k];
+    const std::size_t first = polyhedra.vertex_offsets[k], end = polyhedra.vertex_offsets[k + 1];
+    const auto base = static_cast<Index>(mesh.vertices.size());
+    // Of each plane the corners of its face: the plane before, that after, the vertex.
+    std::vector<std::vector<std::array<Index, 3>>> corners(labels);
+    for (std::size_t v = first; v < end; ++v) {
+      const std::array<std::uint16_t, 3>& planes = polyhedra.triples[v];
+      for (std::size_t i = 0; i < 3; ++i)
+        corners[planes[i]].push_back({planes[(i + 1) % 3], planes[(i + 2) % 3], base + static_cast<Index>(v - first)});
+      mesh.vertices.push_back(polyhedra.vertices[v]);
+    }
+    for (const std::vector<std::array<Index, 3>>& face : corners) {
+      if (face.empty()) continue;
+      std::size_t at = 0;
+      for (std::size_t n = 0; n < face.size(); ++n) {
+        mesh.faces.values.push_back(face[at][2]);
+        const auto next = std::find_if(face.begin(), face.end(), [&](const auto& c) { return c[0] == face[at][1]; });
+        at = static_cast<std::size_t>(next - face.begin());
+        if (next == face.end()) throw std::logic_error("the planes of a polyhedron's face form no ring");
+      }
+      mesh.polyhedra.values.push_back(static_cast<Index>(mesh.faces.rows()));
+      mesh.faces.offsets.push_back(mesh.faces.values.size());
+    }
+    mesh.polyhedra.offsets.push_back(mesh.polyhedra.values.size());
+    mesh.cells.push_back(polyhedra.pairs[k].cell);
+    mesh.tets.push_back(polyhedra.pairs[k].tet);
   }
   return mesh;
 }

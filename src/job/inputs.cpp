@@ -33,6 +33,11 @@ std::vector<std::string> names_of(const std::vector<Attribute>& attributes) {
   return names;
 }
 
+std::vector<Attribute> without(std::vector<Attribute> attributes, const std::string& name) {
+  std::erase_if(attributes, [&](const Attribute& attribute) { return attribute.name == name; });
+  return attributes;
+}
+
 // The numbers of a mesh in memory.
 std::vector<double> given_density(const GivenMesh& mesh, const std::string& name) {
   std::vector<std::string> known;
@@ -50,6 +55,13 @@ void repeat_warnings(const GivenMesh& mesh, Journal& journal) {
 }
 
 }  // namespace
+
+Json size_json(const Domain& domain) {
+  if (!domain.tets) return input_json(*domain.surface);
+  return {{"vertices", domain.tets->vertices.size()},
+          {"faces", domain.surface->triangles.size()},
+          {"tets", domain.tets->tets.size()}};
+}
 
 std::shared_ptr<const TriangleMesh> read_surface(const std::string& path, const std::shared_ptr<const GivenMesh>& given,
                                                  Journal& journal) {
@@ -107,19 +119,20 @@ std::vector<Index> read_kept(const std::string& path, const std::vector<Index>& 
   return kept;
 }
 
-void warn_of_lost_attributes(const std::string& path, const TriangleMesh& surface, Journal& journal) {
-  const std::string lost = loss_of_attributes(path, carried_attributes(surface));
+void warn_of_lost_attributes(const std::string& path, const TriangleMesh& surface, const std::string& used,
+                             Journal& journal) {
+  const std::string lost = loss_of_attributes(path, without(carried_attributes(surface), used), kMeshFormats);
   if (!lost.empty()) journal.warn(lost);
 }
 
-void warn_of_lost_attributes(const std::string& path, const Domain& domain, Journal& journal) {
+void warn_of_lost_attributes(const std::string& path, const Domain& domain, const std::string& used, Journal& journal) {
   std::vector<Attribute> kept, left;
-  for (const Attribute& attribute : domain.tets ? domain.tets->attributes : domain.surface->attributes)
+  for (const Attribute& attribute : without(domain.tets ? domain.tets->attributes : domain.surface->attributes, used))
     (domain.tets || attribute.site == Attribute::Site::vertex ? kept : left).push_back(attribute);
   if (!left.empty())
     journal.warn(fmt::format("attributes of faces do not become those of tetrahedra: {} {} lost",
                              fmt::join(names_of(left), ", "), left.size() == 1 ? "is" : "are"));
-  const std::string lost = loss_of_attributes(path, kept);
+  const std::string lost = loss_of_attributes(path, kept, kTetFormats);
   if (!lost.empty()) journal.warn(lost);
 }
 

@@ -17,6 +17,8 @@ struct Domain {
   std::shared_ptr<const TetMesh> tets;  // null: a surface
 };
 
+Json size_json(const Domain& domain);
+
 // The surface that is given, or that of the file.
 std::shared_ptr<const TriangleMesh> read_surface(const std::string& path, const std::shared_ptr<const GivenMesh>& given,
                                                  Journal& journal);
@@ -37,9 +39,10 @@ std::vector<Index> read_kept(const std::string& path, const std::vector<Index>& 
                              const char* what, const char* option);
 
 // Warns of attributes of the input that a file of a result has no place for, and of those that tetrahedra do not get
-// from a surface.
-void warn_of_lost_attributes(const std::string& path, const TriangleMesh& surface, Journal& journal);
-void warn_of_lost_attributes(const std::string& path, const Domain& domain, Journal& journal);
+// from a surface. Who uses one as a density, `used`, does not ask for it in the result.
+void warn_of_lost_attributes(const std::string& path, const TriangleMesh& surface, const std::string& used,
+                             Journal& journal);
+void warn_of_lost_attributes(const std::string& path, const Domain& domain, const std::string& used, Journal& journal);
 
 // Folds of a wrap are those of its own triangles: creases are not looked for by themselves there.
 void leave_out_folds(const WrapOption& wrap, FeatureOptions& features);

@@ -100,11 +100,12 @@ std::string lost_labels(const std::string& path, bool named, const char* labels)
                      held == Labels::named ? " without names" : "", labels, listed(holders));
 }
 
-std::string loss_of_attributes(const std::string& path, const std::vector<Attribute>& attributes) {
+std::string loss_of_attributes(const std::string& path, const std::vector<Attribute>& attributes,
+                               const std::vector<std::string>& formats) {
   const std::vector<std::string> lost = lost_attributes(path, attributes);
   if (lost.empty()) return {};
   std::vector<std::string> holders;
-  for (const std::string& extension : kMeshFormats)
+  for (const std::string& extension : formats)
     if (lost_attributes("x" + extension, attributes).empty()) holders.push_back(extension);
   return fmt::format("{}: {} files have no place for {}, which {} lost{}", path, extension_of(path),
                      fmt::join(lost, ", "), lost.size() == 1 ? "is" : "are",

@@ -43,7 +43,9 @@ std::string with_extensions(const std::string& text, const std::vector<std::stri
 // `named`: they have names.
 std::string lost_labels(const std::string& path, bool named, const char* labels);
 
-// What to warn of if a file of this name has no place for some of these attributes; empty if it has for all.
-std::string loss_of_attributes(const std::string& path, const std::vector<Attribute>& attributes);
+// What to warn of if a file of this name has no place for some of these attributes; empty if it has for all. `formats`:
+// the extensions that it might have.
+std::string loss_of_attributes(const std::string& path, const std::vector<Attribute>& attributes,
+                               const std::vector<std::string>& formats);
 
 }  // namespace bisector::job

@@ -247,7 +247,7 @@ void RemeshJob::read(Journal& journal) {
 
 void RemeshJob::check_format(std::string_view output, const std::string& path, Journal& journal) const {
   if (output != "output") return;
-  warn_of_lost_attributes(path, *surface, journal);
+  warn_of_lost_attributes(path, *surface, attribute_, journal);
   if (remeshed_surface().labels.empty()) return;
   const std::string lost = lost_labels(path, !remeshed_surface().label_names.empty(), "the input's");
   if (!lost.empty()) journal.warn(lost);

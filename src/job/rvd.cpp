@@ -14,6 +14,8 @@
 #include "job/inputs.h"
 #include "job/messages.h"
 #include "mesh/sampling.h"
+#include "tetmesh/sample_solid.h"
+#include "voronoi/clipped.h"
 #include "voronoi/tiling.h"
 
 namespace bisector::job {
@@ -49,12 +51,18 @@ std::vector<std::array<Index, 2>> face_pairs(const RestrictedPolygons& polygons,
 }  // namespace
 
 std::vector<OutputKind> RvdJob::outputs() const {
-  return {{"output", "-o", "FILE.ply", "write the cells as coloured polygons", {".ply"}},
+  return {{"output",
+           "-o",
+           "FILE",
+           "write the cells as coloured polygons (.ply), of\n"
+           "tetrahedra those of the boundary, or as polyhedra (.vtu)",
+           {".ply", ".vtu"}},
           {"pairs",
            "--pairs",
            "FILE",
            "write \"face seed\" lines, one for each face (counted\n"
-           "from 0 in the input) and cell that meet, sorted",
+           "from 0 in the input), or tetrahedron, and cell that meet,\n"
+           "sorted",
            {}},
           {"preview", "--preview", "FILE.png", "draw a picture of the cells", {".png"}}};
 }
@@ -79,32 +87,86 @@ void RvdJob::check_usage(const Usage& usage) {
 
 void RvdJob::read(Journal& journal) {
   const Stopwatch reading;
-  surface = read_surface(input, given.mesh, journal);
+  domain = read_domain(input, given.mesh, false, journal);
   if (given.seeds || !seeds_file_.empty()) {
     seeds = read_seeds(seeds_file_, given, count_);
+  } else if (domain.tets) {
+    seeds = sample_solid(*domain.tets, count_, random_seed_);
   } else {
-    for (const SurfaceSample& sample : sample_surface(*surface, count_, random_seed_)) seeds.push_back(sample.point);
+    for (const SurfaceSample& sample : sample_surface(*domain.surface, count_, random_seed_))
+      seeds.push_back(sample.point);
   }
   io_ = reading.seconds();
 }
 
+void RvdJob::check_format(std::string_view output, const std::string& path, Journal&) const {
+  if (output == "output" && !domain.tets && extension_of(path) == ".vtu")
+    throw Error(path + ": cells on a surface are polygons; write .ply");
+}
+
+void RvdJob::check_mass(double mass, double tolerance, const char* what, Journal& journal) const {
+  if (std::abs(diagram.moments.mass - mass) > tolerance * mass)
+    journal.warn(fmt::format("the masses of the cells sum to {}, the {} is {}", diagram.moments.mass, what, mass));
+}
+
+void RvdJob::note_seconds(double computing) {
+  const DiagramSeconds& phases = evaluation.seconds;
+  seconds.update(seconds_json(phases));
+  seconds["extract"] = computing - (phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
+  seconds["io"] = io_;
+}
+
 void RvdJob::compute(Journal& journal) {
   journal.phase("computing the diagram");
-  const Surface domain(*surface);
-  const std::unique_ptr<Backend> backend = make_backend(domain, compute_, journal.context());
+  if (domain.tets) compute_solid(journal);
+  else compute_surface(journal);
+}
+
+void RvdJob::compute_surface(Journal& journal) {
+  const Surface surface(*domain.surface);
+  const std::unique_ptr<Backend> backend = make_backend(surface, compute_, journal.context());
   const Stopwatch computing;
   evaluation = backend->evaluate(seeds, Want::polygons | Want::dual, diagram);
   device = backend->description();
-  if (const std::size_t untiled = count_untiled(backend->surface(), diagram.polygons); untiled > 0)
+  if (const std::size_t untiled = count_untiled(surface, diagram.polygons); untiled > 0)
     throw Error(fmt::format("the diagram does not tile {} of the input; please report this as a bug",
                             counted(untiled, "triangle", "triangles")));
-  const double computing_seconds = computing.seconds();
-  if (std::abs(diagram.moments.mass - domain.mass) > backend->mass_tolerance() * domain.mass)
-    journal.warn(fmt::format("the masses of the cells sum to {}, the area is {}", diagram.moments.mass, domain.mass));
-  const DiagramSeconds& phases = evaluation.seconds;
-  seconds.update(seconds_json(phases));
-  seconds["extract"] = computing_seconds - (phases.delaunay + phases.neighbours + phases.pairs + phases.clip);
-  seconds["io"] = io_;
+  note_seconds(computing.seconds());
+  check_mass(surface.mass, backend->mass_tolerance(), "area", journal);
+}
+
+void RvdJob::compute_solid(Journal& journal) {
+  const Solid solid(*domain.tets);
+  const std::unique_ptr<SolidBackend> backend = make_backend(solid, compute_, journal.context());
+  const Stopwatch computing;
+  evaluation = backend->evaluate(seeds, Want::polygons | Want::polyhedra | Want::dual, diagram);
+  device = backend->description();
+  const std::size_t untiled = count_untiled(solid, diagram.polyhedra) + count_untiled(solid.boundary, diagram.polygons);
+  if (untiled > 0)
+    throw Error(fmt::format("the diagram does not tile {} of the input; please report this as a bug",
+                            counted(untiled, "cell or triangle", "cells or triangles")));
+  note_seconds(computing.seconds());
+  dual_tets_ = dual_tets(diagram.polyhedra);
+  check_mass(solid.mass, backend->mass_tolerance(), "volume", journal);
+}
+
+const ClippedPolyhedra& RvdJob::pieces() {
+  if (!pieces_.pairs.empty()) return pieces_;
+  const Solid solid(*domain.tets);
+  Diagram cut;
+  ClippedVoronoi(solid, SolidCells::clipped).evaluate(seeds, NeighbourSource::nearest, Want::polyhedra, cut);
+  if (const std::size_t untiled = count_untiled(solid, cut.polyhedra); untiled > 0)
+    throw Error(fmt::format("the cells do not tile {} of the input; please report this as a bug",
+                            counted(untiled, "tetrahedron", "tetrahedra")));
+  pieces_ = std::move(cut.polyhedra);
+  return pieces_;
+}
+
+std::vector<std::array<Index, 2>> RvdJob::element_pairs() {
+  if (!domain.tets) return face_pairs(diagram.polygons, *domain.surface);
+  std::vector<std::array<Index, 2>> pairs;
+  for (const auto& [tet, cell] : pieces().pairs) pairs.push_back({tet, cell});
+  return pairs;
 }
 
 const PolygonMesh& RvdJob::cells() {
@@ -115,7 +177,7 @@ const PolygonMesh& RvdJob::cells() {
 Json RvdJob::report(Journal&) {
   Json report = start_report(command());
   report["device"] = device_json(device);
-  report["input"] = input_json(*surface);
+  report["input"] = size_json(domain);
   report["energy"] = diagram.moments.energy;
   report["mass"] = diagram.moments.mass;
   report["untiled"] = 0;  // a diagram that does not tile is not reported
@@ -124,6 +186,7 @@ Json RvdJob::report(Journal&) {
   report["certification"] = certification_json(evaluation.certification);
   report["cells"] = cells_json(diagram.moments, seeds);
   report["rdt"] = sorted_dual(diagram.dual);
+  if (domain.tets) report["dual_tets"] = dual_tets_;
   return report;
 }
 
@@ -153,11 +216,11 @@ view::Scene RvdJob::scene(const std::string&) {
 }
 
 void RvdJob::write(std::string_view output, const std::string& path, const std::vector<std::string>&) {
+  if (output == "output" && extension_of(path) == ".vtu") return write_polyhedra(path, polyhedra_of(pieces()));
   if (output == "output") return write_polygons(path, cells());
   if (output == "pairs") {
     fmt::memory_buffer text;
-    for (const auto& [face, cell] : face_pairs(diagram.polygons, *surface))
-      fmt::format_to(std::back_inserter(text), "{} {}\n", face, cell);
+    for (const auto& [face, cell] : element_pairs()) fmt::format_to(std::back_inserter(text), "{} {}\n", face, cell);
     return write_file(path, fmt::to_string(text));
   }
   PreviewOptions picture;
@@ -177,7 +240,7 @@ std::vector<ArrayView> RvdJob::arrays() {
       centroids_.push_back(m.mass > 0 ? seeds[i] + (1 / m.mass) * m.first : Vec3{kNan, kNan, kNan});
     }
     rdt_ = sorted_dual(diagram.dual);
-    pairs_ = face_pairs(diagram.polygons, *surface);
+    pairs_ = element_pairs();
     cell_offsets_.assign(cells().polygons.offsets.begin(), cells().polygons.offsets.end());
   }
   return {array_of("seeds", seeds),
@@ -185,6 +248,7 @@ std::vector<ArrayView> RvdJob::arrays() {
           array_of("centroids", centroids_),
           array_of("energies", energies_),
           array_of("rdt", rdt_),
+          array_of("dual_tets", dual_tets_),
           array_of("pairs", pairs_),
           array_of("polygon_vertices", cells().vertices),
           array_of("polygon_offsets", cell_offsets_),

@@ -99,13 +99,6 @@ void warn_of(Journal& journal, const TetOptions& options, const TetResult& resul
 
 }  // namespace
 
-Json size_json(const Domain& domain) {
-  if (!domain.tets) return input_json(*domain.surface);
-  return {{"vertices", domain.tets->vertices.size()},
-          {"faces", domain.surface->triangles.size()},
-          {"tets", domain.tets->tets.size()}};
-}
-
 std::vector<OutputKind> TetJob::outputs() const {
   return {{"output", "-o", "FILE", with_extensions("mesh to write", kTetFormats), kTetFormats, true},
           {"boundary", "--boundary", "FILE", with_extensions("also write the boundary's triangles", kMeshFormats),
@@ -234,7 +227,7 @@ void TetJob::check_format(std::string_view output, const std::string& path, Jour
   if (order_ == 2 && std::find(holders.begin(), holders.end(), extension_of(path)) == holders.end())
     throw Error(fmt::format("{}: {} files are not written with nodes on edges (--order 2); write {}", path,
                             extension_of(path), listed(holders)));
-  warn_of_lost_attributes(path, domain, journal);
+  warn_of_lost_attributes(path, domain, attribute_, journal);
 }
 
 void TetJob::carry(Journal& journal) {

@@ -58,6 +58,4 @@ class TetJob final : public Job {
   SecondOrderReport curved_;
 };
 
-Json size_json(const Domain& domain);
-
 }  // namespace bisector::job

@@ -34,6 +34,7 @@
 #include "bisector/quality.h"
 #include "compute/compute.h"
 #include "core/geometry.h"
+#include "job/cells.h"
 #include "job/words.h"
 #include "mesh/tet_topology.h"
 #include "mesh/topology.h"
@@ -43,6 +44,7 @@
 #include "support/solids.h"
 #include "support/tree_model.h"
 #include "tetmesh/tetgen.h"
+#include "voronoi/clipped.h"
 
 namespace bisector {
 namespace {
@@ -337,6 +339,53 @@ TEST_F(Cli, ReportOnStdoutIsNothingButJson) {
   EXPECT_EQ(report_of({"rvd", in("sphere.off"), "-n", "5", "--report", "-"})["command"], "rvd");
   EXPECT_EQ(report_of({"quality", in("sphere.off"), "--report", "-"})["command"], "quality");
   EXPECT_EQ(report_of({"devices", "--report", "-"})["devices"][0]["kind"], "cpu");
+}
+
+// The pieces of cells are closed, turned outward, and have the volumes of their cells.
+TEST_F(Cli, CellsOfASolidArePolyhedra) {
+  TetMesh mesh = test::shaken(test::tet_box(3), 0.05, 2);
+  const std::vector<Vec3> seeds = test::seeds_about(mesh, 40, 0.05, 3);
+  const Solid solid(mesh);
+  Diagram diagram;
+  ClippedVoronoi(solid, SolidCells::clipped).evaluate(seeds, NeighbourSource::nearest, Want::polyhedra, diagram);
+  const PolyhedronMesh pieces = job::polyhedra_of(diagram.polyhedra);
+  std::vector<double> volumes(seeds.size(), 0);
+  for (std::size_t i = 0; i < pieces.polyhedra.rows(); ++i) {
+    std::multiset<std::array<Index, 2>> edges;
+    double six_volume = 0;
+    const Vec3 origin = pieces.vertices[*pieces.faces.begin(*pieces.polyhedra.begin(i))];
+    for (const Index* f = pieces.polyhedra.begin(i); f != pieces.polyhedra.end(i); ++f) {
+      const Index* corner = pieces.faces.begin(*f);
+      const std::size_t n = pieces.faces.size(*f);
+      for (std::size_t k = 0; k < n; ++k) edges.insert({corner[k], corner[(k + 1) % n]});
+      for (std::size_t k = 2; k < n; ++k)
+        six_volume += dot(pieces.vertices[corner[0]] - origin,
+                          cross(pieces.vertices[corner[k - 1]] - origin, pieces.vertices[corner[k]] - origin));
+    }
+    for (const auto& [a, b] : edges) {
+      EXPECT_EQ(edges.count({a, b}), 1u);
+      EXPECT_EQ(edges.count({b, a}), 1u);
+    }
+    EXPECT_GE(six_volume, -1e-15);
+    volumes[pieces.cells[i]] += six_volume / 6;
+  }
+  double sum = 0;
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    EXPECT_NEAR(volumes[i], diagram.moments.cells[i].mass, 1e-14);
+    sum += volumes[i];
+  }
+  EXPECT_NEAR(sum, solid.volume, 1e-13);
+
+  write_tet_mesh(in("solid.vtu"), mesh);
+  const Json report = report_of(
+      {"rvd", in("solid.vtu"), "-n", "30", "-o", in("cells.vtu"), "--pairs", in("pairs.txt"), "--report", "-"});
+  EXPECT_NEAR(report["mass"].get<double>(), solid.volume, 1e-13);
+  EXPECT_EQ(report["input"]["tets"], mesh.tets.size());
+  EXPECT_FALSE(report["dual_tets"].empty());
+  EXPECT_NE(read_text(in("cells.vtu")).find("faceoffsets"), std::string::npos);
+  EXPECT_GE(std::ranges::count(read_text(in("pairs.txt")), '\n'), static_cast<long>(mesh.tets.size()));
+  EXPECT_EQ(run({"rvd", in("solid.vtu"), "-n", "30", "-o", in("cells.ply"), "--report", in("cells.html")}).code, 0);
+  expect_failure(1, {"rvd", in("sphere.off"), "-n", "10", "-o", in("cells.vtu")}, "cells on a surface are polygons");
 }
 
 TEST_F(Cli, OutputDoesNotDependOnThreads) {
@@ -660,7 +709,7 @@ TEST_F(CliRemesh, WhatTheInputDoesNotAllow) {
   write_text("chord.txt", "\n0 1\n  0 288\n");
   write_text("half.txt", "0\n");
   const auto refused = [&](const char* input, std::vector<std::string> more, const std::string& part) {
-    more.insert(more.begin(), {"remesh", in(input), "-o", in("out.obj")});
+    more.insert(more.begin(), {"remesh", in(input), "-o", in("out.ply")});
     expect_failure(1, more, part);
   };
   refused("square.ply", {"-n", "100", "--density", "attribute:size"}, "one of x, y, z, rho");

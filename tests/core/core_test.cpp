@@ -11,6 +11,7 @@
 #include "core/grouping.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/single.h"
 #include "core/stopwatch.h"
 #include "core/words.h"
 
@@ -22,6 +23,18 @@ TEST(Geometry, UnitVectorsHaveTheDirectionAndLength1) {
   EXPECT_NEAR(norm(unit(a)), 1, 1e-15);
   EXPECT_NEAR(dot(unit(a), a), 13, 1e-14);
   EXPECT_EQ(unit(Vec3{}), Vec3{});
+}
+
+// As plain conversions do not with g++ 12 at -O2.
+TEST(Single, RoundsEachOfSeveralAtOnce) {
+  const auto rounded = [](const Vec3& p) { return Vec3{to_single(p.x), to_single(p.y), to_single(p.z)}; };
+  volatile double third = 1.0 / 3;
+  const Vec3 p{third, 0.1 + third, 1e-50 * third}, q = rounded(p);
+  for (int k = 0; k < 3; ++k) {
+    const volatile float single = static_cast<float>(p[k]);
+    EXPECT_EQ(q[k], single);
+    EXPECT_NE(q[k], p[k]);
+  }
 }
 
 TEST(Geometry, PerpendicularVectorsHaveLength1) {

@@ -22,6 +22,7 @@
 #include "bisector/quality.h"
 #include "core/degenerate.h"
 #include "core/geometry.h"
+#include "io/bytes.h"
 #include "io/files.h"
 #include "mesh/topology.h"
 #include "support/allocations.h"
@@ -174,6 +175,21 @@ TEST_F(Io, RoundTripsAreBitExact) {
       write_mesh(path(name), mesh);
       EXPECT_TRUE(slurp(name) == bytes);
     }
+}
+
+// Far from the origin rounding turns small triangles; their normals are those of the corners that are written.
+TEST_F(Io, StlNormalsAreOfTheRoundedCorners) {
+  TriangleMesh mesh = icosphere(2);
+  for (Vec3& p : mesh.vertices) p = {1000.1 + 0.01 * p.x, 2000.3 + 0.01 * p.y, 3000.7 + 0.01 * p.z};
+  write_mesh(path("far.stl"), mesh);
+  const std::string bytes = slurp("far.stl");
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    std::array<Vec3, 4> v;  // normal and corners
+    for (std::size_t i = 0; i < 4; ++i)
+      for (int k = 0; k < 3; ++k)
+        v[i][k] = io::load<float>(bytes.data() + 84 + 50 * t + 12 * i + 4 * static_cast<std::size_t>(k), false);
+    EXPECT_LT(norm(v[0] - unit(cross(v[2] - v[1], v[3] - v[1]))), 1e-6) << t;
+  }
 }
 
 TEST_F(Io, StlRoundTripsToFloat) {

@@ -261,6 +261,21 @@ class Arrays(unittest.TestCase):
         sure = np.abs(middles - 0.5) > 0.3
         self.assertTrue(np.array_equal(u.cell_data["above"][sure], middles[sure] > 0.5))
 
+    def test_diagrams_of_solids(self):
+        vertices, faces = cube()
+        t = bs.tetrahedralize((vertices, triangle_fan(faces)), n=100, iterations=3)
+        d = bs.rvd(t, n=20)
+        volumes = np.einsum("ij,ij->i", t.vertices[t.tets[:, 1]] - t.vertices[t.tets[:, 0]], np.cross(
+            t.vertices[t.tets[:, 2]] - t.vertices[t.tets[:, 0]], t.vertices[t.tets[:, 3]] - t.vertices[t.tets[:, 0]])) / 6
+        self.assertAlmostEqual(d.masses.sum(), volumes.sum(), places=12)
+        self.assertGreater(len(d.dual_tets), 0)
+        self.assertLess(d.dual_tets.max(), 20)
+        with tempfile.TemporaryDirectory() as folder:
+            d.save(pathlib.Path(folder) / "cells.vtu")
+            d.save(pathlib.Path(folder) / "cells.ply")
+            with self.assertRaisesRegex(bs.Error, "cells on a surface are polygons"):
+                bs.rvd(cube(), n=20).save(pathlib.Path(folder) / "other.vtu")
+
     def test_nodes_on_edges(self):
         t = bs.tetrahedralize(SMOOTH, n=300, order=2, iterations=5)
         self.assertGreater(t.report["second_order"]["jacobian_min"], 0)
