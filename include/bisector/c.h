@@ -190,9 +190,10 @@ typedef struct bisector_array {
  *            polygon_vertices, polygon_corners, polygon_offsets, polygon_labels
  *   tree     vertices, faces, labels (the branch of each face); the skeleton's nodes (n, 3), node_radii, node_parents
  *            and node_branches; point_branches (of each point; -1: none)
- *   rvd      seeds, masses, centroids (not a number for a cell that is empty), energies; rdt (k, 3); dual_tets (l, 4:
- * of a solid); pairs (face or tetrahedron, seed); the cells' polygons as polygon_vertices, polygon_offsets (corners are
- * consecutive), polygon_cells BISECTOR_FAILED if there is no array of this name. */
+ *   rvd      seeds, masses, centroids (not a number for a cell that is empty), energies; rdt (k, 3); dual_tets (l, 4;
+ *            of a solid); pairs (face or tetrahedron, seed); the cells' polygons as polygon_vertices, polygon_offsets
+ *            (corners are consecutive), polygon_cells
+ * BISECTOR_FAILED if there is no array of this name. */
 BISECTOR_C_API bisector_status bisector_result_array(const bisector_result* result, const char* name,
                                                      bisector_array* array);
 /* The attributes of a result of `remesh` or `tet` (bisector/attributes.h says how they are carried), whose names and

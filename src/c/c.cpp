@@ -1,6 +1,7 @@
 #include "bisector/c.h"
 
 #include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 
 #include <algorithm>

@@ -7,11 +7,11 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 #include <utility>
 
 #include "io/bytes.h"
 #include "io/text.h"
+#include "mesh/attribute_sizes.h"
 
 namespace bisector::io {
 
@@ -83,14 +83,6 @@ class CornerFinder {
   std::vector<std::pair<Index, std::size_t>> sorted_;
 };
 
-Attribute picked(const Attribute& from, const std::vector<std::size_t>& places) {
-  Attribute to{from.name, from.site, from.type, from.components, {}};
-  to.values.reserve(from.components * places.size());
-  for (const std::size_t i : places)
-    for (std::size_t c = 0; c < from.components; ++c) to.values.push_back(from.values[from.components * i + c]);
-  return to;
-}
-
 }  // namespace
 
 void AttributeColumns::add(const std::string& name, Type type) {
@@ -154,7 +146,7 @@ std::vector<std::string> component_names(const Attribute& attribute) {
 }
 
 std::vector<std::uint8_t> colour_bytes(const Attribute& attribute) {
-  const double scale = attribute.type >= Type::float32 ? 255 : 1;
+  const double scale = has_fractions(attribute) ? 255 : 1;
   std::vector<std::uint8_t> bytes;
   bytes.reserve(attribute.values.size());
   for (const double x : attribute.values) bytes.push_back(clamped<std::uint8_t>(std::round(scale * x)));

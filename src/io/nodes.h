@@ -8,6 +8,7 @@
 #include "bisector/attributes.h"
 #include "bisector/mesh.h"
 #include "bisector/second_order.h"
+#include "mesh/attribute_sizes.h"
 
 namespace bisector::io {
 
@@ -35,8 +36,7 @@ inline std::vector<Vec3> vertices_and_nodes(const TetMesh& mesh, const SecondOrd
 inline std::vector<Attribute> attributes_with_nodes(std::vector<Attribute> attributes, const SecondOrder& order) {
   for (Attribute& attribute : attributes) {
     if (attribute.site != Attribute::Site::vertex) continue;
-    const bool between =
-        attribute.type >= Attribute::Type::float32 || meaning_of(attribute) == AttributeMeaning::colour;
+    const bool between = has_fractions(attribute) || meaning_of(attribute) == AttributeMeaning::colour;
     const std::size_t n = attribute.components;
     for (const auto& [a, b] : order.edges)
       for (std::size_t c = 0; c < n; ++c) {

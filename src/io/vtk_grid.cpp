@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "mesh/attribute_sizes.h"
+
 namespace bisector::io {
 
 namespace {
@@ -86,11 +88,8 @@ std::vector<Attribute> attributes_of_cells(const VtkArrays& cell_data, const std
   for (const Attribute& array : cell_data) {
     // Where there are labels and regions, each has zeros where the other one counts.
     if (&array == label || &array == region || array.name == "region" || array.name == "label") continue;
-    attributes.push_back({array.name, Attribute::Site::element, array.type, array.components, {}});
-    std::vector<double>& values = attributes.back().values;
-    values.reserve(array.components * cells.size());
-    for (const std::size_t i : cells)
-      for (std::size_t c = 0; c < array.components; ++c) values.push_back(array.values[array.components * i + c]);
+    attributes.push_back(picked(array, cells));
+    attributes.back().site = Attribute::Site::element;
   }
   return attributes;
 }

@@ -389,7 +389,7 @@ void append_attributes(std::string& out, const std::vector<Attribute>& attribute
     if (attribute.site != site) continue;
     std::string name = cleaned(attribute.name, "<>&\"'"), bytes;
     while (!taken.insert(name).second) name += '_';
-    const double none = attribute.type >= Attribute::Type::float32 ? std::numeric_limits<double>::quiet_NaN() : 0;
+    const double none = has_fractions(attribute) ? std::numeric_limits<double>::quiet_NaN() : 0;
     const auto append = [&](double value) { append_value_bytes(bytes, value, attribute.type); };
     for (std::size_t i = 0; i < attribute.components * before; ++i) append(none);
     for (const double value : attribute.values) append(value);

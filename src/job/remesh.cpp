@@ -366,7 +366,7 @@ std::vector<ArrayView> RemeshJob::arrays() {
           array_of("feature_edges", result.mesh.feature_edges),
           array_of("kept", result.kept),
           array_of("map_faces", map_faces_),
-          {"map_weights", ArrayView::Type::double_, map_.weights.data(), map_.weights.size(), 3}};
+          {"map_weights", ArrayView::Type::double_, map_.weights.data(), map_faces_.size(), 3}};
 }
 
 }  // namespace bisector::job

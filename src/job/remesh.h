@@ -55,7 +55,7 @@ class RemeshJob final : public Job {
   bool wants_feature_edges_ = false;  // --feature-output is given
   bool wants_map_ = false;            // --map is
   SurfaceMap map_;                    // of the result's vertices, where it is wanted or there are attributes
-  std::vector<Index> map_faces_;      // for arrays()
+  std::vector<Index> map_faces_;      // for arrays(); none if it is not wanted
   WrapOption wrap_;
   RemeshOptions options_;
   TriangleMesh wrap_mesh_;

@@ -1,4 +1,4 @@
-// How many numbers attributes have.
+// How many numbers attributes have, and those of some places.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,6 +24,16 @@ inline std::size_t site_count(const TetMesh& mesh, Attribute::Site site) {
   return site == Attribute::Site::vertex    ? mesh.vertices.size()
          : site == Attribute::Site::element ? mesh.tets.size()
                                             : 0;
+}
+
+// The attribute at some of its places, in their order.
+template <class Places>
+Attribute picked(const Attribute& from, const Places& places) {
+  Attribute to{from.name, from.site, from.type, from.components};
+  to.values.reserve(from.components * places.size());
+  for (const std::size_t i : places)
+    for (std::size_t c = 0; c < from.components; ++c) to.values.push_back(from.values[from.components * i + c]);
+  return to;
 }
 
 // Throws Error if values are not as many as it takes.

@@ -124,15 +124,6 @@ Attribute carry_vertices(const Attribute& from, const std::vector<std::array<Ind
   return to;
 }
 
-Attribute carry_elements(const Attribute& from, const std::vector<Index>& element) {
-  Attribute to = like(from, Site::element, element.size());
-  const std::size_t n = from.components;
-  for (std::size_t i = 0; i < element.size(); ++i)
-    std::copy_n(from.values.begin() + static_cast<std::ptrdiff_t>(n * element[i]), n,
-                to.values.begin() + static_cast<std::ptrdiff_t>(n * i));
-  return to;
-}
-
 // Numbers of corners, which may be those of vertices.
 struct CornerValues {
   const Attribute* attribute;
@@ -395,7 +386,7 @@ void carry_attributes(const TriangleMesh& from, const SurfaceMap& map, TriangleM
   if (of_elements || !corners.empty()) {
     const SurfaceMap nearest = map_to_surface(centroids(to), from, context);
     for (std::size_t i = 0; i < carried.size(); ++i)
-      if (carried[i].site == Site::element) carried[i] = carry_elements(from.attributes[i], nearest.triangles);
+      if (carried[i].site == Site::element) carried[i] = picked(from.attributes[i], nearest.triangles);
     if (!corners.empty()) {
       const std::vector<Index> neighbours = find_neighbours(from, corners);
       const SurfaceMap places = CornerPlaces(from, neighbours, map, to).find(nearest.triangles, context);
@@ -425,7 +416,7 @@ void carry_attributes(const TetMesh& from, const SolidMap& map, TetMesh& to, con
       continue;
     }
     if (tets.empty()) tets = map_to_solid(centroids(to), from, context).tets;
-    carried.push_back(carry_elements(attribute, tets));
+    carried.push_back(picked(attribute, tets));
   }
   to.attributes = std::move(carried);
 }

@@ -44,8 +44,8 @@ struct Targets {
   }
 };
 
-Targets find_targets(const TetMesh& mesh, const SecondOrder& order, const TriangleMesh& surface,
-                     const std::vector<Edge>& features, const Context& context) {
+Targets find_targets(const TetMesh& mesh, const SecondOrder& order, const NearestOnMesh& on_surface,
+                     const NearestOnEdges* on_features) {
   Targets targets;
   std::vector<Edge> boundary;
   for (const Triangle& t : boundary_facets(mesh.tets))
@@ -56,10 +56,6 @@ Targets find_targets(const TetMesh& mesh, const SecondOrder& order, const Triang
   targets.points.resize(boundary.size());
   targets.near.resize(boundary.size());
   targets.halvings.assign(boundary.size(), 0);
-  const NearestOnMesh on_surface(surface);
-  std::optional<NearestOnEdges> on_features;
-  if (!features.empty()) on_features.emplace(surface.vertices, features);
-  context.check();
   parallel_each(boundary.size(), [&](std::size_t i) {
     const Edge& e = boundary[i];
     const Vec3 m = middle(mesh, e);
@@ -101,10 +97,9 @@ void hold_back(const TetMesh& mesh, Targets& targets, SecondOrder& order, const 
 }
 
 SecondOrderReport measure(const TetMesh& mesh, const SecondOrder& order, const Targets& targets,
-                          const TriangleMesh& surface) {
+                          const NearestOnMesh& nearest) {
   SecondOrderReport report;
   report.boundary_nodes = targets.edges.size();
-  const NearestOnMesh nearest(surface);
   std::vector<double> of_nodes(targets.edges.size()), of_middles(targets.edges.size());
   parallel_each(targets.edges.size(), [&](std::size_t i) {
     const Vec3 node = targets.node(i);
@@ -120,10 +115,12 @@ SecondOrderReport measure(const TetMesh& mesh, const SecondOrder& order, const T
   const double n = static_cast<double>(std::max<std::size_t>(1, targets.edges.size()));
   report.node_distance_mean = fixed_sum(of_nodes.size(), [&](std::size_t i) { return of_nodes[i]; }) / n;
   report.middle_distance_mean = fixed_sum(of_middles.size(), [&](std::size_t i) { return of_middles[i]; }) / n;
-  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+  std::vector<double> shares(mesh.tets.size(), 1);
+  parallel_each(shares.size(), [&](std::size_t t) {
     const JacobianBound bound = jacobian_bound(mesh, order, t);
-    if (bound.straight > 0) report.jacobian_min = std::min(report.jacobian_min, bound.least / bound.straight);
-  }
+    if (bound.straight > 0) shares[t] = bound.least / bound.straight;
+  });
+  for (const double share : shares) report.jacobian_min = std::min(report.jacobian_min, share);
   return report;
 }
 
@@ -181,9 +178,13 @@ SecondOrder second_order(const TetMesh& mesh, const TriangleMesh& surface, const
   order.edges = sorted_edges(std::move(order.edges));
   order.nodes.resize(order.edges.size());
   parallel_each(order.edges.size(), [&](std::size_t e) { order.nodes[e] = middle(mesh, order.edges[e]); });
-  Targets targets = find_targets(mesh, order, surface, features, context);
+  const NearestOnMesh on_surface(surface);
+  std::optional<NearestOnEdges> on_features;
+  if (!features.empty()) on_features.emplace(surface.vertices, features);
+  context.check();
+  Targets targets = find_targets(mesh, order, on_surface, on_features ? &*on_features : nullptr);
   hold_back(mesh, targets, order, context);
-  if (report) *report = measure(mesh, order, targets, surface);
+  if (report) *report = measure(mesh, order, targets, on_surface);
   return order;
 }
 

@@ -6,6 +6,7 @@
 #include "bisector/quality.h"
 #include "core/disjoint_sets.h"
 #include "core/parallel.h"
+#include "mesh/attribute_sizes.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/topology.h"
 
@@ -113,14 +114,8 @@ TriangleMesh boundary_surface(const TetMesh& mesh, std::vector<Index>* vertices)
     const std::array<Index, 2> e{std::min(index[a], index[b]), std::max(index[a], index[b])};
     if (std::binary_search(table.edges.begin(), table.edges.end(), e)) surface.feature_edges.push_back(e);
   }
-  for (const Attribute& attribute : mesh.attributes) {
-    if (attribute.site != Attribute::Site::vertex) continue;
-    Attribute& picked = surface.attributes.emplace_back(attribute);
-    picked.values.clear();
-    for (const Index v : origin)
-      for (std::size_t c = 0; c < attribute.components; ++c)
-        picked.values.push_back(attribute.values[attribute.components * v + c]);
-  }
+  for (const Attribute& attribute : mesh.attributes)
+    if (attribute.site == Attribute::Site::vertex) surface.attributes.push_back(picked(attribute, origin));
   if (vertices) *vertices = std::move(origin);
   return surface;
 }
