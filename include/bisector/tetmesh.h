@@ -49,6 +49,9 @@ struct TetOptions {
   // Length within which borders of a surface are joined, as in remesh.h; without a value only what lies at the same
   // point.
   std::optional<double> weld;
+  // Of a surface: each part of space that it encloses is filled, and a region of its own, cavities as well. The surface
+  // may branch, where more than two parts meet.
+  bool enclosed_regions = false;
   ComputeOptions compute;
   unsigned threads = 0;  // 0: all cores
 };
@@ -73,10 +76,20 @@ struct TetSeconds {
   DiagramSeconds diagrams;  // of the optimiser, summed over its evaluations
 };
 
+// A region of a solid, and of the result.
+struct TetRegion {
+  std::int32_t region = 0;
+  std::size_t tets = 0;
+  double volume = 0, input_volume = 0;
+};
+
 struct TetResult {
-  // The boundary's vertices first; boundary triangles with the labels of the input's, feature edges, and regions.
+  // The vertices of the boundary and the interfaces first; their triangles as marked ones, with the labels of the
+  // input's, feature edges, and regions.
   TetMesh mesh;
-  std::size_t boundary_vertices = 0;
+  std::size_t boundary_vertices = 0;  // on the boundary and the interfaces
+  std::size_t interface_triangles = 0;
+  std::vector<TetRegion> regions;  // ascending; empty if the solid has none
   RemeshResult boundary;           // without its mesh
   DetailResult detail;             // vertices: of the boundary
   bool delaunay = false;           // the tetrahedra were Delaunay before slivers were removed
@@ -101,14 +114,15 @@ struct TetResult {
   TetSeconds seconds;
 };
 
-// Meshes the inside of a closed surface. Throws Error if it is open, not manifold or crosses itself, on options that
-// contradict each other or the input, and if Bisector was built without TetGen; DeviceError if the device asked for is
-// missing or fails; Cancelled.
+// Meshes the inside of a closed surface. Throws Error if it is open, crosses itself or, but with enclosed_regions, is
+// not manifold, on options that contradict each other or the input, and if Bisector was built without TetGen;
+// DeviceError if the device asked for is missing or fails; Cancelled.
 BISECTOR_API TetResult tetrahedralise(const TriangleMesh& surface, const TetOptions& options,
                                       const Context& context = {});
 
-// Meshes the domain of a tetrahedral mesh anew, whose boundary must be a surface as above. Each tetrahedron of the
-// result has the region in which its centroid lies; interfaces between regions are not kept otherwise.
+// Meshes the domain of a tetrahedral mesh anew, whose boundary must be a closed manifold that does not cross itself.
+// The interfaces between its regions are remeshed as the boundary is and kept: each of their triangles has a
+// tetrahedron of either region. What hangs together of a region must be bounded by closed manifolds, too.
 BISECTOR_API TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const Context& context = {});
 
 }  // namespace bisector

@@ -135,6 +135,7 @@ def tetrahedralize(
     feature_file: Optional[Path] = None,
     weld: Optional[Number] = None,
     wrap: Union[bool, Number, None] = None,
+    regions: Optional[bool] = None,
     min_angle: Optional[Number] = None,
     min_dihedral: Optional[Number] = None,
     order: Optional[int] = None,
@@ -156,6 +157,9 @@ def tetrahedralize(
     tets (t, 4), a TetResult, or a meshio.Mesh. `sizes` are edge lengths: one for each vertex of the mesh, a pair of
     points (k, 3) and lengths (k,), or a file, "FILE:NAME". A density makes edges as long as its power -1/5. The rest,
     what is raised and what is warned of are as for remesh(). Surfaces are filled by TetGen.
+
+    Regions of tetrahedra are kept with the interfaces between them. With `regions` each part of space that a surface
+    encloses is a region of its own; it may branch where several meet.
 
     Numbers of vertices and tetrahedra come with the mesh or in `vertex_data` and `cell_data`, and are those of the
     result at the same place; of a surface vertices inside have those of the nearest point of it.

@@ -31,6 +31,9 @@ void print_summary(Console& console, const TetJob& job, const JobFiles& files) {
                             same ? "; as the input" : "; NOT as the input"));
   console.print(
       fmt::format("volume     {:.6g}, {:+.3g} % of the input's", q.volume, 100 * (q.volume / result.volume - 1)));
+  if (result.interface_triangles > 0)
+    console.print(fmt::format("regions    {}, with {} between them", result.regions.size(),
+                              counted(result.interface_triangles, "triangle", "triangles")));
   const FeatureResult& features = result.boundary.features;
   if (features.curves > 0)
     console.print(fmt::format("features   {} of {} kept, {}", features.curves - features.broken,
@@ -53,8 +56,10 @@ Command add_tet(CLI::App& program) {
        "The vertices are the seeds of a centroidal Voronoi tessellation of the solid, with a boundary like that which "
        "bisector remesh makes; slivers are then removed, so that dihedral angles are at least 30 degrees as a rule.\n"
        "A surface must be closed, manifold and free of self-intersections; others can be wrapped with --wrap. It may "
-       "have several parts, beside or inside each other; a part inside an odd number of others is a cavity. Surfaces "
-       "are filled by TetGen in a process of its own, bisector-tetgen.",
+       "have several parts, beside or inside each other; a part inside an odd number of others is a cavity. With "
+       "--regions each part of space that it encloses is filled, and it may branch where several meet. Surfaces are "
+       "filled by TetGen in a process of its own, bisector-tetgen. Regions of tetrahedra are kept: the triangles "
+       "between two are shared by them.",
        {{"bisector tet bunny.off -o out.msh -n 10000", "Fill a surface with tetrahedra of about 10,000 vertices."},
         {"bisector tet part.stl -o out.vtu --edge-length 0.5 --report out.json",
          "Make edges half a unit long, and write figures on angles and volumes."},

@@ -16,6 +16,7 @@
 #include "job/messages.h"
 #include "job/outputs.h"
 #include "job/words.h"
+#include "mesh/tet_topology.h"
 #include "remesh/topology_control.h"
 
 namespace bisector::job {
@@ -36,6 +37,14 @@ SizeSamples read_sizes(const std::string& word) {
   const auto [path, name] = split_sizes(word);
   const TetMesh mesh = read_tet_mesh(path);
   return {mesh.vertices, read_tet_attribute(path, name), mesh.tets};
+}
+
+// The surface of a solid on its vertices, with the interfaces between its regions.
+std::shared_ptr<const TriangleMesh> walls_of(const Domain& domain) {
+  if (!domain.tets) return domain.surface;
+  std::vector<Triangle> facets = wall_facets(*domain.tets);
+  if (facets.size() == domain.surface->triangles.size()) return domain.surface;
+  return std::make_shared<const TriangleMesh>(TriangleMesh{domain.tets->vertices, std::move(facets)});
 }
 
 TriangleMesh boundary_mesh(const TetMesh& mesh) {
@@ -62,6 +71,19 @@ Json improved_json(const TetImproveReport& improved) {
           {"moves", improved.moves},
           {"before", shapes(improved.before)},
           {"after", shapes(improved.after)}};
+}
+
+Json regions_json(const TetResult& result) {
+  Json list = Json::array();
+  for (const TetRegion& region : result.regions) {
+    list.push_back({{"region", region.region}});
+    const auto name = result.mesh.region_names.find(region.region);
+    if (name != result.mesh.region_names.end()) list.back()["name"] = name->second;
+    list.back()["tets"] = region.tets;
+    list.back()["volume"] = region.volume;
+    list.back()["volume_input"] = region.input_volume;
+  }
+  return {{"interface_triangles", result.interface_triangles}, {"list", list}};
 }
 
 Json tet_seconds(const TetSeconds& seconds) {
@@ -155,6 +177,11 @@ void TetJob::add_options(CLI::App* app) {
   add_feature_file(app, feature_file_);
   add_weld(app, weld_);
   add_wrap(app, wrap_);
+  app->add_flag("--regions", options_.enclosed_regions,
+                "fill each part of space that the surface encloses, also\n"
+                "inside others, as a region of its own; the walls between\n"
+                "are kept and shared")
+      ->group("Features");
   app->add_option("--min-angle", options_.min_angle,
                   "degrees that all angles of the boundary's triangles\n"
                   "should exceed; 0: as they are; default 40")
@@ -184,6 +211,7 @@ void TetJob::add_options(CLI::App* app) {
 void TetJob::check_usage(const Usage& usage) {
   usage.check_number_of_vertices();
   usage.check_wrap(attribute_);
+  if (usage.given("--wrap")) usage.refuse("--regions", "a wrap encloses one region only; leave one of the two out");
   if (usage.given("--sizes")) usage.refuse("--density", "sizes come from --sizes; leave one of the two out");
   const SizingOptions& sizing = options_.sizing.field;
   if (usage.given("--gradation") && sizing.gradation == 0)
@@ -201,7 +229,7 @@ void TetJob::complete_options() {
     options_.sizing.field.attribute = read_density(input, attribute_, given, domain.surface->vertices.size());
   if (!given.sizes.lengths.empty()) options_.sizing.sizes = given.sizes;
   else if (!sizes_.empty()) options_.sizing.sizes = read_sizes(sizes_);
-  if (!feature_file_.empty()) options_.features.given = read_feature_edges(feature_file_, *domain.surface);
+  if (!feature_file_.empty()) options_.features.given = read_feature_edges(feature_file_, *walls_);
   if (edge_length_relative_ > 0)
     options_.edge_length = edge_length_relative_ * bounding_box(domain.surface->vertices).diagonal();
   if (weld_ >= 0) options_.weld = weld_;
@@ -216,6 +244,10 @@ void TetJob::complete_options() {
 void TetJob::read(Journal& journal) {
   const Stopwatch reading;
   domain = read_domain(input, given.mesh, false, journal);
+  if (domain.tets && options_.enclosed_regions)
+    throw Error(
+        "--regions: it is for surfaces, and tetrahedra have regions of their own, which are kept; leave it out");
+  walls_ = walls_of(domain);
   complete_options();
   io_ = reading.seconds();
   wrapped_ = wrap_if_asked(wrap_, *domain.surface, options_.vertices, options_.edge_length, true, journal, wrap_mesh_);
@@ -247,8 +279,7 @@ void TetJob::curve(Journal& journal) {
   const Stopwatch curving;
   if (order_ == 2) {
     journal.phase("placing nodes on edges");
-    const TriangleMesh& surface = wrapped_.is_null() ? *domain.surface : wrap_mesh_;
-    order = second_order(result.mesh, surface, detect_features(surface, options_.features).edges, &curved_,
+    order = second_order(result.mesh, walls(), detect_features(walls(), options_.features).edges, &curved_,
                          journal.context());
   }
   seconds["second_order"] = curving.seconds();
@@ -291,12 +322,13 @@ Json TetJob::report(Journal& journal) {
   report["quality"] = quality_json(measures.boundary);
   add_tets(report["quality"], measures.tets);
   journal.phase("measuring the distance of the boundary to the input");
-  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), *domain.surface, journal.context()));
+  add_distance(report["quality"], measure_distance(boundary_mesh(result.mesh), *walls_, journal.context()));
   report["quality"]["volume_input"] = result.volume;
   report["topology"] = topology_json(measures.topology.boundary);
   add_tets(report["topology"], measures.topology);
   report["topology"]["matches_input"] = same_topology(measures.topology.boundary, result.input_topology);
   report["topology"]["ball_property"] = result.boundary.ball_property;
+  if (!result.regions.empty()) report["regions"] = regions_json(result);
   report["features"] = features_json(result.boundary.features, result.mesh.feature_edges.size());
   report["detail"] = detail_json(result.detail, result.boundary.features.curves);
   report["attributes"] = attributes_json(result.mesh.attributes);
@@ -325,7 +357,7 @@ view::Scene TetJob::scene(const std::string& output) {
   view::Scene scene;
   scene.models = {domain.tets ? view::solid_model("Input", input, *domain.tets, domain.surface->triangles)
                               : view::surface_model("Input", input, *domain.surface),
-                  view::solid_model("Result", output, result.mesh, result.mesh.boundary)};
+                  view::solid_model("Result", output, result.mesh, boundary_facets(result.mesh.tets))};
   view::measure_shapes(scene);
   view::measure_distances(scene);
   std::vector<std::int32_t> regions;

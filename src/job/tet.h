@@ -43,6 +43,8 @@ class TetJob final : public Job {
 
  private:
   void complete_options();
+  // What the walls of the result follow: the input's surface with the interfaces between its regions, or its wrap.
+  const TriangleMesh& walls() const { return wrapped_.is_null() ? *walls_ : wrap_mesh_; }
   void carry(Journal& journal);
   void curve(Journal& journal);
 
@@ -52,6 +54,7 @@ class TetJob final : public Job {
   double weld_ = -1;                 // not given
   WrapOption wrap_;
   TetOptions options_;
+  std::shared_ptr<const TriangleMesh> walls_;  // on the input's vertices
   TriangleMesh wrap_mesh_;
   Json wrapped_;  // null: no wrap
   int order_ = 1;

@@ -48,7 +48,7 @@ Targets find_targets(const TetMesh& mesh, const SecondOrder& order, const Neares
                      const NearestOnEdges* on_features) {
   Targets targets;
   std::vector<Edge> boundary;
-  for (const Triangle& t : boundary_facets(mesh.tets))
+  for (const Triangle& t : wall_facets(mesh))
     for (std::size_t k = 0; k < 3; ++k) boundary.push_back(sorted_edge(t[k], t[(k + 1) % 3]));
   boundary = sorted_edges(std::move(boundary));
   for (const Edge& e : boundary) targets.edges.push_back(order.node_of(e[0], e[1]));

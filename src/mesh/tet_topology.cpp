@@ -23,15 +23,22 @@ void for_each_facet(const std::vector<TetSide>& sides, const Visit& visit) {
   }
 }
 
-std::vector<Triangle> boundary_of(const std::vector<Tetrahedron>& tets, const std::vector<TetSide>& sides) {
-  std::vector<std::size_t> single;
+// The facets whose sides, from first to last, are chosen, as their first tetrahedron has them.
+template <class Chosen>
+std::vector<Triangle> chosen_facets(const std::vector<Tetrahedron>& tets, const std::vector<TetSide>& sides,
+                                    const Chosen& chosen) {
+  std::vector<std::size_t> places;
   for_each_facet(sides, [&](std::size_t first, std::size_t last) {
-    if (last - first == 1) single.push_back(sides[first].at);
+    if (chosen(first, last)) places.push_back(sides[first].at);
   });
-  std::sort(single.begin(), single.end());
+  std::sort(places.begin(), places.end());
   std::vector<Triangle> facets;
-  for (const std::size_t at : single) facets.push_back(facet_of(tets[at / 4], static_cast<int>(at % 4)));
+  for (const std::size_t at : places) facets.push_back(facet_of(tets[at / 4], static_cast<int>(at % 4)));
   return facets;
+}
+
+std::vector<Triangle> boundary_of(const std::vector<Tetrahedron>& tets, const std::vector<TetSide>& sides) {
+  return chosen_facets(tets, sides, [](std::size_t first, std::size_t last) { return last - first == 1; });
 }
 
 void check_vertices(const TetMesh& mesh, TetTopology& topology) {
@@ -73,6 +80,15 @@ TetTopology analyse_tet_topology(const TetMesh& mesh) {
 
 std::vector<Triangle> boundary_facets(const std::vector<Tetrahedron>& tets) {
   return boundary_of(tets, sorted_sides(tets));
+}
+
+std::vector<Triangle> wall_facets(const TetMesh& mesh) {
+  if (mesh.regions.empty()) return boundary_facets(mesh.tets);
+  const std::vector<TetSide> sides = sorted_sides(mesh.tets);
+  return chosen_facets(mesh.tets, sides, [&](std::size_t first, std::size_t last) {
+    return last - first == 1 ||
+           (last - first == 2 && mesh.regions[sides[first].at / 4] != mesh.regions[sides[first + 1].at / 4]);
+  });
 }
 
 TriangleMesh boundary_surface(const TetMesh& mesh, std::vector<Index>* vertices) {

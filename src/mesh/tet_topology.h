@@ -11,6 +11,9 @@ namespace bisector {
 // facet.
 std::vector<Triangle> boundary_facets(const std::vector<Tetrahedron>& tets);
 
+// These, and the facets between tetrahedra of different regions, each once, as the first of its two has it.
+std::vector<Triangle> wall_facets(const TetMesh& mesh);
+
 // The boundary as a surface of its own: the vertices that it uses, ascending, the labels of marked triangles (0
 // elsewhere, none if all are 0), those feature edges that are edges of it, and the attributes of vertices. `vertices`,
 // if not null, gets the mesh's vertex of each.

@@ -100,7 +100,9 @@ void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
 // a manifold then.
 class Separation {
  public:
-  Separation(TriangleMesh& mesh, const Context& context) : given_(mesh.vertices.size()), vertices_(given_) {
+  Separation(TriangleMesh& mesh, bool branches, const Context& context)
+      : given_(mesh.vertices.size()), vertices_(given_) {
+    if (branches) return;
     const MeshTopology touching = analyse_topology(mesh.triangles, given_);
     if (touching.manifold) return;
     halved_ = halve_touching_edges(mesh);
@@ -219,7 +221,7 @@ WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double
   return welded;
 }
 
-Preparation::Preparation(OrderedInput ordered, const Context& context)
+Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches)
     : welded_(weld_and_orient(ordered.mesh, ordered.options.weld, context)), mesh_(std::exchange(welded_.mesh, {})),
       sizing_(ordered.options.sizing), target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
   const TriangleMesh& input = ordered.mesh;
@@ -234,7 +236,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context)
       for (Index& v : edge) v = vertex_of[v];
     std::erase_if(*edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
   }
-  const Separation separation(mesh_, context);
+  const Separation separation(mesh_, branches, context);
   features.given = separation.edges(mesh_, features.given);
   keep_edges = separation.edges(mesh_, keep_edges);
   features.given.insert(features.given.end(), keep_edges.begin(), keep_edges.end());

@@ -51,8 +51,9 @@ struct OrderedInput {
 // What is done to an input before seeds are placed.
 class Preparation {
  public:
-  // Welds and orients the input, finds its features and plans their details. Throws Error as remesh does.
-  Preparation(OrderedInput input, const Context& context);
+  // Welds and orients the input, finds its features and plans their details. Where it branches on purpose, parts that
+  // touch are not separated. Throws Error as remesh does.
+  Preparation(OrderedInput input, const Context& context, bool branches = false);
 
   // Beside the bounds that there are already.
   void bound(const SizeBounds& bounds);

@@ -333,7 +333,7 @@ void Pipeline::mend_features_and_topology() {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
-    topology_ = enforce_topology(run_, trace_, input_topology_, step_);
+    topology_ = enforce_topology(run_, trace_, input_topology_, step_, plan_.branches);
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
       step_.iterations = kFreedSteps;
       optimise(run_, step_);
@@ -464,8 +464,8 @@ void Pipeline::place_again(const PlacedSeeds& earlier) {
 SizeBounds Pipeline::crowded() {
   SizeBounds found;
   const MeshTopology& input = input_topology_;
-  if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !input.manifold || !input.oriented)
-    return found;
+  const bool controlled = plan_.branches || (input.manifold && input.oriented);
+  if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !controlled) return found;
   run_.localise(localises_);
   const BallReport report = check_ball_property(surface_, run_.diagram(Want::labels).polygons);
   if (report.cells.empty() || report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
@@ -605,13 +605,14 @@ RemeshPlan plan_of(const RemeshOptions& options) {
 namespace {
 
 // All of a surface; triangles are not kept.
-RemeshResult remesh_surface(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
+RemeshResult remesh_whole(const TriangleMesh& input, const RemeshOptions& options, bool branches,
+                          const Context& context) {
   const Stopwatch watch;
   OrderedInput ordered(input, options);
   const std::vector<Index> vertex_of = std::move(ordered.vertex_of);
   std::vector<Index> input_of(vertex_of.size());
   for (Index v = 0; v < vertex_of.size(); ++v) input_of[vertex_of[v]] = v;
-  Preparation preparation(std::move(ordered), context);
+  Preparation preparation(std::move(ordered), context, branches);
   Compute compute(options.compute, context);
   const MakeBackend make_backend = [&](const Surface& surface) { return compute.backend(surface); };
   double preparing = watch.seconds();
@@ -629,6 +630,7 @@ RemeshResult remesh_surface(const TriangleMesh& input, const RemeshOptions& opti
     PreparedInput prepared = preparation.lay_down();
     RemeshPlan plan = plan_of(options);
     plan.vertices = prepared.vertices;
+    plan.branches = branches;
     if (prepared.noisy) plan.constrained = false;
     for (Index& v : prepared.kept.corners) {
       plan.held.push_back(v != kNone);
@@ -683,7 +685,19 @@ RemeshResult remesh_surface(const TriangleMesh& input, const RemeshOptions& opti
   return std::move(chosen);
 }
 
+RemeshResult remesh_surface(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
+  return remesh_whole(input, options, false, context);
+}
+
 }  // namespace
+
+RemeshResult remesh_walls(const TriangleMesh& walls, const RemeshOptions& options, const Context& context) {
+  check_options(options);
+  RemeshOptions walled = options;
+  walled.energy = Energy::constrained;
+  walled.weld = 0;
+  return remesh_whole(walls, walled, true, context);
+}
 
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
   check_options(options);

@@ -24,6 +24,7 @@ struct RemeshPlan {
   int levels = 0;
   bool constrained = true;  // seeds end on the surface (CCVT)
   TopologyControl topology = TopologyControl::enforce;
+  bool branches = false;  // sheets are meant to meet in edges: topology is controlled there, too
   double min_angle = 40;
   bool fit = false;
 };
@@ -39,5 +40,10 @@ using MakeBackend = std::function<std::unique_ptr<Backend>(const Surface&)>;
 // Cancelled.
 RemeshResult remesh(Backend& backend, const FeatureGraph& features, const RemeshPlan& plan, const Context& context = {},
                     const MakeBackend& make_backend = {});
+
+// Remeshes the walls of a solid of several parts, sheets that meet in edges, with seeds on the walls: as the public
+// remesh(), but what touches stays joined, nothing is welded or taken for noise, and topology is enforced where sheets
+// meet as elsewhere.
+RemeshResult remesh_walls(const TriangleMesh& walls, const RemeshOptions& options, const Context& context = {});
 
 }  // namespace bisector

@@ -62,21 +62,29 @@ void check_triangles(const TriangleMesh& mesh) {
                 Reason::no_solid);
 }
 
-void check_edges(const TriangleMesh& mesh, const EdgeTable& table, const std::vector<Index>& original) {
-  Offenders open, multiple;
-  for (std::size_t e = 0; e < table.edges.size(); ++e) {
-    const std::size_t sides = table.half_edges.size(e);
-    if (sides == 2) continue;
-    (sides == 1 ? open : multiple).add(fmt::format("{}-{}", original[table.edges[e][0]], original[table.edges[e][1]]));
-  }
+std::string edge_name(const EdgeTable& table, std::size_t e, const std::vector<Index>& original) {
+  return fmt::format("{}-{}", original[table.edges[e][0]], original[table.edges[e][1]]);
+}
+
+void check_closed(const EdgeTable& table, const std::vector<Index>& original) {
+  Offenders open;
+  for (std::size_t e = 0; e < table.edges.size(); ++e)
+    if (table.half_edges.size(e) == 1) open.add(edge_name(table, e, original));
   if (open.any())
     throw Error("the surface is not closed: " + open.list("edge has one triangle", "edges have one triangle") +
                     "; close the holes or weld the cracks",
                 Reason::open_surface);
+}
+
+void check_edges(const TriangleMesh& mesh, const EdgeTable& table, const std::vector<Index>& original) {
+  check_closed(table, original);
+  Offenders multiple;
+  for (std::size_t e = 0; e < table.edges.size(); ++e)
+    if (table.half_edges.size(e) > 2) multiple.add(edge_name(table, e, original));
   if (multiple.any())
     throw Error("the surface is not manifold: " +
                     multiple.list("edge has more than two triangles", "edges have more than two triangles") +
-                    "; separate the parts that meet there",
+                    "; separate the parts that meet there, or mesh them as regions",
                 Reason::no_solid);
   Offenders turned;
   for (std::size_t e = 0; e < table.edges.size(); ++e) {
@@ -123,11 +131,13 @@ void check_vertices(const TriangleMesh& mesh, const std::vector<Index>& original
                 Reason::no_solid);
 }
 
-void check_intersections(const TriangleMesh& mesh) {
+// `name`: of each triangle; empty: its index.
+void check_intersections(const TriangleMesh& mesh, const std::vector<Index>& name = {}) {
   const std::vector<std::array<Index, 2>> pairs = find_self_intersections(mesh);
   if (pairs.empty()) return;
   Offenders crossing;
-  for (const auto& [a, b] : pairs) crossing.add(fmt::format("{}-{}", a, b));
+  for (const auto& [a, b] : pairs)
+    crossing.add(name.empty() ? fmt::format("{}-{}", a, b) : fmt::format("{}-{}", name[a], name[b]));
   throw Error("the surface intersects itself: " + crossing.list("pair of triangles meets", "pairs of triangles meet") +
                   "; mend it there",
               Reason::no_solid);
@@ -201,14 +211,40 @@ void orient_shells(TriangleMesh& mesh) {
   }
 }
 
+// Of each vertex after welding, the first that has become it.
+std::vector<Index> first_originals(const WeldResult& welded) {
+  std::vector<Index> original(welded.mesh.vertices.size(), kNone);
+  for (Index v = 0; v < welded.vertex_of.size(); ++v)
+    if (welded.vertex_of[v] != kNone && original[welded.vertex_of[v]] == kNone) original[welded.vertex_of[v]] = v;
+  return original;
+}
+
+// Of each triangle after welding, which keeps their order, the first with its corners.
+std::vector<Index> first_triangles(const TriangleMesh& mesh, const WeldResult& welded) {
+  std::vector<Index> original;
+  for (Index t = 0; t < mesh.triangles.size() && original.size() < welded.mesh.triangles.size(); ++t) {
+    Triangle corners = mesh.triangles[t];
+    for (Index& v : corners) v = welded.vertex_of[v];
+    if (corners == welded.mesh.triangles[original.size()]) original.push_back(t);
+  }
+  return original;
+}
+
 }  // namespace
+
+TriangleMesh check_walls(const TriangleMesh& mesh) {
+  check_triangles(mesh);
+  WeldResult welded = weld(mesh, 0);
+  const EdgeTable table = edge_table(welded.mesh.triangles, welded.mesh.vertices.size());
+  check_closed(table, first_originals(welded));
+  check_intersections(welded.mesh, first_triangles(mesh, welded));
+  return std::move(welded.mesh);
+}
 
 TriangleMesh check_surface(const TriangleMesh& mesh) {
   check_triangles(mesh);
   WeldResult welded = weld(mesh, 0);
-  std::vector<Index> original(welded.mesh.vertices.size(), kNone);
-  for (Index v = 0; v < mesh.vertices.size(); ++v)
-    if (welded.vertex_of[v] != kNone && original[welded.vertex_of[v]] == kNone) original[welded.vertex_of[v]] = v;
+  const std::vector<Index> original = first_originals(welded);
   TriangleMesh surface = std::move(welded.mesh);
   orient(surface.triangles, surface.vertices.size());
   check_edges(surface, edge_table(surface.triangles, surface.vertices.size()), original);

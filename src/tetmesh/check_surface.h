@@ -17,4 +17,9 @@ namespace bisector {
 // consistent orientation, and triangles that intersect other than in a shared vertex or edge. All is decided exactly.
 TriangleMesh check_surface(const TriangleMesh& mesh);
 
+// The same for the walls of a solid of several parts, which may meet in edges of more than two triangles and in
+// vertices, and whose triangles may face either way: of those with the same corners one stays. Throws Error for no
+// triangle, coordinates, indices, triangles without area, edges of one triangle, and intersections, as above.
+TriangleMesh check_walls(const TriangleMesh& mesh);
+
 }  // namespace bisector

@@ -463,6 +463,17 @@ double estimate_tet_vertices(double volume, double area, double h) {
   return kPerVolume * volume / (h * h * h) + kPerArea * area / (h * h);
 }
 
+double estimate_cells(const SizedSolid& sized) {
+  return kPerVolume * fixed_sum(sized.mesh.tets.size(), [&](std::size_t t) {
+           double sum = 0;
+           for (const Index v : sized.mesh.tets[t]) {
+             const double h = sized.lengths.empty() ? sized.edge_length : sized.lengths[v];
+             sum += 1 / (h * h * h);
+           }
+           return volume_of(sized.mesh, sized.mesh.tets[t]) * sum / 4;
+         });
+}
+
 SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, const TetSizingOptions& options,
                             const SizingTarget& target, const SizeField* bound, bool more_vertices) {
   check(mesh, options, target);

@@ -30,6 +30,9 @@ struct SizedSolid {
 // about, has 1.575 / h^3 of them per volume for the mean h of its edges; on the boundary there are as many as an
 // equilateral triangulation has, each with half a cell.
 double estimate_tet_vertices(double volume, double area, double h);
+// Those of its cells in a solid, for the lengths that it is sized for, of which each vertex on the boundary has half a
+// one.
+double estimate_cells(const SizedSolid& sized);
 
 // Bisects edges that are longer than 2 h at one of their ends, longest first (Rivara 1984). With a gradation of 0.2 the
 // linear density then stands for lengths within 8 % of h, and its integrals are exact; edges of length h would take

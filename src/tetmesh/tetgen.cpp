@@ -361,7 +361,16 @@ std::string find_tetgen() {
   return runs(BISECTOR_TETGEN_PROGRAM) ? BISECTOR_TETGEN_PROGRAM : "";
 }
 
-TetgenResult tetgen_tets(const TriangleMesh& surface, const TetgenOptions& options, const Context& context) {
+namespace {
+
+// What TetGen makes of a surface: positive tetrahedra on its vertices, followed by those that TetGen added.
+struct Filled {
+  std::vector<Vec3> vertices;
+  std::vector<Tetrahedron> tets;
+  std::size_t flat = 0;  // tetrahedra without volume
+};
+
+Filled run_tetgen(const TriangleMesh& surface, const TetgenOptions& options, const Context& context) {
   const std::string program = options.program.empty() ? find_tetgen() : options.program;
   if (program.empty())
     throw Error(
@@ -382,27 +391,127 @@ TetgenResult tetgen_tets(const TriangleMesh& surface, const TetgenOptions& optio
   explain(child.wait(), child);
   Tets given = parse_reply(reply);
 
-  TetgenResult result;
-  std::vector<Vec3> vertices = surface.vertices;
-  std::vector<char> wanted(vertices.size(), 0);
+  Filled filled;
+  filled.vertices = surface.vertices;
+  std::vector<char> wanted(filled.vertices.size(), 0);
   for (const Index v : used) wanted[v] = 1;
-  const std::vector<Index> index = identify(given.points, vertices, wanted);
-  for (Tetrahedron& t : given.tets)
+  const std::vector<Index> index = identify(given.points, filled.vertices, wanted);
+  filled.tets = std::move(given.tets);
+  for (Tetrahedron& t : filled.tets)
     for (Index& v : t) v = index[v];
-  turn_positive(vertices, given.tets, result.zero_volume);
-  Carved carved = carve(given.tets, surface.triangles);
-  if (!carved.missing.empty())
-    throw Error(fmt::format("TetGen did not keep {} of {} boundary triangles (first: {}); {}", carved.missing.size(),
-                            surface.triangles.size(), carved.missing.front(), kSimplify));
-  result.steiner_points = drop_unused(vertices, carved.tets, surface.vertices.size());
-  if (boundary_facets(carved.tets).size() != surface.triangles.size())
-    throw Error(fmt::format("TetGen's tetrahedra have holes; {}", kSimplify));
-  result.mesh.regions = number_parts(carved.tets);
-  result.mesh.vertices = std::move(vertices);
-  result.mesh.tets = std::move(carved.tets);
+  turn_positive(filled.vertices, filled.tets, filled.flat);
+  return filled;
+}
+
+[[noreturn]] void fail_for_lost_triangles(std::size_t lost, std::size_t first, std::size_t all) {
+  throw Error(
+      fmt::format("TetGen did not keep {} of {} boundary triangles (first: {}); {}", lost, all, first, kSimplify));
+}
+
+TetgenResult with_marks(const TriangleMesh& surface, Filled filled) {
+  TetgenResult result;
+  result.zero_volume = filled.flat;
+  result.steiner_points = drop_unused(filled.vertices, filled.tets, surface.vertices.size());
+  result.mesh.vertices = std::move(filled.vertices);
+  result.mesh.tets = std::move(filled.tets);
   result.mesh.boundary = surface.triangles;
   result.mesh.boundary_labels = surface.labels;
   result.mesh.feature_edges = surface.feature_edges;
+  return result;
+}
+
+// The triangle that each facet of each tetrahedron is, or kNone.
+std::vector<std::array<Index, 4>> triangles_of_facets(const std::vector<Tetrahedron>& tets,
+                                                      const std::vector<Triangle>& triangles) {
+  const auto ascending = [](Triangle t) {
+    std::sort(t.begin(), t.end());
+    return t;
+  };
+  std::vector<std::pair<Triangle, Index>> order;
+  for (Index i = 0; i < triangles.size(); ++i) order.push_back({ascending(triangles[i]), i});
+  std::sort(order.begin(), order.end());
+  std::vector<std::array<Index, 4>> found(tets.size());
+  parallel_each(tets.size(), [&](std::size_t t) {
+    for (int k = 0; k < 4; ++k) {
+      const Triangle facet = ascending(facet_of(tets[t], k));
+      const auto at = std::lower_bound(order.begin(), order.end(), std::pair{facet, Index{0}});
+      found[t][static_cast<std::size_t>(k)] = at != order.end() && at->first == facet ? at->second : kNone;
+    }
+  });
+  return found;
+}
+
+// Whether a triangle has the corners of a facet in the facet's order, which is that seen from outside.
+bool faces_away(const Triangle& triangle, Triangle facet) {
+  while (facet[0] != triangle[0]) std::rotate(facet.begin(), facet.begin() + 1, facet.end());
+  return facet == triangle;
+}
+
+// A part for each tetrahedron: what hangs together through facets that are no walls.
+std::vector<Index> parts_between(const std::vector<std::array<Index, 4>>& adjacent,
+                                 const std::vector<std::array<Index, 4>>& wall) {
+  std::vector<Index> part(adjacent.size(), kNone), queue;
+  Index parts = 0;
+  for (Index first = 0; first < part.size(); ++first) {
+    if (part[first] != kNone) continue;
+    queue.assign(1, first);
+    part[first] = parts++;
+    while (!queue.empty()) {
+      const Index t = queue.back();
+      queue.pop_back();
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Index other = adjacent[t][k];
+        if (wall[t][k] == kNone && other == kNone)
+          throw Error(fmt::format("TetGen's tetrahedra have holes; {}", kSimplify));
+        if (wall[t][k] != kNone || part[other] != kNone) continue;
+        part[other] = part[t];
+        queue.push_back(other);
+      }
+    }
+  }
+  return part;
+}
+
+}  // namespace
+
+TetgenResult tetgen_tets(const TriangleMesh& surface, const TetgenOptions& options, const Context& context) {
+  Filled filled = run_tetgen(surface, options, context);
+  Carved carved = carve(filled.tets, surface.triangles);
+  if (!carved.missing.empty())
+    fail_for_lost_triangles(carved.missing.size(), carved.missing.front(), surface.triangles.size());
+  filled.tets = std::move(carved.tets);
+  TetgenResult result = with_marks(surface, std::move(filled));
+  if (boundary_facets(result.mesh.tets).size() != surface.triangles.size())
+    throw Error(fmt::format("TetGen's tetrahedra have holes; {}", kSimplify));
+  result.mesh.regions = number_parts(result.mesh.tets);
+  return result;
+}
+
+TetgenResult tetgen_regions(const TriangleMesh& walls, const TetgenOptions& options, const Context& context) {
+  Filled filled = run_tetgen(walls, options, context);
+  const std::vector<std::array<Index, 4>> wall = triangles_of_facets(filled.tets, walls.triangles);
+  const std::vector<Index> part = parts_between(tet_adjacency(filled.tets), wall);
+  // Of each triangle the part that it faces away from, and the one beyond.
+  std::vector<std::array<Index, 2>> sides(walls.triangles.size(), {kNone, kNone});
+  for (std::size_t t = 0; t < wall.size(); ++t)
+    for (int k = 0; k < 4; ++k) {
+      const Index i = wall[t][static_cast<std::size_t>(k)];
+      if (i != kNone) sides[i][faces_away(walls.triangles[i], facet_of(filled.tets[t], k)) ? 0 : 1] = part[t];
+    }
+  std::vector<std::size_t> lost;
+  std::vector<std::int32_t> number(part.empty() ? 0 : *std::max_element(part.begin(), part.end()) + 1, 0);
+  std::int32_t count = 0;
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    if (sides[i][0] == kNone && sides[i][1] == kNone) lost.push_back(i);
+    else if (sides[i][0] == sides[i][1])
+      throw Error(fmt::format("triangle {} has the same enclosed part on both sides; remove what divides nothing", i));
+    for (const Index side : sides[i])
+      if (side != kNone && number[side] == 0) number[side] = ++count;
+  }
+  if (!lost.empty()) fail_for_lost_triangles(lost.size(), lost.front(), walls.triangles.size());
+  TetgenResult result = with_marks(walls, std::move(filled));
+  if (count > 1)
+    for (const Index p : part) result.mesh.regions.push_back(number[p]);
   return result;
 }
 

@@ -35,4 +35,10 @@ std::string find_tetgen();
 // what is not such a mesh; each tells what to do.
 TetgenResult tetgen_tets(const TriangleMesh& surface, const TetgenOptions& options = {}, const Context& context = {});
 
+// The same for walls, as check_walls gives them: tetrahedra in every part of space that they enclose, with a region for
+// each, if there are several. Regions are numbered from 1 by the first triangles that bound them; of two at the same
+// triangle the one that it faces away from comes first. Throws Error as well if both sides of a triangle are in one
+// part.
+TetgenResult tetgen_regions(const TriangleMesh& walls, const TetgenOptions& options = {}, const Context& context = {});
+
 }  // namespace bisector

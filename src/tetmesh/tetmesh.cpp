@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <limits>
+#include <cmath>
+#include <map>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -12,11 +12,9 @@
 #include "compute/compute.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "features/size_field.h"
 #include "mesh/locate.h"
 #include "mesh/tet_topology.h"
 #include "mesh/topology.h"
-#include "remesh/detail.h"
 #include "remesh/prepare.h"
 #include "remesh/sizing.h"
 #include "tetmesh/boundary_phase.h"
@@ -25,31 +23,21 @@
 #include "tetmesh/free_phase.h"
 #include "tetmesh/improve.h"
 #include "tetmesh/inner_phase.h"
+#include "tetmesh/regions.h"
+#include "tetmesh/solid_plan.h"
 #include "tetmesh/stand_ins.h"
 #include "tetmesh/tetgen.h"
+#include "tetmesh/walls.h"
 #include "voronoi/clipped.h"
 #include "voronoi/tiling.h"
 
 namespace bisector {
 namespace {
 
-constexpr std::size_t kFewest = 8;  // vertices or seeds that a result can be made of
-constexpr double kEnough = 0.97;    // of the sites wanted; with fewer the boundary takes more
-constexpr double kGoalBeyond = 5;   // degrees: aiming a little higher than asked for raises the mean as well
+constexpr double kEnough = 0.97;   // of the sites wanted; with fewer the boundary takes more
+constexpr double kGoalBeyond = 5;  // degrees: aiming a little higher than asked for raises the mean as well
 // Fractions of the whole run, about, for progress.
 constexpr double kPlaced = 0.82, kExtracted = 0.85;
-
-void check_options(const TetOptions& options) {
-  if (!options.seeds.empty()) {
-    if (options.seeds.size() < kFewest)
-      throw Error(fmt::format("a tetrahedral mesh needs at least {} seeds; give more", kFewest));
-    return;
-  }
-  if ((options.vertices > 0) == (options.edge_length > 0))
-    throw Error("ask for a number of vertices or for an edge length, and not for both");
-  if (options.edge_length == 0 && options.vertices < kFewest)
-    throw Error(fmt::format("a tetrahedral mesh needs at least {} vertices; ask for more", kFewest));
-}
 
 // The finished boundary, whose vertices are the first of the run's sites.
 struct FinishedBoundary {
@@ -94,14 +82,14 @@ void extract(const CvtRun& sites, const TriangleMesh& boundary, TetResult& resul
   result.seconds.extract = watch.seconds();
 }
 
-void remove_slivers(const CvtRun& sites, double min_dihedral, TetResult& result) {
+void remove_slivers(double min_dihedral, const Context& context, TetResult& result) {
   const Stopwatch watch;
   if (min_dihedral > 0) {
     TetImproveOptions improve;
     improve.insert_below = min_dihedral;
     improve.goal = min_dihedral + kGoalBeyond;
-    sites.context().report({"improving", 0, 1, sites.energy, sites.gradient_norm, kExtracted});
-    TetImproveResult improved = improve_tets(result.mesh, improve, sites.context());
+    context.report({"improving", 0, 1, result.energy, result.gradient_norm, kExtracted});
+    TetImproveResult improved = improve_tets(result.mesh, improve, context);
     result.mesh = std::move(improved.mesh);
     result.improved = std::move(improved.report);
   }
@@ -123,7 +111,6 @@ TetResult mesh_sized(TetRun& run, StandIns& stand_ins) {
   free_phase(run, stand_ins);
   FinishedBoundary finished = place_enough_sites(run, stand_ins);
   extract(run.sites, finished.surface.mesh, result);
-  remove_slivers(run.sites, run.options.min_dihedral, result);
   result.certification = run.sites.certification();
   result.untiled = count_untiled(run);
   result.boundary = std::move(finished.surface);
@@ -140,42 +127,6 @@ TetResult mesh_sized(TetRun& run, StandIns& stand_ins) {
   result.seconds.lbfgs = totals.seconds_lbfgs;
   result.seconds.diagrams = totals.seconds;
   return result;
-}
-
-// The triangles of one tetrahedron each, on the solid's vertices, with the labels of its marked triangles.
-TriangleMesh boundary_of(const TetMesh& mesh) {
-  TriangleMesh surface;
-  surface.vertices = mesh.vertices;
-  surface.triangles = boundary_facets(mesh.tets);
-  surface.feature_edges = mesh.feature_edges;
-  if (mesh.boundary_labels.empty()) return surface;
-  std::vector<std::pair<Triangle, std::int32_t>> marks(mesh.boundary.size());
-  for (std::size_t t = 0; t < marks.size(); ++t) {
-    marks[t] = {mesh.boundary[t], mesh.boundary_labels[t]};
-    std::sort(marks[t].first.begin(), marks[t].first.end());
-  }
-  std::sort(marks.begin(), marks.end());
-  for (Triangle t : surface.triangles) {
-    std::sort(t.begin(), t.end());
-    const auto mark =
-        std::lower_bound(marks.begin(), marks.end(), std::pair{t, std::numeric_limits<std::int32_t>::min()});
-    surface.labels.push_back(mark != marks.end() && mark->first == t ? mark->second : 0);
-  }
-  return surface;
-}
-
-// The same of a solid refined from one whose boundary is known.
-TriangleMesh boundary_of(const SizedSolid& sized, const TetMesh& given, const TriangleMesh& boundary) {
-  return sized.mesh.tets.size() == given.tets.size() ? boundary : boundary_of(sized.mesh);
-}
-
-// Edges of a boundary that are shared by two triangles; marks inside the solid are none of its features.
-void keep_boundary_edges(TriangleMesh& surface) {
-  const EdgeTable table = edge_table(surface.triangles, surface.vertices.size());
-  std::erase_if(surface.feature_edges, [&](std::array<Index, 2> e) {
-    if (e[0] > e[1]) std::swap(e[0], e[1]);
-    return !std::binary_search(table.edges.begin(), table.edges.end(), e);
-  });
 }
 
 void set_regions(const TetMesh& from, TetMesh& mesh) {
@@ -209,53 +160,23 @@ void check_attribute(const TetOptions& options, std::size_t vertices) {
                             vertices));
 }
 
-// What becomes of the boundary's features and edge lengths where they are finer than the edges.
-struct BoundaryDetail {
-  FeatureGraph features;
-  std::optional<SizeField> bound;
-  DetailResult result;
-};
-
-// `plain` is the solid refined for sizes without details.
-BoundaryDetail plan_boundary(const TetMesh& mesh, const TriangleMesh& surface, const SizedSolid& plain,
-                             const TetOptions& options) {
-  BoundaryDetail detail;
-  detail.features = detect_features(surface, options.features);
-  if (options.detail == DetailMode::off || !options.seeds.empty()) return detail;
-  std::vector<double> lengths(surface.vertices.size(), plain.edge_length);
-  std::copy_n(plain.lengths.begin(), std::min(plain.lengths.size(), lengths.size()), lengths.begin());
-  const MeshEstimate without =
-      estimate_mesh(boundary_of(plain, mesh, surface), {plain.surface_density(), plain.edge_length});
-  DetailPlan plan = plan_details(surface, detail.features, lengths, static_cast<std::size_t>(without.vertices),
-                                 options.detail == DetailMode::all);
-  detail.features = std::move(plan.features);
-  detail.result = plan.result;
-  if (!plan.points.empty()) detail.bound.emplace(plan.points, plan.lengths, options.sizing.field.gradation);
-  return detail;
-}
-
-TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& context) {
+TetResult mesh_solid(const TetMesh& mesh, const TetOptions& options, const Context& context) {
   const Stopwatch watch;
-  TriangleMesh surface = boundary_of(mesh);
-  keep_boundary_edges(surface);
-  const SizingTarget target = options.seeds.empty() ? SizingTarget{options.vertices, options.edge_length}
-                                                    : SizingTarget{options.seeds.size(), 0};
-  SizedSolid sized = refine_for_sizes(mesh, surface, options.sizing, target);
-  const BoundaryDetail detail = plan_boundary(mesh, surface, sized, options);
-  const SizeField* bound = detail.bound ? &*detail.bound : nullptr;
-  if (bound) sized = refine_for_sizes(mesh, surface, options.sizing, target, bound, options.detail == DetailMode::all);
-  if (sized.vertices < kFewest)
-    throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones",
-                            options.edge_length, sized.vertices, kFewest));
-  const FeatureGraph features = split_features(detail.features, sized.splits);
+  TriangleMesh surface = labelled_boundary(mesh);
+  keep_own_edges(surface);
+  const auto surface_of = [&](const TetMesh& refined) {
+    return refined.tets.size() == mesh.tets.size() ? surface : labelled_boundary(refined);
+  };
+  const SolidPlan plan = plan_solid(mesh, surface, surface_of, options);
+  const SizedSolid& sized = plan.sized;
+  const FeatureGraph features = split_features(plan.features, sized.splits);
   const Solid solid(sized.mesh, sized.volume_density());
-  TriangleMesh outside = boundary_of(sized, mesh, surface);
-  const Surface boundary(std::move(outside), sized.surface_density());
+  const Surface boundary(surface_of(sized.mesh), sized.surface_density());
   const double preparing = watch.seconds();
   Compute compute(options.compute, context);
   const std::unique_ptr<SolidBackend> backend = compute.backend(solid);
   const std::unique_ptr<Backend> boundary_backend = compute.backend(boundary);
-  StandIns stand_ins(mesh, surface, *boundary_backend, features, options, bound, compute, context);
+  StandIns stand_ins(mesh, surface, *boundary_backend, features, options, plan.bounds(), compute, context);
   const FeatureCurves curves(features, solid.mesh.vertices);
   const std::size_t wanted = options.seeds.empty() ? sized.vertices : options.seeds.size();
   TetRun run{CvtRun(*backend, curves, context),
@@ -267,10 +188,45 @@ TetResult mesh_solid(TetMesh mesh, const TetOptions& options, const Context& con
              [&](const Surface& domain) { return compute.backend(domain); },
              wanted};
   TetResult result = mesh_sized(run, stand_ins);
-  set_regions(sized.mesh, result.mesh);
   result.background_tets = sized.mesh.tets.size();
-  result.detail = detail.result;
+  result.detail = plan.detail;
   result.seconds.prepare = preparing;
+  return result;
+}
+
+std::vector<TetRegion> measure_regions(const TetMesh& input, const TetMesh& result) {
+  std::map<std::int32_t, TetRegion> regions;
+  const auto volume = [](const TetMesh& mesh, std::size_t t) {
+    const auto& [a, b, c, d] = mesh.tets[t];
+    return std::abs(rounded_six_volume(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], mesh.vertices[d])) / 6;
+  };
+  for (std::size_t t = 0; t < input.regions.size(); ++t) {
+    TetRegion& region = regions[input.regions[t]];
+    region.region = input.regions[t];
+    region.input_volume += volume(input, t);
+  }
+  for (std::size_t t = 0; t < result.regions.size(); ++t) {
+    TetRegion& region = regions[result.regions[t]];
+    region.volume += volume(result, t);
+    ++region.tets;
+  }
+  std::vector<TetRegion> measured;
+  for (const auto& [number, region] : regions) measured.push_back(region);
+  return measured;
+}
+
+// Regions that are nowhere next to each other are told by where tetrahedra lie; others are meshed with their
+// interfaces.
+TetResult mesh_any(const TetMesh& mesh, const TetOptions& options, const Context& context) {
+  const Stopwatch watch;
+  const Walls walls = find_walls(mesh);
+  const bool divided = walls.divide();
+  TetResult result = divided ? mesh_regions(mesh, walls, options, context) : mesh_solid(mesh, options, context);
+  remove_slivers(options.min_dihedral, context, result);
+  if (!divided) set_regions(mesh, result.mesh);
+  result.regions = measure_regions(mesh, result.mesh);
+  if (divided)
+    for (const TetRegion& region : result.regions) result.volume += region.input_volume;
   result.seconds.total = watch.seconds();
   return result;
 }
@@ -303,12 +259,12 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   const WeldResult welded = join_borders(input, options.weld);
-  const TriangleMesh surface = check_surface(welded.mesh);
+  const TriangleMesh surface = options.enclosed_regions ? check_walls(welded.mesh) : check_surface(welded.mesh);
   const TetOptions moved = follow_vertices(options, welded);
   context.report({"background tetrahedra", 0, 1, 0, 0, 0});
-  TetMesh background = tetgen_tets(surface, {}, context).mesh;
+  const TetMesh background = (options.enclosed_regions ? tetgen_regions : tetgen_tets)(surface, {}, context).mesh;
   const double seconds = watch.seconds();
-  TetResult result = mesh_solid(std::move(background), moved, context);
+  TetResult result = mesh_any(background, moved, context);
   result.mesh.label_names = input.label_names;
   result.seconds.background = seconds;
   result.seconds.total = watch.seconds();
@@ -321,7 +277,7 @@ TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const 
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   check_boundary(solid);
-  TetResult result = mesh_solid(solid, options, context);
+  TetResult result = mesh_any(solid, options, context);
   result.mesh.region_names = solid.region_names;
   result.mesh.label_names = solid.label_names;
   return result;

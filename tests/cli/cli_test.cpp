@@ -1419,26 +1419,49 @@ TEST_F(CliTet, RegionsAndLabelsStay) {
     solid.boundary_labels.push_back(label);
   }
   write_tet_mesh(in("bar.msh"), solid);
-  tet("bar.msh", {"-n", "250"}, "out.msh");
+  const Json report = tet("bar.msh", {"-n", "250"}, "out.msh");
   const TetMesh mesh = read_tet_mesh(in("out.msh"));
-  std::map<int, double> volume, area;
   ASSERT_EQ(mesh.regions.size(), mesh.tets.size());
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
-    const auto& t = mesh.tets[i];
-    const Vec3 o = mesh.vertices[t[0]], a = mesh.vertices[t[1]] - o, b = mesh.vertices[t[2]] - o;
-    volume[mesh.regions[i]] += dot(cross(a, b), mesh.vertices[t[3]] - o) / 6;
-    double x = 0;
-    for (const Index v : t) x += 0.25 * mesh.vertices[v].x;
-    EXPECT_EQ(mesh.regions[i], x < 1 ? 7 : 3);
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i)
+    for (const Index v : mesh.tets[i])
+      EXPECT_TRUE(mesh.regions[i] == 7 ? mesh.vertices[v].x <= 1 : mesh.vertices[v].x >= 1);
+  const Json& list = report["regions"]["list"];
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list[0]["region"], 3);
+  EXPECT_EQ(list[1]["region"], 7);
+  for (const Json& region : list) {
+    EXPECT_NEAR(region["volume"].get<double>(), 1, 1e-12);
+    EXPECT_NEAR(region["volume_input"].get<double>(), 1, 1e-12);
+    EXPECT_GT(region["tets"], 0);
   }
-  EXPECT_EQ(volume.size(), 2u);
+  EXPECT_NEAR(report["quality"]["distance_max"].get<double>(), 0, 1e-9);
   TriangleMesh skin = surface_of_marks(mesh);
   ASSERT_EQ(skin.labels.size(), skin.triangles.size());
-  area = area_of_labels(skin);
-  EXPECT_EQ(area.size(), 3u);
+  EXPECT_EQ(report["regions"]["interface_triangles"], std::count(skin.labels.begin(), skin.labels.end(), 0));
+  std::map<int, double> area = area_of_labels(skin);
+  EXPECT_EQ(area.size(), 4u);
+  EXPECT_NEAR(area[0], 1, 1e-9);
   EXPECT_NEAR(area[1], 2, 1e-9);
   EXPECT_NEAR(area[2], 4, 1e-9);
   EXPECT_NEAR(area[3], 4, 1e-9);
+}
+
+TEST_F(CliTet, RegionsThatASurfaceEncloses) {
+  const TetMesh bar = test::tet_grid(2, 1, 1);
+  TetMesh halves = bar;
+  for (std::size_t t = 0; t < bar.tets.size(); ++t) halves.regions.push_back(t < 6 ? 1 : 2);
+  TriangleMesh walls;
+  walls.vertices = bar.vertices;
+  walls.triangles = wall_facets(halves);
+  write_mesh(in("walls.off"), walls);
+  expect_failure(1, {"tet", in("cube.mesh"), "-o", in("out.msh"), "-n", "100", "--regions"}, "--regions");
+  expect_failure(2, {"tet", in("walls.off"), "-o", in("out.msh"), "-n", "100", "--regions", "--wrap"}, "--regions");
+  if (find_tetgen().empty()) GTEST_SKIP() << "built without TetGen";
+  expect_failure(1, {"tet", in("walls.off"), "-o", in("out.msh"), "-n", "100"}, "mesh them as regions");
+  const Json report = tet("walls.off", {"-n", "200", "--regions"}, "out.vtu");
+  ASSERT_EQ(report["regions"]["list"].size(), 2u);
+  const TetMesh mesh = read_tet_mesh(in("out.vtu"));
+  EXPECT_EQ(std::set<int>(mesh.regions.begin(), mesh.regions.end()), (std::set<int>{1, 2}));
 }
 
 TEST_F(CliTet, SeedsFromAFile) {

@@ -21,9 +21,18 @@ struct RunCase {
   bool graded;
 };
 
-// Features, a reentrant edge, and a density.
+TetMesh two_regions() {
+  TetMesh mesh = tet_grid(2, 1, 1);
+  mesh.regions = {1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2};
+  return mesh;
+}
+
+// Features, a reentrant edge, a density, and an interface.
 std::vector<RunCase> run_cases() {
-  return {{"box", tet_box(1), false}, {"step", step(), false}, {"graded", tet_box(2), true}};
+  return {{"box", tet_box(1), false},
+          {"step", step(), false},
+          {"graded", tet_box(2), true},
+          {"regions", two_regions(), false}};
 }
 
 struct Instance {
