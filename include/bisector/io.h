@@ -119,6 +119,18 @@ BISECTOR_API void write_polyhedra(const std::string& path, const PolyhedronMesh&
 // finite.
 BISECTOR_API std::vector<double> read_vertex_attribute(const std::string& path, const std::string& name);
 
+// What a Medit file says is to stay as it is: RequiredVertices, RequiredEdges and RequiredTriangles. Indices are those
+// that read_mesh gives, ascending, each once.
+struct RequiredElements {
+  std::vector<Index> vertices;
+  std::vector<std::array<Index, 2>> edges;  // lower vertex first
+  std::vector<Index> triangles;
+
+  bool empty() const { return vertices.empty() && edges.empty() && triangles.empty(); }
+};
+// None for files of other formats. Throws Error as read_mesh does, and for an index that is out of range.
+BISECTOR_API RequiredElements read_required(const std::string& path);
+
 // Reads "a b" lines, vertex indices counted from 0 as in the mesh's file; '#' starts a comment, further columns are
 // ignored. Ascending, each edge once and with the lower vertex first. Throws Error, naming the line, for what is not an
 // edge of the mesh.

@@ -86,8 +86,20 @@ struct RemeshOptions {
   // diagonal are tried, for files round their coordinates: the first that leaves fewest border and non-manifold edges
   // is taken, if it leaves more of neither.
   std::optional<double> weld;
+  // If positive: the Hausdorff distance of result and input, in the mesh's unit, is to be no more. Where it may be,
+  // edges become shorter, in several runs, while the vertices asked for are fewer than `most_vertices` (0: ten times
+  // those without). Not with seeds.
+  double distance_max = 0;
+  std::size_t most_vertices = 0;
   ComputeOptions compute;
   unsigned threads = 0;  // 0: all cores
+};
+
+// What came of RemeshOptions::distance_max.
+struct DistanceOutcome {
+  double lower = 0, upper = 0;    // bounds of the Hausdorff distance of the result and the input
+  int runs = 0;                   // with shorter edges
+  std::size_t most_vertices = 0;  // that could be asked for
 };
 
 // What the final pass did to bad triangles and irregular vertices.
@@ -159,7 +171,8 @@ struct RemeshResult {
   double edge_length = 0;  // aimed at where the density is 1
   ImproveReport improved;
   FitReport fitted;
-  int iterations = 0;  // accepted steps, all levels
+  DistanceOutcome distance;  // all 0 unless one was asked for
+  int iterations = 0;        // accepted steps, all levels
   int evaluations = 0;
   DeviceWork device_work;       // of these, summed
   double energy = 0;            // CVT energy of the final seeds

@@ -61,6 +61,9 @@ def remesh(
     gradation: Optional[Number] = None,
     edge_min: Optional[Number] = None,
     edge_max: Optional[Number] = None,
+    distance_max: Optional[Number] = None,
+    distance_max_relative: Optional[Number] = None,
+    vertices_max: Optional[int] = None,
     features: Union[str, Number, None] = None,
     detail: Optional[str] = None,
     feature_file: Optional[Path] = None,
@@ -94,7 +97,8 @@ def remesh(
     Lengths are in its unit. `seeds` is an (n, 3) array of points to start from, or a file of them; `density` a word
     ("lfs", "curvature:2", "attribute:NAME") or one positive value for each vertex, edges being as long as its power
     -1/4. `labels` is (m,), a number for each face of a mesh in memory, and `feature_edges` (k, 2), edges of it to keep.
-    `keep_vertices` and `keep_faces` are indices of what stays as it is, or files of them.
+    `keep_vertices` and `keep_faces` are indices of what stays as it is, or files of them. With `distance_max` edges
+    become shorter where a point of result or input may be farther from the other; report["distance"] has the bounds.
 
     Numbers of vertices, faces and their corners come with the mesh or in `vertex_data`, `face_data` and `corner_data`,
     dicts of arrays of n, m or (m, 3) rows by name, and are those of the result at the same place (docs/cli.md,

@@ -28,6 +28,10 @@ void print_summary(Console& console, const RemeshJob& job, const JobFiles& files
                               counted(result.features.curves, "curve", "curves"),
                               counted(result.features.corners, "corner", "corners")));
   print_detail(console, result.detail);
+  if (result.distance.upper > 0)
+    console.print(fmt::format("distance   to the input and back at most {:.6g}, at least {:.6g}; {} with shorter edges",
+                              result.distance.upper, result.distance.lower,
+                              counted(static_cast<std::size_t>(result.distance.runs), "run", "runs")));
   if (result.noisy)
     console.print("noise      seeds were left off the surface, whose normals are noise at this edge length");
   console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));

@@ -61,6 +61,13 @@ void read_elements(MeditReader& medit, const char* kind, std::size_t vertices,
   }
 }
 
+// The list of a keyword Required...; null of others.
+std::vector<std::int64_t>* required_list(std::string_view keyword, TetSoup& soup) {
+  if (keyword == "RequiredVertices") return &soup.required_vertices;
+  if (keyword == "RequiredEdges") return &soup.required_edges;
+  return keyword == "RequiredTriangles" ? &soup.required_triangles : nullptr;
+}
+
 // Reads one of the keywords that matter; false if it is none of these.
 bool read_keyword(MeditReader& medit, std::string_view keyword, TetSoup& soup, bool& vertices_seen) {
   if (keyword == "Vertices") {
@@ -71,6 +78,11 @@ bool read_keyword(MeditReader& medit, std::string_view keyword, TetSoup& soup, b
       for (int k = 0; k < 3; ++k) p[k] = medit.coordinate();
       medit.integer();
     }
+    return true;
+  }
+  if (std::vector<std::int64_t>* const required = required_list(keyword, soup)) {
+    const std::size_t n = medit.count(0, 1, "elements");
+    for (std::size_t i = 0; i < n; ++i) required->push_back(medit.integer());
     return true;
   }
   const bool element = keyword == "Tetrahedra" || keyword == "Triangles" || keyword == "Edges";
@@ -92,9 +104,6 @@ bool is_other_element(std::string_view keyword) {
 int numbers_of(std::string_view keyword) {
   static const std::map<std::string_view, int> kNumbers{{"Corners", 1},
                                                         {"Ridges", 1},
-                                                        {"RequiredVertices", 1},
-                                                        {"RequiredEdges", 1},
-                                                        {"RequiredTriangles", 1},
                                                         {"RequiredTetrahedra", 1},
                                                         {"Normals", 3},
                                                         {"Tangents", 3},
@@ -162,6 +171,9 @@ std::string_view keyword_of(std::int32_t code) {
                                                                {kGmfTetrahedra, "Tetrahedra"},
                                                                {9, "Prisms"},
                                                                {10, "Hexahedra"},
+                                                               {15, "RequiredVertices"},
+                                                               {16, "RequiredEdges"},
+                                                               {17, "RequiredTriangles"},
                                                                {24, "TrianglesP2"},
                                                                {25, "EdgesP2"},
                                                                {27, "QuadrilateralsQ2"},

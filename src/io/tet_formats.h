@@ -29,6 +29,8 @@ struct TetSoup {
   std::vector<Attribute> attributes = {};           // of vertices and tetrahedra
   std::vector<Attribute> triangle_attributes = {};  // elements are the triangles
   std::size_t curved = 0;                           // elements of second order, of which the corners were taken
+  // Medit: the vertices, edges and triangles that are to stay, counted from 1, as the file has them.
+  std::vector<std::int64_t> required_vertices = {}, required_edges = {}, required_triangles = {};
 };
 
 // What read_tet_mesh() makes of a file's contents, with its warnings; the path is for these.

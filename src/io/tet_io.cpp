@@ -215,6 +215,36 @@ std::vector<double> read_tet_attribute(const std::string& path, const std::strin
   return values;
 }
 
+RequiredElements read_required(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  const bool binary = extension == ".meshb";
+  if (!binary && extension != ".mesh") return {};
+  const std::string bytes = read_bytes(path);
+  const TetSoup soup = (binary ? read_medit_binary : read_medit)(path, bytes);
+  const auto indices = [&](const std::vector<std::int64_t>& listed, std::size_t count, const char* what) {
+    std::vector<Index> found;
+    for (const std::int64_t i : listed) {
+      if (i < 1 || i > static_cast<std::int64_t>(count))
+        fail(path, fmt::format("the required {} {} is out of range, the file has {}, counted from 1; mend it", what, i,
+                               count));
+      found.push_back(static_cast<Index>(i - 1));
+    }
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
+  };
+  RequiredElements required;
+  required.vertices = indices(soup.required_vertices, soup.vertices.size(), "vertex");
+  required.triangles = indices(soup.required_triangles, soup.triangles.size(), "triangle");
+  for (const Index e : indices(soup.required_edges, soup.edges.size(), "edge")) {
+    const auto [a, b] = soup.edges[e];
+    required.edges.push_back({std::min(a, b), std::max(a, b)});
+  }
+  std::sort(required.edges.begin(), required.edges.end());
+  required.edges.erase(std::unique(required.edges.begin(), required.edges.end()), required.edges.end());
+  return required;
+}
+
 TriangleMesh surface_of_marks(const TetMesh& mesh) {
   TriangleMesh surface{mesh.vertices, mesh.boundary, {}, mesh.boundary_labels, {}, mesh.label_names};
   const EdgeTable table = edge_table(surface.triangles, surface.vertices.size());

@@ -80,6 +80,14 @@ Json remesh_seconds(const RemeshSeconds& seconds) {
   return json;
 }
 
+// Both ascending.
+std::vector<Index> united(std::vector<Index> a, const std::vector<Index>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  std::sort(a.begin(), a.end());
+  a.erase(std::unique(a.begin(), a.end()), a.end());
+  return a;
+}
+
 }  // namespace
 
 std::vector<OutputKind> RemeshJob::outputs() const {
@@ -126,6 +134,7 @@ void RemeshJob::add_options(CLI::App* app) {
       ->check(number_below(10))
       ->group("Size");
   add_edge_bounds(app, options_.sizing);
+  add_distance_options(app);
   add_features(app, options_.features,
                "sharp edges to keep: auto (default), none, or all with a\n"
                "dihedral deviation of so many degrees. Borders and\n"
@@ -179,6 +188,26 @@ void RemeshJob::add_options(CLI::App* app) {
   add_threads(app, threads);
 }
 
+void RemeshJob::add_distance_options(CLI::App* app) {
+  app->add_option("--distance-max", options_.distance_max,
+                  "shorter edges where a point of result or input may be\n"
+                  "farther from the other than this, in the mesh's unit")
+      ->type_name("L")
+      ->check(number_above_zero())
+      ->group("Size");
+  app->add_option("--distance-max-relative", distance_max_relative_,
+                  "the same, in diagonals of the input's bounding box")
+      ->type_name("R")
+      ->check(number_above_zero())
+      ->group("Size");
+  app->add_option("--vertices-max", options_.most_vertices,
+                  "ask for no more vertices for it; default: ten times as\n"
+                  "many as without")
+      ->type_name("N")
+      ->check(whole_number(4, kMostSeeds))
+      ->group("Size");
+}
+
 void RemeshJob::check_usage(const Usage& usage) {
   usage.check_number_of_vertices();
   usage.check_wrap(attribute_);
@@ -194,11 +223,24 @@ void RemeshJob::check_usage(const Usage& usage) {
   if (length > 0 && (length < sizing.min_edge || (sizing.max_edge > 0 && length > sizing.max_edge)))
     throw CLI::ValidationError("--edge-length is not between --edge-min and --edge-max");
   if (sizing.kind == DensityKind::uniform) usage.check_uniform_density();
+  check_distance(usage);
   if (usage.given("--seeds"))
     usage.refuse("--keep-faces",
                  "seeds are of the whole surface and leave no room for kept faces; leave one of the two out");
   if (options_.energy == Energy::restricted && options_.min_angle > 0)
     usage.refuse("--min-angle", "seeds have to be on the surface for that; leave out --energy rcvt");
+}
+
+void RemeshJob::check_distance(const Usage& usage) const {
+  const bool wanted = usage.given("--distance-max") || usage.given("--distance-max-relative");
+  if (usage.given("--distance-max"))
+    usage.refuse("--distance-max-relative", "the distance is given by --distance-max; leave one of the two out");
+  if (!wanted) return usage.refuse("--vertices-max", "it is for --distance-max; leave it out, or give that as well");
+  if (options_.most_vertices > 0 && options_.most_vertices < options_.vertices)
+    throw CLI::ValidationError("--vertices-max is less than -n");
+  if (!usage.given("--seeds")) return;
+  for (const char* option : {"--distance-max", "--distance-max-relative"})
+    usage.refuse(option, "seeds from a file have their own number; leave one of the two out");
 }
 
 void RemeshJob::keep() {
@@ -210,10 +252,16 @@ void RemeshJob::keep() {
   const std::size_t faces =
       faces_of.empty() ? triangles : std::size_t{*std::max_element(faces_of.begin(), faces_of.end())} + 1;
   const std::vector<Index> kept = read_kept(keep_faces_, given.keep_faces, faces, "face", "--keep-faces");
+  // What the file itself says is to stay; of a wrap nothing is.
+  const RequiredElements required = given.mesh || wrap_.on ? RequiredElements{} : read_required(input);
+  options_.keep_vertices = united(std::move(options_.keep_vertices), required.vertices);
+  options_.keep_edges = required.edges;
   if (wrap_.on && !(kept.empty() && options_.keep_vertices.empty()))
     throw Error("--wrap: a wrap has other vertices than its input; keep none of them, or leave --wrap out");
   for (Index t = 0; t < triangles; ++t)
-    if (std::binary_search(kept.begin(), kept.end(), face_of(t))) options_.keep_triangles.push_back(t);
+    if (std::binary_search(kept.begin(), kept.end(), face_of(t)) ||
+        std::binary_search(required.triangles.begin(), required.triangles.end(), t))
+      options_.keep_triangles.push_back(t);
 }
 
 // What the options say, with the files that they name.
@@ -222,6 +270,8 @@ void RemeshJob::complete_options() {
   if (!feature_file_.empty()) options_.features.given = read_feature_edges(feature_file_, *surface);
   if (edge_length_relative_ > 0)
     options_.edge_length = edge_length_relative_ * bounding_box(surface->vertices).diagonal();
+  if (distance_max_relative_ > 0)
+    options_.distance_max = distance_max_relative_ * bounding_box(surface->vertices).diagonal();
   if (weld_ >= 0) options_.weld = weld_;
   keep();
   leave_out_folds(wrap_, options_.features);
@@ -259,6 +309,13 @@ void RemeshJob::compute(Journal& journal) {
   require_sound(result);
   warn_of_features(journal, result);
   if (options_.topology != TopologyControl::off) warn_of_topology(journal, result);
+  if (result.distance.upper > options_.distance_max)
+    journal.warn(fmt::format(
+        "the distance to the input is at least {:.6g} and at most {:.6g}, where {:.6g} was asked for; {}",
+        result.distance.lower, result.distance.upper, options_.distance_max,
+        result.wanted >= result.distance.most_vertices
+            ? fmt::format("{} were not enough, give --vertices-max more", counted(result.wanted, "vertex", "vertices"))
+            : "shorter edges alone do not bring it down"));
   seconds = remesh_seconds(result.seconds);
   const Stopwatch measuring;
   quality = measure_quality(result.mesh);
@@ -318,6 +375,12 @@ Json RemeshJob::report(Journal& journal) {
     report["kept"] = {{"vertices", result.kept.size() - static_cast<std::size_t>(
                                                             std::count(result.kept.begin(), result.kept.end(), kNone))},
                       {"faces", result.kept_triangles}};
+  if (options_.distance_max > 0)
+    report["distance"] = {{"wanted", options_.distance_max},
+                          {"lower", result.distance.lower},
+                          {"upper", result.distance.upper},
+                          {"runs", result.distance.runs},
+                          {"vertices_max", result.distance.most_vertices}};
   report["features"] = features_json(result.features, result.mesh.feature_edges.size());
   report["detail"] = detail_json(result.detail, result.features.curves);
   report["attributes"] = attributes_json(result.mesh.attributes);

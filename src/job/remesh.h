@@ -38,7 +38,9 @@ class RemeshJob final : public Job {
   QualityReport quality;  // of the result
 
  private:
+  void add_distance_options(CLI::App* app);
   void complete_options();
+  void check_distance(const Usage& usage) const;
   void keep();
   void carry(Journal& journal);
   std::string map_text() const;
@@ -51,6 +53,7 @@ class RemeshJob final : public Job {
   std::string keep_vertices_, keep_faces_;
   std::string attribute_;             // of the input's vertices, a density
   double edge_length_relative_ = 0;   // of the input's diagonal; 0: not given
+  double distance_max_relative_ = 0;  // likewise
   double weld_ = -1;                  // not given
   bool wants_feature_edges_ = false;  // --feature-output is given
   bool wants_map_ = false;            // --map is

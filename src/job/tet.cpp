@@ -248,6 +248,9 @@ void TetJob::read(Journal& journal) {
     throw Error(
         "--regions: it is for surfaces, and tetrahedra have regions of their own, which are kept; leave it out");
   walls_ = walls_of(domain);
+  if (!given.mesh && !read_required(input).empty())
+    journal.warn(fmt::format("{}: what the file requires to stay as it is is meshed anew; only remesh keeps that",
+                             std::filesystem::path(input).filename().string()));
   complete_options();
   io_ = reading.seconds();
   wrapped_ = wrap_if_asked(wrap_, *domain.surface, options_.vertices, options_.edge_length, true, journal, wrap_mesh_);

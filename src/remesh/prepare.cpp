@@ -361,6 +361,11 @@ void Preparation::bound(const SizeBounds& bounds) {
   bounds_.add(bounds);
 }
 
+void Preparation::ask_for(std::size_t vertices) {
+  target_ = {vertices, 0};
+  unbounded_.reset();
+}
+
 PreparedInput Preparation::lay_down() {
   std::optional<SizeField> field;
   if (!bounds_.points.empty()) field.emplace(bounds_.points, bounds_.lengths, kDetailGradation);

@@ -57,6 +57,8 @@ class Preparation {
 
   // Beside the bounds that there are already.
   void bound(const SizeBounds& bounds);
+  // So many vertices, whatever was asked for.
+  void ask_for(std::size_t vertices);
   // The domain with its density as it stands.
   PreparedInput lay_down();
   const WeldResult& welded() const { return welded_; }

@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "bisector/distance_bound.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "compute/compute.h"
@@ -21,6 +22,7 @@
 #include "mesh/topology.h"
 #include "remesh/around_kept.h"
 #include "remesh/coarse_surface.h"
+#include "remesh/deviation.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/fit.h"
 #include "remesh/improve.h"
@@ -52,6 +54,12 @@ constexpr int kMendingRounds = 3;  // of features and topology
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
 constexpr int kRefinements = 3;  // of a result, while that makes it better
+// Runs for a distance to the input, how many times the vertices they may take, and the gap between bounds of it.
+constexpr int kNearings = 8;
+constexpr std::size_t kMostTimes = 10;
+constexpr double kBoundsGap = 0.02;
+// Of the distance, what edges aim at; less from run to run, for the farthest of many triangles is far from their mean.
+constexpr double kFirstAim = 0.6, kNextAim = 0.9;
 constexpr int kFreedSteps = 20;
 constexpr double kFitQuality = 0.7;  // what fitting may bring better triangles down to
 constexpr double kMaxAngle = 91;     // degrees; goal of the final pass
@@ -76,6 +84,10 @@ void check_options(const RemeshOptions& options) {
   if (options.seeds.empty() && (options.vertices > 0) == (options.edge_length > 0))
     throw Error("ask for a number of vertices or for an edge length, and not for both");
   if (options.edge_length == 0 || !options.seeds.empty()) check_plan(plan_of(options));
+  if (!(options.distance_max >= 0 && std::isfinite(options.distance_max)))
+    throw Error(fmt::format("the largest distance {:g} is none; give a positive length", options.distance_max));
+  if (options.distance_max > 0 && !options.seeds.empty())
+    throw Error("a largest distance takes other seeds than those given; leave one of the two out");
 }
 
 // What runs took.
@@ -604,89 +616,164 @@ RemeshPlan plan_of(const RemeshOptions& options) {
 
 namespace {
 
-// All of a surface; triangles are not kept.
-RemeshResult remesh_whole(const TriangleMesh& input, const RemeshOptions& options, bool branches,
-                          const Context& context) {
-  const Stopwatch watch;
-  OrderedInput ordered(input, options);
-  const std::vector<Index> vertex_of = std::move(ordered.vertex_of);
-  std::vector<Index> input_of(vertex_of.size());
-  for (Index v = 0; v < vertex_of.size(); ++v) input_of[vertex_of[v]] = v;
-  Preparation preparation(std::move(ordered), context, branches);
-  Compute compute(options.compute, context);
-  const MakeBackend make_backend = [&](const Surface& surface) { return compute.backend(surface); };
-  double preparing = watch.seconds();
-  // The run starts again once where cells are no disks, and some times for what is wrong with its result, with shorter
-  // edges there.
-  bool may_shorten = options.seeds.empty() && options.detail != DetailMode::off;
-  int refinements = may_shorten ? kRefinements : 0;
-  Spent before;
-  RunProgress progress(context);
-  std::optional<JudgedResult> best;
-  std::optional<PlacedSeeds> earlier;
-  NewCrossings new_crossings(preparation.mesh());
+// Runs on all of a surface, each with the edge lengths that the results of those before it asked for. Triangles are not
+// kept.
+class Runs {
+ public:
+  Runs(const TriangleMesh& input, const RemeshOptions& options, bool branches, const Context& context)
+      : input_(input), options_(options), branches_(branches), context_(context), compute_(options.compute, context),
+        progress_(context) {
+    OrderedInput ordered(input, options);
+    vertex_of_ = std::move(ordered.vertex_of);
+    input_of_.resize(vertex_of_.size());
+    for (Index v = 0; v < vertex_of_.size(); ++v) input_of_[vertex_of_[v]] = v;
+    preparation_.emplace(std::move(ordered), context, branches);
+    new_crossings_.emplace(preparation_->mesh());
+    may_shorten_ = options.seeds.empty() && options.detail != DetailMode::off;
+    preparing_ = watch_.seconds();
+  }
+
+  RemeshResult run() {
+    settle();
+    if (options_.distance_max > 0) come_near();
+    return take_best();
+  }
+
+ private:
+  // A result, and why another run would be better.
+  struct Run {
+    JudgedResult judged;
+    std::size_t vertices = 0;  // asked for
+    AnotherRun next;
+  };
+
+  Run make_run(bool last);
+  void settle();
+  void come_near();
+  RemeshResult take_best();
+
+  const Stopwatch watch_;
+  const TriangleMesh& input_;
+  const RemeshOptions& options_;
+  const bool branches_;
+  const Context& context_;
+  Compute compute_;
+  RunProgress progress_;
+  std::vector<Index> vertex_of_, input_of_;  // the vertex in spatial order of each of the input's, and back
+  std::optional<Preparation> preparation_;
+  std::optional<NewCrossings> new_crossings_;
+  bool may_shorten_ = false;  // once, where cells are no disks
+  double preparing_ = 0;
+  Spent spent_;
+  std::optional<PlacedSeeds> earlier_;
+  std::optional<JudgedResult> best_;
+  std::size_t vertices_ = 0;  // asked for, of the best
+};
+
+Runs::Run Runs::make_run(bool last) {
+  const MakeBackend make_backend = [&](const Surface& surface) { return compute_.backend(surface); };
   for (;;) {
     const Stopwatch laying_down;
-    PreparedInput prepared = preparation.lay_down();
-    RemeshPlan plan = plan_of(options);
+    PreparedInput prepared = preparation_->lay_down();
+    RemeshPlan plan = plan_of(options_);
     plan.vertices = prepared.vertices;
-    plan.branches = branches;
+    plan.branches = branches_;
     if (prepared.noisy) plan.constrained = false;
     for (Index& v : prepared.kept.corners) {
       plan.held.push_back(v != kNone);
-      if (v != kNone) v = input_of[v];
+      if (v != kNone) v = input_of_[v];
     }
     const Surface surface(std::move(prepared.mesh), prepared.density);
-    preparing += laying_down.seconds();
-    const std::unique_ptr<Backend> backend = compute.backend(surface);
-    Pipeline pipeline(*backend, prepared.features, plan, progress.context(), make_backend);
-    pipeline.count(before);
-    if (earlier) pipeline.place_again(*earlier);
+    preparing_ += laying_down.seconds();
+    const std::unique_ptr<Backend> backend = compute_.backend(surface);
+    Pipeline pipeline(*backend, prepared.features, plan, progress_.context(), make_backend);
+    pipeline.count(spent_);
+    if (earlier_) pipeline.place_again(*earlier_);
     else pipeline.place();
-    if (std::exchange(may_shorten, false)) {
+    if (std::exchange(may_shorten_, false)) {
       const SizeBounds crowded = pipeline.crowded();
       if (!crowded.points.empty()) {
-        preparation.bound(crowded);
-        earlier = pipeline.seeds();
-        before = pipeline.spent();
-        progress.start_again("shorter edges for topology");
+        preparation_->bound(crowded);
+        earlier_ = pipeline.seeds();
+        spent_ = pipeline.spent();
+        progress_.start_again("shorter edges for topology");
         continue;
       }
     }
     RemeshResult result = pipeline.finish();
-    if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input, result);
+    if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
-    before = {pipeline.spent().totals, result.seconds};
-    JudgedResult judged = judge(std::move(result));
-    const bool last = refinements-- == 0 || !plan.constrained || plan.min_angle == 0;
-    const Crossings crossings = last && !best ? Crossings{} : new_crossings.of(judged.result.mesh);
-    judged.crossings = crossings.pairs;
-    if (best && !is_better(judged, *best)) break;
-    best = std::move(judged);
-    if (last) break;
-    const AnotherRun next = another_run(pipeline, *best, crossings);
-    if (!next.why) break;
-    preparation.bound(next.bounds);
-    earlier = pipeline.seeds();
-    progress.start_again(next.why);
+    spent_ = {pipeline.spent().totals, result.seconds};
+    Run run{judge(std::move(result)), plan.vertices, {}};
+    last = last || !plan.constrained || plan.min_angle == 0;
+    const Crossings crossings = last && !best_ ? Crossings{} : new_crossings_->of(run.judged.result.mesh);
+    run.judged.crossings = crossings.pairs;
+    if (!last && (!best_ || is_better(run.judged, *best_))) run.next = another_run(pipeline, run.judged, crossings);
+    earlier_ = pipeline.seeds();
+    return run;
   }
-  RemeshResult& chosen = best->result;
-  chosen.iterations = before.totals.iterations;
-  chosen.evaluations = before.totals.evaluations;
-  chosen.device_work = before.totals.device_work;
-  chosen.seconds = before.seconds;
-  chosen.seconds.prepare = preparing;
-  chosen.seconds.total = watch.seconds();
-  chosen.welded = preparation.welded();
-  for (std::size_t v = 0; v < input.vertices.size(); ++v)
-    chosen.welded.vertex_of[v] = preparation.welded().vertex_of[vertex_of[v]];
+}
+
+// While results become better, with shorter edges for what is wrong with them.
+void Runs::settle() {
+  for (int left = may_shorten_ ? kRefinements : 0;; --left) {
+    Run run = make_run(left == 0);
+    if (best_ && !is_better(run.judged, *best_)) return;
+    best_ = std::move(run.judged);
+    vertices_ = run.vertices;
+    if (left == 0 || !run.next.why) return;
+    preparation_->bound(run.next.bounds);
+    progress_.start_again(run.next.why);
+  }
+}
+
+// With shorter edges, and as many vertices as that takes, where the result is too far from the input.
+void Runs::come_near() {
+  const double most = options_.distance_max;
+  DistanceOutcome outcome;
+  outcome.most_vertices = options_.most_vertices > 0 ? options_.most_vertices : kMostTimes * vertices_;
+  double aim = kFirstAim;
+  Deviation best = find_deviation(best_->result.mesh, input_, most, aim, context_), last = best;
+  for (std::size_t asked = vertices_; best.upper > most && outcome.runs < kNearings; ++outcome.runs) {
+    const auto next = static_cast<std::size_t>(std::ceil(last.growth * static_cast<double>(asked)));
+    if (last.bounds.points.empty() || asked >= outcome.most_vertices) break;
+    asked = std::min(std::max(next, asked + 1), outcome.most_vertices);
+    preparation_->bound(last.bounds);
+    preparation_->ask_for(asked);
+    progress_.start_again("shorter edges for the distance");
+    Run run = make_run(true);
+    run.judged.crossings = new_crossings_->of(run.judged.result.mesh).pairs;
+    aim *= kNextAim;
+    last = find_deviation(run.judged.result.mesh, input_, most, aim, context_);
+    if (last.upper >= best.upper || is_worse(run.judged, *best_)) continue;
+    best = last;
+    best_ = std::move(run.judged);
+    vertices_ = asked;
+  }
+  const HausdorffBounds bounds = bound_hausdorff_distance(best_->result.mesh, input_, kBoundsGap * most, context_);
+  outcome.lower = bounds.lower;
+  outcome.upper = bounds.upper;
+  best_->result.distance = outcome;
+}
+
+RemeshResult Runs::take_best() {
+  RemeshResult& chosen = best_->result;
+  chosen.iterations = spent_.totals.iterations;
+  chosen.evaluations = spent_.totals.evaluations;
+  chosen.device_work = spent_.totals.device_work;
+  chosen.seconds = spent_.seconds;
+  chosen.seconds.prepare = preparing_;
+  chosen.seconds.total = watch_.seconds();
+  chosen.welded = preparation_->welded();
+  for (std::size_t v = 0; v < input_.vertices.size(); ++v)
+    chosen.welded.vertex_of[v] = preparation_->welded().vertex_of[vertex_of_[v]];
   return std::move(chosen);
 }
 
 RemeshResult remesh_surface(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
-  return remesh_whole(input, options, false, context);
+  return Runs(input, options, false, context).run();
 }
 
 }  // namespace
@@ -696,7 +783,7 @@ RemeshResult remesh_walls(const TriangleMesh& walls, const RemeshOptions& option
   RemeshOptions walled = options;
   walled.energy = Energy::constrained;
   walled.weld = 0;
-  return remesh_whole(walls, walled, true, context);
+  return Runs(walls, walled, true, context).run();
 }
 
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {

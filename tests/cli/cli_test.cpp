@@ -657,6 +657,41 @@ std::map<int, double> area_of_labels(const TriangleMesh& mesh) {
   return area;
 }
 
+TEST_F(CliRemesh, WhatAMeditFileRequiresStays) {
+  const TriangleMesh ball = test::icosphere(3);
+  write_mesh(in("ball.mesh"), ball);
+  std::string text = read_text(in("ball.mesh"));
+  text.erase(text.rfind("End"));
+  write_text("ball.mesh", text + "RequiredVertices\n2\n5\n300\nRequiredTriangles\n2\n1\n2\nEnd\n");
+  const Json report =
+      report_of({"remesh", in("ball.mesh"), "-o", in("out.off"), "-n", "200", "--quiet", "--report", "-"});
+  EXPECT_EQ(report["kept"]["faces"], 2);
+  const std::vector<Vec3> found = read_mesh(in("out.off")).vertices;
+  std::set<Index> kept{4, 299};
+  for (const std::size_t t : {0u, 1u}) kept.insert(ball.triangles[t].begin(), ball.triangles[t].end());
+  for (const Index v : kept) EXPECT_NE(std::find(found.begin(), found.end(), ball.vertices[v]), found.end()) << v;
+}
+
+TEST_F(CliRemesh, DistanceIsBounded) {
+  const std::vector<std::string> run = {"remesh", in("sphere.off"), "-o", in("out.off"), "-n", "60", "--report", "-"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), run.begin(), run.end());
+    more.push_back("--quiet");
+    return report_of(more);
+  };
+  EXPECT_FALSE(with({}).contains("distance"));
+  const Json reached = with({"--distance-max", "0.03"})["distance"];
+  EXPECT_EQ(reached["wanted"], 0.03);
+  EXPECT_LE(reached["lower"], reached["upper"]);
+  EXPECT_LE(reached["upper"], 0.03);
+  EXPECT_EQ(reached["vertices_max"], 600);
+  EXPECT_GT(reached["runs"], 0);
+  const Json missed = with({"--distance-max-relative", "1e-5", "--vertices-max", "80"});
+  EXPECT_GT(missed["distance"]["upper"], missed["distance"]["wanted"]);
+  ASSERT_EQ(missed["warnings"].size(), 1u);
+  EXPECT_NE(missed["warnings"][0].get<std::string>().find("--vertices-max"), std::string::npos);
+}
+
 TEST_F(CliRemesh, OptionsThatContradictEachOther) {
   write_text("points.xyz", "1 0 0\n-1 0 0\n0 1 0\n0 -1 0\n0 0 1\n0 0 -1\n");
   const auto refused = [&](std::vector<std::string> more, const std::string& part) {
@@ -668,6 +703,13 @@ TEST_F(CliRemesh, OptionsThatContradictEachOther) {
     refused({"--seeds", in("points.xyz"), option, "0.1"}, option);
   }
   refused({"--edge-length", "0.1", "--edge-length-relative", "0.1"}, "--edge-length-relative");
+  for (const char* option : {"--distance-max", "--distance-max-relative"}) {
+    refused({"--seeds", in("points.xyz"), option, "0.1"}, option);
+    refused({"-n", "100", option, "-1"}, option);
+  }
+  refused({"-n", "100", "--distance-max", "0.1", "--distance-max-relative", "0.1"}, "--distance-max-relative");
+  refused({"-n", "100", "--vertices-max", "200"}, "--vertices-max");
+  refused({"-n", "100", "--distance-max", "0.1", "--vertices-max", "50"}, "--vertices-max");
   for (const char* option : {"--gradation", "--edge-min", "--edge-max"}) {
     refused({"-n", "100", option, "0.1"}, option);
     refused({"-n", "100", "--density", "uniform", option, "0.1"}, option);

@@ -600,6 +600,12 @@ std::string meshb(int version, bool big, std::int32_t dimension = 3, std::int64_
   integer(1);
   integer(1);
   end();
+  begin(15);  // vertices that are to stay
+  for (const int n : {2, 4, 1}) integer(n);
+  end();
+  begin(17);  // and a triangle
+  for (const int n : {1, 2}) integer(n);
+  end();
   begin(6);
   integer(triangles);
   for (const std::int64_t n : {std::int64_t{1}, std::int64_t{2}, corner, std::int64_t{3}, std::int64_t{1},
@@ -618,6 +624,10 @@ TEST_F(Formats, ReadsEveryVersionOfBinaryMedit) {
       EXPECT_EQ(mesh.vertices, kSquare.vertices);
       EXPECT_EQ(mesh.triangles, kSquare.triangles);
       EXPECT_EQ(mesh.labels, (Labels{3, 4}));
+      const RequiredElements required = read_required(path("a.meshb"));
+      EXPECT_EQ(required.vertices, (std::vector<Index>{0, 3}));
+      EXPECT_EQ(required.triangles, std::vector<Index>{1});
+      EXPECT_TRUE(required.edges.empty());
       expect_error("b.meshb", meshb(version, big, 2), "the dimension is 2");
       expect_error("b.meshb", meshb(version, big, 3, 2000000000), "2000000000 triangles are declared");
       expect_error("b.meshb", meshb(version, big, 3, -5), "is negative");

@@ -312,6 +312,26 @@ TEST_F(TetIo, ReadsAsciiAndAppendedVtu) {
     EXPECT_THROW(read("c.vtu", raw.substr(0, cut)), Error) << cut;
 }
 
+TEST_F(TetIo, ReadsWhatMeditRequires) {
+  const std::string square =
+      "MeshVersionFormatted 2\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n"
+      "Triangles 2\n1 2 3 0\n1 3 4 0\nEdges 3\n1 2 0\n3 2 0\n2 1 0\n";
+  store("a.mesh", square + "RequiredEdges 3\n3\n1\n2\nRequiredTriangles 2\n2\n2\nRequiredVertices\n1\n4\nEnd\n");
+  const RequiredElements required = read_required(path("a.mesh"));
+  EXPECT_EQ(required.vertices, std::vector<Index>{3});
+  EXPECT_EQ(required.edges, (std::vector<std::array<Index, 2>>{{0, 1}, {1, 2}}));
+  EXPECT_EQ(required.triangles, std::vector<Index>{1});
+  store("b.mesh", square + "End\n");
+  EXPECT_TRUE(read_required(path("b.mesh")).empty());
+  EXPECT_TRUE(read_required(path("missing.off")).empty());
+  EXPECT_THROW(read_required(path("missing.mesh")), Error);
+  for (const char* bad : {"RequiredTriangles 1\n3\n", "RequiredVertices 1\n0\n", "RequiredEdges 1\n-1\n",
+                          "RequiredVertices -1\n", "RequiredVertices 1000000\n1\n", "RequiredVertices 1\nx\n"}) {
+    store("c.mesh", square + bad + "End\n");
+    EXPECT_THROW(read_required(path("c.mesh")), Error) << bad;
+  }
+}
+
 TEST_F(TetIo, ReadsMeditWithWhatOthersWrite) {
   const TetMesh mesh =
       read("a.mesh",
@@ -323,6 +343,7 @@ TEST_F(TetIo, ReadsMeditWithWhatOthersWrite) {
   EXPECT_EQ(mesh.boundary, (std::vector<Triangle>{{0, 2, 1}}));
   EXPECT_EQ(mesh.boundary_labels, std::vector<std::int32_t>{-4});
   EXPECT_EQ(mesh.feature_edges, (std::vector<std::array<Index, 2>>{{0, 1}}));
+  EXPECT_EQ(read_required(path("a.mesh")).vertices, (std::vector<Index>{0, 1}));
   store("a.sol",
         "MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n4\n2 2 1\n1 1 1 0.5\n1 1 1 1.5\n1 1 1 2.5\n1 1 1 "
         "3.5\nEnd\n");

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -369,6 +370,49 @@ TEST(RemeshHard, AThinTipKeepsTheTopology) {
   EXPECT_EQ(result.features.curves, 1u);
 }
 
+// Bounds that hold for samples and for the known distance of a chord.
+TEST(RemeshDistance, IsBroughtDownToWhatIsAskedFor) {
+  const TriangleMesh ball = icosphere(4);
+  RemeshOptions options = options_for(60);
+  options.distance_max = 0.02;
+  const RemeshResult result = remesh(ball, options);
+  EXPECT_LE(result.distance.upper, options.distance_max);
+  EXPECT_LE(result.distance.lower, result.distance.upper);
+  EXPECT_GT(result.distance.runs, 0);
+  EXPECT_EQ(result.distance.most_vertices, 600u);
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_EQ(result.mesh.vertices.size(), result.wanted);
+  const double diagonal = bounding_box(ball.vertices).diagonal();
+  const double sampled = measure_distance(result.mesh, ball).max / 100 * diagonal;
+  EXPECT_GE(result.distance.upper, sampled);
+  EXPECT_LE(result.distance.lower, sampled + 0.02 * options.distance_max + 1e-6);
+  // Enough vertices for it: the middle of an equilateral triangle lies h^2 / 6 below the sphere.
+  const double h = std::sqrt(4 * std::numbers::pi / (std::numbers::sqrt3 / 2 * static_cast<double>(result.wanted)));
+  EXPECT_LT(h * h / 6, options.distance_max);
+}
+
+TEST(RemeshDistance, EndsWithTheMostVerticesThatMayBeAskedFor) {
+  RemeshOptions options = options_for(60);
+  options.distance_max = 1e-4;
+  options.most_vertices = 90;
+  const RemeshResult result = remesh(icosphere(4), options);
+  EXPECT_EQ(result.wanted, 90u);
+  EXPECT_GT(result.distance.upper, options.distance_max);
+  EXPECT_EQ(result.distance.most_vertices, 90u);
+  EXPECT_LT(result.distance.upper, 0.1);
+}
+
+TEST(RemeshDistance, IsLeftWhereItIsKeptAlready) {
+  RemeshOptions options = options_for(200);
+  const RemeshResult plain = remesh(icosphere(4), options);
+  options.distance_max = 0.5;
+  const RemeshResult result = remesh(icosphere(4), options);
+  EXPECT_EQ(result.distance.runs, 0);
+  EXPECT_EQ(result.mesh.vertices, plain.mesh.vertices);
+  EXPECT_EQ(plain.distance.upper, 0);
+  EXPECT_LE(result.distance.upper, 0.5);
+}
+
 TEST(RemeshErrors, AreOneLineThatSaysWhatToDo) {
   const auto message = [](const TriangleMesh& mesh, const RemeshOptions& options) {
     try {
@@ -384,6 +428,12 @@ TEST(RemeshErrors, AreOneLineThatSaysWhatToDo) {
   RemeshOptions seeded;
   seeded.seeds = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
   EXPECT_FALSE(message(icosphere(1), seeded).empty());
+  seeded.seeds.push_back({0, 0, -1});
+  seeded.distance_max = 0.1;
+  EXPECT_NE(message(icosphere(1), seeded).find("distance"), std::string::npos);
+  RemeshOptions negative = options_for(10);
+  negative.distance_max = -1;
+  EXPECT_NE(message(icosphere(1), negative).find("distance"), std::string::npos);
   const TriangleMesh line{{{0, 0, 0}, {1, 1, 1}, {3, 3, 3}}, {{0, 1, 2}, {2, 1, 0}}, {}};
   for (const TriangleMesh& mesh : {TriangleMesh{}, line}) {
     const std::string text = message(mesh, options_for(10));
