@@ -23,10 +23,6 @@ constexpr double kHopeless = 0.05;
 // 1.15 times their height as edges.
 constexpr double kPerHeight = 1.15, kLeast = 0.5;
 
-std::tuple<bool, std::size_t, std::size_t> faults_of(const JudgedResult& judged) {
-  return {!judged.result.topology_matches, judged.result.features.broken, judged.crossings};
-}
-
 }  // namespace
 
 Slivers find_slivers(const TriangleMesh& mesh) {
@@ -88,10 +84,16 @@ JudgedResult judge(RemeshResult result) {
 }
 
 bool is_better(const JudgedResult& judged, const JudgedResult& than) {
-  const auto rank = [](const JudgedResult& j) { return std::pair(faults_of(j), j.slivers.bounds.points.size()); };
+  const auto rank = [](const JudgedResult& j) {
+    const RemeshResult& r = j.result;
+    return std::tuple(!r.topology_matches, r.features.broken, j.crossings, j.slivers.bounds.points.size());
+  };
   return rank(judged) < rank(than);
 }
 
-bool is_worse(const JudgedResult& judged, const JudgedResult& than) { return faults_of(than) < faults_of(judged); }
+bool is_worse(const JudgedResult& judged, const JudgedResult& than) {
+  const auto rank = [](const JudgedResult& j) { return std::pair(!j.result.topology_matches, j.crossings); };
+  return rank(than) < rank(judged);
+}
 
 }  // namespace bisector
