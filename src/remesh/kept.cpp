@@ -54,13 +54,46 @@ std::array<std::size_t, 2> ends_of(const FeatureGraph& features, const FeatureCu
   return {corner_at(curve.vertices.front()), corner_at(curve.vertices.back())};
 }
 
-std::vector<VertexChain> chains_of(const KeptFeatures& kept, const FeatureGraph& features,
-                                   const std::vector<Index>& at_corner, const RemeshResult& result) {
+// The cells of a border's corner at an obtuse angle and of its two neighbours may meet nowhere on the surface. Then the
+// dual's border leads from one neighbour to the other, and lacks the triangle of the three, which is added. False if
+// that is not so.
+bool add_ear(std::size_t corner, const std::vector<Index>& neighbours, RemeshResult& result) {
+  if (neighbours.size() != 2) return false;
+  const Index a = neighbours[0], b = neighbours[1];
+  if (a == kNone || b == kNone) return false;
+  TriangleMesh& mesh = result.mesh;
+  std::vector<std::size_t> beside;  // triangles on the edge from one neighbour to the other
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle& v = mesh.triangles[t];
+    if (std::count(v.begin(), v.end(), a) > 0 && std::count(v.begin(), v.end(), b) > 0) beside.push_back(t);
+  }
+  if (beside.size() != 1) return false;
+  const Triangle beyond = mesh.triangles[beside.front()];
+  const auto k = static_cast<std::size_t>(std::find(beyond.begin(), beyond.end(), a) - beyond.begin());
+  const auto added = static_cast<Index>(mesh.vertices.size());
+  mesh.vertices.emplace_back();
+  mesh.triangles.push_back(beyond[(k + 1) % 3] == b ? Triangle{b, a, added} : Triangle{a, b, added});
+  if (!mesh.labels.empty()) mesh.labels.push_back(std::int32_t{mesh.labels[beside.front()]});
+  SeedPlace place;
+  place.kind = SeedPlace::Kind::fixed;
+  place.corner = static_cast<Index>(corner);
+  result.places.push_back(place);
+  return true;
+}
+
+// The corners that are kept, and the vertices along each edge that is, from corner to corner.
+struct KeptEdge {
+  std::array<std::size_t, 2> corners;
+  VertexChain chain;
+};
+
+std::vector<KeptEdge> kept_edges(const KeptFeatures& kept, const FeatureGraph& features,
+                                 const std::vector<Index>& at_corner, const RemeshResult& result) {
   std::vector<std::vector<std::pair<double, Index>>> inside(features.curves.size());
   for (Index v = 0; v < result.places.size(); ++v)
     if (const SeedPlace& place = result.places[v]; place.curve != kNone && kept.curves[place.curve])
       inside[place.curve].push_back({place.position, v});
-  std::vector<VertexChain> chains;
+  std::vector<KeptEdge> edges;
   for (std::size_t c = 0; c < features.curves.size(); ++c) {
     if (!kept.curves[c]) continue;
     const auto [from, to] = ends_of(features, features.curves[c]);
@@ -68,9 +101,27 @@ std::vector<VertexChain> chains_of(const KeptFeatures& kept, const FeatureGraph&
     std::sort(inside[c].begin(), inside[c].end());
     for (const auto& [position, v] : inside[c]) chain.push_back(v);
     chain.push_back(at_corner[to]);
-    chains.push_back(std::move(chain));
+    edges.push_back({{from, to}, std::move(chain)});
   }
-  return chains;
+  return edges;
+}
+
+void add_missing_corners(const KeptFeatures& kept, std::vector<KeptEdge>& edges, std::vector<Index>& at_corner,
+                         RemeshResult& result) {
+  for (std::size_t c = 0; c < at_corner.size(); ++c) {
+    if (kept.corners[c] == kNone || at_corner[c] != kNone) continue;
+    std::vector<Index> neighbours;
+    for (const KeptEdge& edge : edges) {
+      if (edge.corners[0] == c) neighbours.push_back(edge.chain[1]);
+      if (edge.corners[1] == c) neighbours.push_back(edge.chain[edge.chain.size() - 2]);
+    }
+    if (!add_ear(c, neighbours, result)) continue;
+    at_corner[c] = static_cast<Index>(result.mesh.vertices.size() - 1);
+    for (KeptEdge& edge : edges) {
+      if (edge.corners[0] == c) edge.chain.front() = at_corner[c];
+      if (edge.corners[1] == c) edge.chain.back() = at_corner[c];
+    }
+  }
 }
 
 // Takes the vertices out that no triangle uses.
@@ -107,7 +158,9 @@ void take_out_divisions(const std::vector<VertexChain>& chains, const TriangleMe
     options.movable.push_back(result.places[v].kind == SeedPlace::Kind::surface);
   const NearestOnMesh surface(input);
   options.project = [&](const Vec3& p) { return surface.nearest(p).point; };
-  make_whole(mesh, chains, options);
+  make_whole(mesh, chains, std::move(options));
+  result.places.resize(mesh.vertices.size());
+  result.kept.resize(mesh.vertices.size(), kNone);
   std::vector<Edge> links, edges;
   for (const VertexChain& chain : chains)
     for (std::size_t k = 0; k + 1 < chain.size(); ++k) links.push_back(sorted_edge(chain[k], chain[k + 1]));
@@ -161,7 +214,9 @@ void add_corners(FeatureGraph& graph, const std::vector<Index>& vertices) {
 
 void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const TriangleMesh& input,
                   RemeshResult& result) {
-  const std::vector<Index> at_corner = vertices_at_corners(result, features.corners.size());
+  std::vector<Index> at_corner = vertices_at_corners(result, features.corners.size());
+  std::vector<KeptEdge> edges = kept_edges(kept, features, at_corner, result);
+  add_missing_corners(kept, edges, at_corner, result);
   result.kept.assign(result.mesh.vertices.size(), kNone);
   for (std::size_t c = 0; c < at_corner.size(); ++c) {
     const Index of_input = kept.corners[c], v = at_corner[c];
@@ -172,9 +227,9 @@ void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const 
     result.mesh.vertices[v] = input.vertices[of_input];
     result.kept[v] = of_input;
   }
-  const std::vector<VertexChain> chains = chains_of(kept, features, at_corner, result);
-  const auto is_divided = [](const VertexChain& chain) { return chain.size() > 2; };
-  if (std::any_of(chains.begin(), chains.end(), is_divided)) take_out_divisions(chains, input, result);
+  std::vector<VertexChain> chains;
+  for (KeptEdge& edge : edges) chains.push_back(std::move(edge.chain));
+  if (!chains.empty()) take_out_divisions(chains, input, result);
   check_edges(kept, features, result);
 }
 

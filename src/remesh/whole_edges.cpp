@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <numbers>
+#include <numeric>
 #include <set>
 #include <utility>
 
 #include "core/geometry.h"
 #include "mesh/topology.h"
+#include "remesh/improve_patch.h"
 
 namespace bisector {
 namespace {
@@ -20,6 +23,11 @@ constexpr double kFirstStep = 0.25, kLeastStep = 0.02;
 constexpr int kDirections = 6;
 // What a triangle's normal may turn by when it changes: less than a right angle.
 constexpr double kLeastCosine = 0.2;
+// Radians: an angle below the first makes a sliver, one below the second costs. Rounds over all slivers, and how far
+// around one angles are looked at, in edges.
+constexpr double kSliver = std::numbers::pi / 6, kCheap = std::numbers::pi / 5;
+constexpr int kRounds = 4, kPatchRings = 3, kPatchSweeps = 3;
+constexpr double kBetter = 0.98;  // of what the angles around cost: a change that brings less is not made
 // Polygons of more corners are not filled anew: the time goes with the cube.
 constexpr std::size_t kMostCorners = 64;
 
@@ -35,7 +43,7 @@ double angle_at(const Vec3& p, const Vec3& q, const Vec3& r) {
 
 class Mender {
  public:
-  Mender(TriangleMesh& mesh, const WholeEdgesOptions& options)
+  Mender(TriangleMesh& mesh, WholeEdgesOptions& options)
       : mesh_(mesh), options_(options), stars_(mesh.vertices.size()), alive_(mesh.triangles.size(), 1) {
     for (const auto& [a, b] : options.locked) locked_.insert(sorted_edge(a, b));
     for (Index t = 0; t < mesh.triangles.size(); ++t)
@@ -43,6 +51,11 @@ class Mender {
   }
 
   void take_out_inner(VertexChain chain) {
+    near_.insert(near_.end(), {chain.front(), chain.back()});
+    if (chain.size() == 2) {
+      locked_.insert(sorted_edge(chain.front(), chain.back()));
+      return;
+    }
     touched_.insert(touched_.end(), chain.begin(), chain.end());
     for (bool any = true; any && chain.size() > 2;) {
       any = false;
@@ -58,15 +71,19 @@ class Mender {
     for (std::size_t k = 0; k + 1 < chain.size(); ++k) locked_.insert(sorted_edge(chain[k], chain[k + 1]));
   }
 
-  void improve() {
-    const std::vector<Index> near = ring(touched_, kRings);
-    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+  void improve() { improve(ring(touched_, kRings), kSweeps); }
+
+  // Flips and moves over these vertices.
+  void improve(const std::vector<Index>& near, int sweeps) {
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
       for (const Index v : near) flip_at(v);
       for (const Index v : near)
         if (options_.movable[v]) move(v);
     }
     for (const Index v : near) flip_at(v);
   }
+
+  void mend_slivers();
 
   void drop_dead() {
     std::size_t kept = 0;
@@ -114,6 +131,7 @@ class Mender {
   }
 
   bool are_neighbours(Index a, Index b) const {
+    if (apart_.contains(sorted_edge(a, b))) return true;
     return std::any_of(stars_[a].begin(), stars_[a].end(), [&](Index t) { return has(mesh_.triangles[t], b); });
   }
   std::vector<Index> triangles_at(Index a, Index b) const {
@@ -341,21 +359,206 @@ class Mender {
       }
   }
 
+  // Puts a vertex into the edge between two others; false if it is locked, or no edge of two triangles.
+  bool split(Index a, Index b) {
+    if (locked_.contains(sorted_edge(a, b))) return false;
+    const std::vector<Index> both = triangles_at(a, b);
+    if (both.size() != 2) return false;
+    const Index m = add_vertex(0.5 * (at(a) + at(b)));
+    for (const Index t : both) {
+      Triangle first = mesh_.triangles[t], second = first;
+      std::replace(first.begin(), first.end(), b, m);
+      std::replace(second.begin(), second.end(), a, m);
+      replace({{t}, {}}, {first, second});
+    }
+    return true;
+  }
+
+  void insert(Index t) {
+    const auto [a, b, c] = mesh_.triangles[t];
+    const Index m = add_vertex((1.0 / 3) * (at(a) + at(b) + at(c)));
+    replace({{t}, {}}, {{a, b, m}, {b, c, m}, {c, a, m}});
+  }
+
+  Index add_vertex(const Vec3& p) {
+    mesh_.vertices.push_back(options_.project(p));
+    stars_.emplace_back();
+    options_.movable.push_back(1);
+    return static_cast<Index>(mesh_.vertices.size() - 1);
+  }
+
+  // Whether two locked edges enclose the smallest angle.
+  bool is_imposed(const Triangle& t) const {
+    const std::array<Vec3, 3> corners{at(t[0]), at(t[1]), at(t[2])};
+    std::array<bool, 3> locked{};
+    for (std::size_t k = 0; k < 3; ++k) locked[k] = locked_.contains(sorted_edge(t[k], t[(k + 1) % 3]));
+    return angle_is_imposed(corners, locked);
+  }
+
+  bool is_sliver(Index t) const {
+    return alive_[t] && smallest_angle(mesh_.triangles[t]) < kSliver && !is_imposed(mesh_.triangles[t]);
+  }
+
+  // By the angles that are too small, the least of them counting most.
+  double cost() const {
+    double sum = 0;
+    for (Index t = 0; t < mesh_.triangles.size(); ++t) {
+      if (!alive_[t] || is_imposed(mesh_.triangles[t])) continue;
+      const double under = std::max(0.0, kCheap - smallest_angle(mesh_.triangles[t]));
+      sum += under * under * under;
+    }
+    return sum;
+  }
+
+  struct Patch;
+  Patch patch_around(Index t) const;
+  void take(const Patch& patch);
+  bool mend(Index t);
+
   TriangleMesh& mesh_;
-  const WholeEdgesOptions& options_;
+  WholeEdgesOptions& options_;
   std::set<Edge> locked_;
+  std::set<Edge> apart_;                   // vertices that are neighbours outside of the mesh
   std::vector<std::vector<Index>> stars_;  // triangles at each vertex
   std::vector<char> alive_;                // of the triangles
-  std::vector<Index> touched_;
+  std::vector<Index> touched_;             // of chains that were divided
+  std::vector<Index> near_;                // ends of all chains
 };
+
+// What lies around a sliver, with vertices of its own, to try changes on.
+struct Mender::Patch {
+  TriangleMesh mesh;
+  WholeEdgesOptions options;
+  std::set<Edge> apart;
+  std::vector<Index> vertices, triangles;  // what they are in the whole mesh; none for those added
+  Index sliver = 0;
+};
+
+Mender::Patch Mender::patch_around(Index t) const {
+  Patch patch;
+  const Triangle& corners = mesh_.triangles[t];
+  patch.vertices = ring({corners.begin(), corners.end()}, kPatchRings);
+  const auto place = [&](Index v) {
+    const auto found = std::lower_bound(patch.vertices.begin(), patch.vertices.end(), v);
+    return found == patch.vertices.end() || *found != v ? kNone : static_cast<Index>(found - patch.vertices.begin());
+  };
+  for (const Index v : patch.vertices) {
+    patch.mesh.vertices.push_back(at(v));
+    bool inside = true;
+    for (const Index star : stars_[v]) {
+      Triangle local = mesh_.triangles[star];
+      for (Index& w : local) w = place(w);
+      const bool whole = std::find(local.begin(), local.end(), kNone) == local.end();
+      inside = inside && whole;
+      if (!whole || mesh_.triangles[star][0] != v) continue;
+      if (star == t) patch.sliver = static_cast<Index>(patch.mesh.triangles.size());
+      patch.triangles.push_back(star);
+      patch.mesh.triangles.push_back(local);
+      if (!mesh_.labels.empty()) patch.mesh.labels.push_back(mesh_.labels[star]);
+    }
+    patch.options.movable.push_back(inside && options_.movable[v]);
+  }
+  for (const Index v : patch.vertices)
+    for (const Index w : neighbours(v)) {
+      const Index a = place(v), b = place(w);
+      if (b == kNone || b < a) continue;
+      if (locked_.contains(sorted_edge(v, w))) patch.options.locked.push_back({a, b});
+      patch.apart.insert({a, b});
+    }
+  for (const Triangle& local : patch.mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) patch.apart.erase(sorted_edge(local[k], local[(k + 1) % 3]));
+  patch.options.project = options_.project;
+  return patch;
+}
+
+// In place of what the whole mesh has there.
+void Mender::take(const Patch& patch) {
+  for (const Index t : patch.triangles) {
+    alive_[t] = 0;
+    for (const Index v : mesh_.triangles[t]) std::erase(stars_[v], t);
+  }
+  std::vector<Index> name = patch.vertices;
+  for (std::size_t v = 0; v < patch.mesh.vertices.size(); ++v) {
+    if (v >= name.size()) name.push_back(add_vertex(patch.mesh.vertices[v]));
+    mesh_.vertices[name[v]] = patch.mesh.vertices[v];
+  }
+  for (std::size_t i = 0; i < patch.mesh.triangles.size(); ++i) {
+    Triangle t = patch.mesh.triangles[i];
+    for (Index& v : t) v = name[v];
+    const auto added = static_cast<Index>(mesh_.triangles.size());
+    mesh_.triangles.push_back(t);
+    if (!mesh_.labels.empty()) mesh_.labels.push_back(patch.mesh.labels[i]);
+    alive_.push_back(1);
+    for (const Index v : t) stars_[v].push_back(added);
+  }
+}
+
+// The best of all changes to the sliver and what is beside it, if one is better than none.
+bool Mender::mend(Index t) {
+  const Patch given = patch_around(t);
+  const Triangle& corners = given.mesh.triangles[given.sliver];
+  double least = 0;
+  {
+    Patch same = given;
+    least = kBetter * Mender(same.mesh, same.options).cost();
+  }
+  Patch best;
+  const auto attempt = [&](const std::function<bool(Mender&)>& change) {
+    Patch patch = given;
+    Mender mender(patch.mesh, patch.options);
+    mender.apart_ = given.apart;
+    if (!change(mender)) return;
+    std::vector<Index> all(patch.mesh.vertices.size());
+    std::iota(all.begin(), all.end(), Index{0});
+    std::erase_if(all, [&](Index v) { return mender.stars_[v].empty(); });
+    mender.improve(all, kPatchSweeps);
+    const double now = mender.cost();
+    if (now >= least) return;
+    least = now;
+    mender.drop_dead();
+    best = std::move(patch);
+  };
+  attempt([](Mender&) { return true; });
+  std::vector<Index> around(corners.begin(), corners.end());
+  {
+    Patch same = given;
+    around = Mender(same.mesh, same.options).ring(around, 1);
+  }
+  for (const Index v : around)
+    if (given.options.movable[v]) attempt([v](Mender& mender) { return mender.take_out(v); });
+  for (std::size_t k = 0; k < 3; ++k)
+    attempt([&, k](Mender& mender) { return mender.split(corners[k], corners[(k + 1) % 3]); });
+  attempt([&](Mender& mender) {
+    mender.insert(given.sliver);
+    return true;
+  });
+  if (best.mesh.triangles.empty()) return false;
+  take(best);
+  return true;
+}
+
+void Mender::mend_slivers() {
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::pair<double, Index>> slivers;
+    for (const Index v : ring(near_, 1))
+      for (const Index t : stars_[v])
+        if (is_sliver(t)) slivers.push_back({smallest_angle(mesh_.triangles[t]), t});
+    std::sort(slivers.begin(), slivers.end());
+    slivers.erase(std::unique(slivers.begin(), slivers.end()), slivers.end());
+    bool any = false;
+    for (const auto& [angle, t] : slivers)
+      if (alive_[t]) any = mend(t) || any;
+    if (!any) return;
+  }
+}
 
 }  // namespace
 
-void make_whole(TriangleMesh& mesh, const std::vector<VertexChain>& chains, const WholeEdgesOptions& options) {
+void make_whole(TriangleMesh& mesh, const std::vector<VertexChain>& chains, WholeEdgesOptions options) {
   Mender mender(mesh, options);
-  for (const VertexChain& chain : chains)
-    if (chain.size() > 2) mender.take_out_inner(chain);
+  for (const VertexChain& chain : chains) mender.take_out_inner(chain);
   mender.improve();
+  mender.mend_slivers();
   mender.drop_dead();
 }
 

@@ -23,6 +23,9 @@ struct WholeEdgesOptions {
 // that are nearer to the edge than its half length are taken out first. Then edges around are flipped to be Delaunay,
 // and movable vertices go to where the smallest angle of their triangles is largest. Vertices that were taken out stay
 // in mesh.vertices; labels follow their triangles. Edges that could not be made whole stay divided.
-void make_whole(TriangleMesh& mesh, const std::vector<VertexChain>& chains, const WholeEdgesOptions& options);
+// Last, triangles near the chains with an angle below 30 degrees that two locked edges do not enclose are mended one by
+// one: a movable vertex around is taken out, or one is put into an edge or the triangle, if the angles around are
+// better once flips and moves have followed. Vertices that are put in come last in mesh.vertices.
+void make_whole(TriangleMesh& mesh, const std::vector<VertexChain>& chains, WholeEdgesOptions options);
 
 }  // namespace bisector

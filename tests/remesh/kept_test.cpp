@@ -191,7 +191,7 @@ TEST(AddCorners, DividesCurvesWhereTheyPass) {
 // A square in a fan around a vertex on its lower edge: without it the edge is whole, and the area is what it was.
 TEST(MakeWhole, TakesVerticesOutOfAnEdge) {
   TriangleMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {0.2, 0, 0}, {0.6, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0.5, 1.2, 0}, {0, 1, 0}};
+  mesh.vertices = {{0, 0, 0}, {0.2, 0, 0}, {0.6, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0.5, 1.6, 0}, {0, 1, 0}};
   mesh.triangles = {{0, 1, 6}, {1, 5, 6}, {1, 2, 5}, {2, 4, 5}, {2, 3, 4}};
   WholeEdgesOptions options;
   options.movable.assign(7, 0);
@@ -204,8 +204,34 @@ TEST(MakeWhole, TakesVerticesOutOfAnEdge) {
     area += triangle_area(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
     used.insert(t.begin(), t.end());
   }
-  EXPECT_NEAR(area, 1.1, 1e-12);
+  EXPECT_NEAR(area, 1.3, 1e-12);
   EXPECT_EQ(used, (std::set<Index>{0, 3, 4, 5, 6}));
+}
+
+// A vertex close to an edge that stays, alone or with another beside it.
+TEST(MakeWhole, MendsSliversBesideAnEdge) {
+  for (const bool two : {false, true}) {
+    TriangleMesh mesh;
+    mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.05, 0}};
+    mesh.triangles = {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
+    if (two) {
+      mesh.vertices.push_back({0.55, 0.1, 0});
+      mesh.triangles = {{0, 1, 4}, {1, 5, 4}, {1, 2, 5}, {2, 3, 5}, {3, 4, 5}, {3, 0, 4}};
+    }
+    WholeEdgesOptions options;
+    options.movable = {0, 0, 0, 0, 1, 1};
+    options.project = [](const Vec3& p) { return p; };
+    make_whole(mesh, {{0, 1}}, options);
+    double area = 0;
+    bool has_edge = false;
+    for (const Triangle& t : mesh.triangles) {
+      area += triangle_area(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
+      has_edge = has_edge || (std::count(t.begin(), t.end(), Index{0}) && std::count(t.begin(), t.end(), Index{1}));
+    }
+    EXPECT_NEAR(area, 1, 1e-12);
+    EXPECT_TRUE(has_edge);
+    EXPECT_GT(measure_quality(mesh).theta_min, 30);
+  }
 }
 
 }  // namespace
