@@ -122,7 +122,7 @@ BISECTOR_API TetResult tetrahedralise(const TriangleMesh& surface, const TetOpti
 
 // Meshes the domain of a tetrahedral mesh anew, whose boundary must be a closed manifold that does not cross itself.
 // The interfaces between its regions are remeshed as the boundary is and kept: each of their triangles has a
-// tetrahedron of either region. What hangs together of a region must be bounded by closed manifolds, too.
+// tetrahedron of either region.
 BISECTOR_API TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const Context& context = {});
 
 }  // namespace bisector

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numeric>
@@ -17,7 +18,6 @@
 #include "mesh/tet_topology.h"
 #include "remesh/remesh.h"
 #include "remesh/sizing.h"
-#include "tetmesh/check_surface.h"
 #include "tetmesh/conform.h"
 #include "tetmesh/free_phase.h"
 #include "tetmesh/inner_phase.h"
@@ -49,34 +49,46 @@ Context step_of(const Context& context, double from, double to, std::string name
   return step;
 }
 
-// The closed surface around a part.
+// The closed surface around a part, which may touch itself.
 struct PartBoundary {
-  TriangleMesh surface;         // oriented, seen from outside the part
+  TriangleMesh surface;         // counter-clockwise seen from outside the part
   std::vector<Index> vertices;  // the walls' vertex of each
 };
 
-// `patch_of` is of each triangle of the walls. Throws Error if it is no closed manifold.
+// `patch_of` is of each triangle of the walls.
 PartBoundary boundary_of_part(const TriangleMesh& walls, const std::vector<std::int32_t>& patch_of,
                               const std::vector<Walls::Patch>& patches, Index part) {
   PartBoundary boundary;
-  TriangleMesh surface;
   std::vector<Index> place(walls.vertices.size(), kNone);
   for (std::size_t t = 0; t < walls.triangles.size(); ++t) {
     const Walls::Patch& patch = patches[static_cast<std::size_t>(patch_of[t])];
     if (patch.back != part && patch.front != part) continue;
     Triangle triangle = walls.triangles[t];
+    if (patch.front == part) std::swap(triangle[1], triangle[2]);
     for (Index& v : triangle) {
       if (place[v] == kNone) {
-        place[v] = static_cast<Index>(surface.vertices.size());
-        surface.vertices.push_back(walls.vertices[v]);
+        place[v] = static_cast<Index>(boundary.surface.vertices.size());
+        boundary.surface.vertices.push_back(walls.vertices[v]);
         boundary.vertices.push_back(v);
       }
       v = place[v];
     }
-    surface.triangles.push_back(triangle);
+    boundary.surface.triangles.push_back(triangle);
   }
-  boundary.surface = check_surface(surface);
   return boundary;
+}
+
+// Whether as many triangles run along each edge one way as the other.
+bool is_closed(const TriangleMesh& surface) {
+  std::vector<std::array<Index, 2>> forth, back;
+  for (const Triangle& t : surface.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      forth.push_back({t[k], t[(k + 1) % 3]});
+      back.push_back({t[(k + 1) % 3], t[k]});
+    }
+  std::sort(forth.begin(), forth.end());
+  std::sort(back.begin(), back.end());
+  return !forth.empty() && forth == back;
 }
 
 // The tetrahedra of a part with the edge lengths there; where they are all the same, that is the uniform one.
@@ -123,7 +135,6 @@ class RegionMesher {
 
  private:
   std::string name_of(Index part) const;
-  void check_parts() const;
   void plan();
   void remesh_walls();
   bool take_walls(RemeshResult remeshed, bool last);
@@ -151,16 +162,6 @@ std::string RegionMesher::name_of(Index part) const {
   const std::int32_t region = given_.regions[part];
   const auto name = mesh_.region_names.find(region);
   return name == mesh_.region_names.end() ? fmt::format("region {}", region) : fmt::format("region '{}'", name->second);
-}
-
-void RegionMesher::check_parts() const {
-  for (Index part = 0; part < given_.regions.size(); ++part) {
-    try {
-      boundary_of_part(given_.surface, given_.surface.labels, given_.patches, part);
-    } catch (const Error& error) {
-      throw Error(fmt::format("the walls of {}: {}", name_of(part), error.what()));
-    }
-  }
 }
 
 // Edges that are given are features of the walls as marked ones are.
@@ -210,7 +211,7 @@ void RegionMesher::remesh_walls() {
   }
 }
 
-// False if they do not bound the parts.
+// False if they do not bound the parts, and there is another try.
 bool RegionMesher::take_walls(RemeshResult remeshed, bool last) {
   remeshed_ = std::exchange(remeshed.mesh, {});
   result_.iterations += remeshed.iterations;
@@ -220,13 +221,21 @@ bool RegionMesher::take_walls(RemeshResult remeshed, bool last) {
   result_.device = remeshed.device;
   result_.boundary = std::move(remeshed);
   boundaries_.clear();
+  const std::size_t crossings = count_self_intersections(remeshed_, context_);
+  if (crossings > 0) {
+    if (!last) return false;
+    throw Error(fmt::format(
+        "the walls of the result cross each other at {} pairs of triangles: parts are thinner than their edges; ask "
+        "for more vertices",
+        crossings));
+  }
   for (Index part = 0; part < walls_.regions.size(); ++part) {
-    try {
-      boundaries_.push_back(boundary_of_part(remeshed_, remeshed_.labels, walls_.patches, part));
-    } catch (const Error& error) {
-      if (!last) return false;
-      throw Error(fmt::format("the walls of {} in the result: {}; ask for more vertices", name_of(part), error.what()));
-    }
+    boundaries_.push_back(boundary_of_part(remeshed_, remeshed_.labels, walls_.patches, part));
+    if (is_closed(boundaries_.back().surface)) continue;
+    if (!last) return false;
+    throw Error(fmt::format(
+        "the walls of {} are not closed in the result: parts of it are thinner than their edges; ask for more vertices",
+        name_of(part)));
   }
   return true;
 }
@@ -367,7 +376,6 @@ void RegionMesher::mark_walls() {
 
 TetResult RegionMesher::run() {
   const Stopwatch watch;
-  check_parts();
   plan();
   result_.seconds.prepare = watch.seconds();
   remesh_walls();

@@ -7,8 +7,8 @@
 
 namespace bisector {
 
-// `walls` are the solid's, with interfaces. Slivers are not removed yet. Throws as tetrahedralise(), and Error, naming
-// the region, if the boundary of a part is no closed manifold.
+// `walls` are the solid's, with interfaces. Slivers are not removed yet. Throws as tetrahedralise(), and Error where
+// the walls of the result bound the parts no longer, however many more vertices they get.
 TetResult mesh_regions(const TetMesh& mesh, const Walls& walls, const TetOptions& options, const Context& context);
 
 }  // namespace bisector
