@@ -30,4 +30,28 @@ std::vector<TetSide> sorted_sides(const std::vector<Tetrahedron>& tets);
 // Error, naming the first, if a facet has more than two tetrahedra.
 std::vector<std::array<Index, 4>> tet_adjacency(const std::vector<Tetrahedron>& tets);
 
+// What hangs together through the facets k of tetrahedra t for which joined(t, k) holds; it is asked of facets with a
+// tetrahedron on the other side only. The part of each tetrahedron, numbered by their first ones.
+template <class Joined>
+std::vector<Index> tet_parts(const std::vector<std::array<Index, 4>>& adjacent, const Joined& joined) {
+  std::vector<Index> part(adjacent.size(), kNone), stack;
+  Index parts = 0;
+  for (Index first = 0; first < part.size(); ++first) {
+    if (part[first] != kNone) continue;
+    part[first] = parts++;
+    stack.assign(1, first);
+    while (!stack.empty()) {
+      const Index t = stack.back();
+      stack.pop_back();
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Index other = adjacent[t][k];
+        if (other == kNone || part[other] != kNone || !joined(t, k)) continue;
+        part[other] = part[t];
+        stack.push_back(other);
+      }
+    }
+  }
+  return part;
+}
+
 }  // namespace bisector

@@ -152,6 +152,7 @@ class RegionMesher {
   SolidPlan plan_;
   Walls walls_;                           // of the solid refined for its sizes
   std::vector<SizedSolid> parts_;         // the refined solid's
+  std::vector<Index> part_of_seed_;       // of those given
   TriangleMesh remeshed_;                 // walls of the result
   std::vector<PartBoundary> boundaries_;  // of the parts of the result
   std::vector<std::size_t> inside_;       // sites of each part that are on no wall, as wanted
@@ -177,6 +178,10 @@ void RegionMesher::plan() {
       marked, surface, [](const TetMesh& refined) { return find_walls(refined).surface; }, options_);
   walls_ = find_walls(plan_.sized.mesh);
   for (Index part = 0; part < walls_.regions.size(); ++part) parts_.push_back(sized_part(plan_.sized, walls_, part));
+  if (!options_.seeds.empty()) {
+    const TetLocator locator(plan_.sized.mesh);
+    for (const Vec3& seed : options_.seeds) part_of_seed_.push_back(walls_.part_of_tet[locator.nearest(seed)]);
+  }
   result_.wanted = options_.seeds.empty() ? plan_.sized.vertices : options_.seeds.size();
   result_.edge_length = plan_.sized.edge_length;
   result_.background_tets = plan_.sized.mesh.tets.size();
@@ -263,9 +268,8 @@ std::vector<Vec3> RegionMesher::sites_inside(Index part) {
   if (!sized.lengths.empty()) options.sizing.sizes = {sized.mesh.vertices, sized.lengths, sized.mesh.tets};
   options.seeds.clear();
   if (!options_.seeds.empty()) {
-    const TetLocator locator(plan_.sized.mesh);
-    for (const Vec3& seed : options_.seeds)
-      if (walls_.part_of_tet[locator.nearest(seed)] == part) options.seeds.push_back(seed);
+    for (std::size_t i = 0; i < options_.seeds.size(); ++i)
+      if (part_of_seed_[i] == part) options.seeds.push_back(options_.seeds[i]);
     if (options.seeds.empty()) return {};
   }
   const Solid solid(sized.mesh, sized.volume_density());
@@ -346,31 +350,22 @@ void RegionMesher::fill(Index part) {
 // The walls as marked triangles, those between regions facing away from that of the lower number.
 void RegionMesher::mark_walls() {
   TetMesh& mesh = result_.mesh;
+  mesh.boundary = remeshed_.triangles;
+  for (const std::int32_t patch : remeshed_.labels)
+    mesh.boundary_labels.push_back(walls_.patches[static_cast<std::size_t>(patch)].label);
   const Walls walls = find_walls(mesh);
   mesh.boundary = walls.surface.triangles;
+  mesh.boundary_labels.clear();
+  bool labelled = false;
   for (std::size_t t = 0; t < mesh.boundary.size(); ++t) {
     const Walls::Patch& patch = walls.patches[static_cast<std::size_t>(walls.surface.labels[t])];
+    mesh.boundary_labels.push_back(patch.label);
+    labelled = labelled || patch.label != 0;
     if (patch.front == kNone) continue;
     ++result_.interface_triangles;
     if (walls.regions[patch.front] < walls.regions[patch.back]) std::swap(mesh.boundary[t][1], mesh.boundary[t][2]);
   }
-  std::vector<std::pair<Triangle, std::int32_t>> labels;
-  for (std::size_t t = 0; t < remeshed_.triangles.size(); ++t) {
-    Triangle corners = remeshed_.triangles[t];
-    std::sort(corners.begin(), corners.end());
-    labels.push_back({corners, walls_.patches[static_cast<std::size_t>(remeshed_.labels[t])].label});
-  }
-  std::sort(labels.begin(), labels.end());
-  const bool labelled = std::any_of(labels.begin(), labels.end(), [](const auto& label) { return label.second != 0; });
-  for (Triangle corners : mesh.boundary) {
-    if (!labelled) break;
-    std::sort(corners.begin(), corners.end());
-    const auto at = std::lower_bound(labels.begin(), labels.end(), corners,
-                                     [](const auto& label, const Triangle& c) { return label.first < c; });
-    if (at == labels.end() || at->first != corners)
-      throw Error("a triangle between regions is none of their walls; please report this as a bug");
-    mesh.boundary_labels.push_back(at->second);
-  }
+  if (!labelled) mesh.boundary_labels.clear();
   mesh.feature_edges = remeshed_.feature_edges;
 }
 

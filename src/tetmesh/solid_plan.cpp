@@ -13,8 +13,6 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kFewest = 8;  // vertices or seeds that a result can be made of
-
 // `plan.sized` is the solid refined for sizes without details.
 void plan_surface(const TriangleMesh& surface, const SurfaceOf& surface_of, const TetOptions& options,
                   SolidPlan& plan) {
@@ -46,18 +44,6 @@ SolidPlan plan_solid(const TetMesh& mesh, const TriangleMesh& surface, const Sur
     throw Error(fmt::format("edges of {:.6g} make {} vertices, fewer than {}; ask for shorter ones",
                             options.edge_length, plan.sized.vertices, kFewest));
   return plan;
-}
-
-void check_options(const TetOptions& options) {
-  if (!options.seeds.empty()) {
-    if (options.seeds.size() < kFewest)
-      throw Error(fmt::format("a tetrahedral mesh needs at least {} seeds; give more", kFewest));
-    return;
-  }
-  if ((options.vertices > 0) == (options.edge_length > 0))
-    throw Error("ask for a number of vertices or for an edge length, and not for both");
-  if (options.edge_length == 0 && options.vertices < kFewest)
-    throw Error(fmt::format("a tetrahedral mesh needs at least {} vertices; ask for more", kFewest));
 }
 
 }  // namespace bisector

@@ -1,6 +1,7 @@
 // Edge lengths of a solid, and what becomes of the features of its surface, before sites are placed.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 
@@ -9,6 +10,8 @@
 #include "tetmesh/tet_sizing.h"
 
 namespace bisector {
+
+inline constexpr std::size_t kFewest = 8;  // vertices or seeds that a result can be made of
 
 struct SolidPlan {
   SizedSolid sized;
@@ -26,8 +29,5 @@ using SurfaceOf = std::function<TriangleMesh(const TetMesh&)>;
 // and if the result would have too few vertices.
 SolidPlan plan_solid(const TetMesh& mesh, const TriangleMesh& surface, const SurfaceOf& surface_of,
                      const TetOptions& options);
-
-// Throws Error unless the options ask for one thing, and enough of it.
-void check_options(const TetOptions& options);
 
 }  // namespace bisector

@@ -301,26 +301,11 @@ void turn_positive(const std::vector<Vec3>& vertices, std::vector<Tetrahedron>& 
 
 // Numbers from 1 for parts that share no facet; empty if there is one only.
 std::vector<std::int32_t> number_parts(const std::vector<Tetrahedron>& tets) {
-  const std::vector<std::array<Index, 4>> adjacent = tet_adjacency(tets);
-  std::vector<std::int32_t> part(tets.size(), 0);
-  std::int32_t parts = 0;
-  std::vector<Index> stack;
-  for (Index start = 0; start < tets.size(); ++start) {
-    if (part[start] != 0) continue;
-    part[start] = ++parts;
-    stack.push_back(start);
-    while (!stack.empty()) {
-      const Index t = stack.back();
-      stack.pop_back();
-      for (const Index other : adjacent[t]) {
-        if (other == kNone || part[other] != 0) continue;
-        part[other] = parts;
-        stack.push_back(other);
-      }
-    }
-  }
-  if (parts == 1) part.clear();
-  return part;
+  const std::vector<Index> part = tet_parts(tet_adjacency(tets), [](Index, std::size_t) { return true; });
+  std::vector<std::int32_t> number;
+  if (std::all_of(part.begin(), part.end(), [](Index p) { return p == 0; })) return number;
+  for (const Index p : part) number.push_back(static_cast<std::int32_t>(p) + 1);
+  return number;
 }
 
 // Leaves out Steiner points that no tetrahedron uses, which lie in cavities. Returns how many stay.
@@ -447,29 +432,14 @@ bool faces_away(const Triangle& triangle, Triangle facet) {
   return facet == triangle;
 }
 
-// A part for each tetrahedron: what hangs together through facets that are no walls.
+// What hangs together through facets that are no walls.
 std::vector<Index> parts_between(const std::vector<std::array<Index, 4>>& adjacent,
                                  const std::vector<std::array<Index, 4>>& wall) {
-  std::vector<Index> part(adjacent.size(), kNone), queue;
-  Index parts = 0;
-  for (Index first = 0; first < part.size(); ++first) {
-    if (part[first] != kNone) continue;
-    queue.assign(1, first);
-    part[first] = parts++;
-    while (!queue.empty()) {
-      const Index t = queue.back();
-      queue.pop_back();
-      for (std::size_t k = 0; k < 4; ++k) {
-        const Index other = adjacent[t][k];
-        if (wall[t][k] == kNone && other == kNone)
-          throw Error(fmt::format("TetGen's tetrahedra have holes; {}", kSimplify));
-        if (wall[t][k] != kNone || part[other] != kNone) continue;
-        part[other] = part[t];
-        queue.push_back(other);
-      }
-    }
-  }
-  return part;
+  for (std::size_t t = 0; t < wall.size(); ++t)
+    for (std::size_t k = 0; k < 4; ++k)
+      if (wall[t][k] == kNone && adjacent[t][k] == kNone)
+        throw Error(fmt::format("TetGen's tetrahedra have holes; {}", kSimplify));
+  return tet_parts(adjacent, [&](Index t, std::size_t k) { return wall[t][k] == kNone; });
 }
 
 }  // namespace

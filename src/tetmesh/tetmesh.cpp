@@ -39,6 +39,18 @@ constexpr double kGoalBeyond = 5;  // degrees: aiming a little higher than asked
 // Fractions of the whole run, about, for progress.
 constexpr double kPlaced = 0.82, kExtracted = 0.85;
 
+void check_options(const TetOptions& options) {
+  if (!options.seeds.empty()) {
+    if (options.seeds.size() < kFewest)
+      throw Error(fmt::format("a tetrahedral mesh needs at least {} seeds; give more", kFewest));
+    return;
+  }
+  if ((options.vertices > 0) == (options.edge_length > 0))
+    throw Error("ask for a number of vertices or for an edge length, and not for both");
+  if (options.edge_length == 0 && options.vertices < kFewest)
+    throw Error(fmt::format("a tetrahedral mesh needs at least {} vertices; ask for more", kFewest));
+}
+
 // The finished boundary, whose vertices are the first of the run's sites.
 struct FinishedBoundary {
   RemeshResult surface;

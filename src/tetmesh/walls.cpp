@@ -51,24 +51,9 @@ Walls find_walls(const TetMesh& mesh) {
   Walls walls;
   const std::vector<std::array<Index, 4>> adjacent = tet_adjacency(mesh.tets);
   const auto region = [&](Index t) { return mesh.regions.empty() ? 0 : mesh.regions[t]; };
-  walls.part_of_tet.assign(mesh.tets.size(), kNone);
-  std::vector<Index> queue;
-  for (Index first = 0; first < mesh.tets.size(); ++first) {
-    if (walls.part_of_tet[first] != kNone) continue;
-    const auto part = static_cast<Index>(walls.regions.size());
-    walls.regions.push_back(region(first));
-    walls.part_of_tet[first] = part;
-    queue.assign(1, first);
-    while (!queue.empty()) {
-      const Index t = queue.back();
-      queue.pop_back();
-      for (const Index other : adjacent[t]) {
-        if (other == kNone || walls.part_of_tet[other] != kNone || region(other) != region(t)) continue;
-        walls.part_of_tet[other] = part;
-        queue.push_back(other);
-      }
-    }
-  }
+  walls.part_of_tet = tet_parts(adjacent, [&](Index t, std::size_t k) { return region(adjacent[t][k]) == region(t); });
+  for (Index t = 0; t < mesh.tets.size(); ++t)
+    if (walls.part_of_tet[t] == walls.regions.size()) walls.regions.push_back(region(t));
 
   walls.surface.vertices = mesh.vertices;
   walls.surface.feature_edges = mesh.feature_edges;
