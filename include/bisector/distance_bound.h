@@ -12,7 +12,8 @@ namespace bisector {
 // How far a point of a triangle is from a surface at most: a length between these two, in the mesh's unit.
 struct TriangleDistance {
   double lower = 0, upper = 0;
-  Vec3 farthest;  // the point that `lower` is of
+  Vec3 farthest;          // the point that `lower` is of
+  Index nearest = kNone;  // the triangle of the surface that is nearest to it
 };
 
 // Of each triangle of `from`. The distance to one triangle is convex, so that on a part of another it is largest in a

@@ -58,7 +58,6 @@ class Divider {
 
   TriangleDistance run(const std::array<Vec3, 3>& corners) {
     found_ = {};
-    found_.farthest = corners[0];
     std::array<Corner, 3> part;
     part[0] = corner_at(corners[0], target_.nearest(corners[0]));
     for (std::size_t k = 1; k < 3; ++k) part[k] = corner_at(corners[k], target_.nearest(corners[k], part[0].near));
@@ -69,9 +68,10 @@ class Divider {
  private:
   Corner corner_at(const Vec3& p, const NearestPoint& near) {
     const Corner corner{p, near, norm(p - near.point)};
-    if (corner.distance > found_.lower) {
+    if (corner.distance > found_.lower || found_.nearest == kNone) {
       found_.lower = corner.distance;
       found_.farthest = p;
+      found_.nearest = near.triangle;
     }
     return corner;
   }

@@ -9,7 +9,6 @@
 #include "core/parallel.h"
 #include "features/size_field.h"
 #include "remesh/detail.h"
-#include "spatial/nearest.h"
 
 namespace bisector {
 namespace {
@@ -56,11 +55,10 @@ Deviation find_deviation(const TriangleMesh& result, const TriangleMesh& input, 
   const double near = kNear * aim * most, gap = kGap * most;
   const std::vector<TriangleDistance> forth = bound_distances(result, input, near, gap, context);
   for (std::size_t t = 0; t < off.size(); ++t) off[t] = forth[t].upper;
-  const NearestOnMesh nearest(result);
   for (const TriangleDistance& back : bound_distances(input, result, near, gap, context)) {
     deviation.upper = std::max(deviation.upper, back.upper);
     if (back.upper <= near) continue;
-    double& there = off[nearest.nearest(back.farthest).triangle];
+    double& there = off[back.nearest];
     there = std::max(there, back.upper);
   }
   for (std::size_t t = 0; t < off.size(); ++t) {

@@ -643,7 +643,6 @@ class Runs {
   // A result, and why another run would be better.
   struct Run {
     JudgedResult judged;
-    std::size_t vertices = 0;  // asked for
     AnotherRun next;
   };
 
@@ -667,7 +666,6 @@ class Runs {
   Spent spent_;
   std::optional<PlacedSeeds> earlier_;
   std::optional<JudgedResult> best_;
-  std::size_t vertices_ = 0;  // asked for, of the best
 };
 
 Runs::Run Runs::make_run(bool last) {
@@ -706,7 +704,7 @@ Runs::Run Runs::make_run(bool last) {
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
     spent_ = {pipeline.spent().totals, result.seconds};
-    Run run{judge(std::move(result)), plan.vertices, {}};
+    Run run{judge(std::move(result)), {}};
     last = last || !plan.constrained || plan.min_angle == 0;
     const Crossings crossings = last && !best_ ? Crossings{} : new_crossings_->of(run.judged.result.mesh);
     run.judged.crossings = crossings.pairs;
@@ -722,7 +720,6 @@ void Runs::settle() {
     Run run = make_run(left == 0);
     if (best_ && !is_better(run.judged, *best_)) return;
     best_ = std::move(run.judged);
-    vertices_ = run.vertices;
     if (left == 0 || !run.next.why) return;
     preparation_->bound(run.next.bounds);
     progress_.start_again(run.next.why);
@@ -733,10 +730,11 @@ void Runs::settle() {
 void Runs::come_near() {
   const double most = options_.distance_max;
   DistanceOutcome outcome;
-  outcome.most_vertices = options_.most_vertices > 0 ? options_.most_vertices : kMostTimes * vertices_;
+  std::size_t asked = best_->result.wanted;
+  outcome.most_vertices = options_.most_vertices > 0 ? options_.most_vertices : kMostTimes * asked;
   double aim = kFirstAim;
   Deviation best = find_deviation(best_->result.mesh, input_, most, aim, context_), last = best;
-  for (std::size_t asked = vertices_; best.upper > most && outcome.runs < kNearings; ++outcome.runs) {
+  for (; best.upper > most && outcome.runs < kNearings; ++outcome.runs) {
     const auto next = static_cast<std::size_t>(std::ceil(last.growth * static_cast<double>(asked)));
     if (last.bounds.points.empty() || asked >= outcome.most_vertices) break;
     asked = std::min(std::max(next, asked + 1), outcome.most_vertices);
@@ -750,11 +748,10 @@ void Runs::come_near() {
     if (last.upper >= best.upper || is_worse(run.judged, *best_)) continue;
     best = last;
     best_ = std::move(run.judged);
-    vertices_ = asked;
   }
   const HausdorffBounds bounds = bound_hausdorff_distance(best_->result.mesh, input_, kBoundsGap * most, context_);
   outcome.lower = bounds.lower;
-  outcome.upper = bounds.upper;
+  outcome.upper = std::min(bounds.upper, best.upper);
   best_->result.distance = outcome;
 }
 

@@ -497,11 +497,9 @@ void Mender::take(const Patch& patch) {
 bool Mender::mend(Index t) {
   const Patch given = patch_around(t);
   const Triangle& corners = given.mesh.triangles[given.sliver];
-  double least = 0;
-  {
-    Patch same = given;
-    least = kBetter * Mender(same.mesh, same.options).cost();
-  }
+  Patch as_it_is = given;
+  const Mender before(as_it_is.mesh, as_it_is.options);
+  double least = kBetter * before.cost();
   Patch best;
   const auto attempt = [&](const std::function<bool(Mender&)>& change) {
     Patch patch = given;
@@ -519,12 +517,7 @@ bool Mender::mend(Index t) {
     best = std::move(patch);
   };
   attempt([](Mender&) { return true; });
-  std::vector<Index> around(corners.begin(), corners.end());
-  {
-    Patch same = given;
-    around = Mender(same.mesh, same.options).ring(around, 1);
-  }
-  for (const Index v : around)
+  for (const Index v : before.ring({corners.begin(), corners.end()}, 1))
     if (given.options.movable[v]) attempt([v](Mender& mender) { return mender.take_out(v); });
   for (std::size_t k = 0; k < 3; ++k)
     attempt([&, k](Mender& mender) { return mender.split(corners[k], corners[(k + 1) % 3]); });
