@@ -184,8 +184,9 @@ typedef struct bisector_array {
  *   remesh   vertices (n, 3), faces (m, 3), labels (m, or none), feature_edges (k, 2), kept (n, or none:
  *            the mesh's vertex that each is, or 0xffffffff); with the option `map` map_faces (n: the mesh's face that
  *            each vertex is on) and map_weights (n, 3: of the corners of a triangle of that)
- *   tet      vertices, tets (t, 4), regions (t, or none), faces of the boundary, their labels, feature_edges; with the
- *            option `order` 2 edge_nodes (k, 3), the nodes on the edges node_edges (k, 2)
+ *   tet      vertices, tets (t, 4), regions (t, or none), faces (of the boundary and between regions), labels of
+ *            these, feature_edges; with the option `order` 2 edge_nodes (k, 3), the nodes on the edges
+ *            node_edges (k, 2)
  *   segment  vertices, faces, labels (the region of each face), feature_edges; with the option `polygons`
  *            polygon_vertices, polygon_corners, polygon_offsets, polygon_labels
  *   tree     vertices, faces, labels (the branch of each face); the skeleton's nodes (n, 3), node_radii, node_parents

@@ -24,8 +24,7 @@ BISECTOR_API void write_preview(const std::string& path, const std::vector<Vec3>
 BISECTOR_API void write_preview(const std::string& path, const TriangleMesh& mesh, const PreviewOptions& options = {});
 
 // Renders the mesh without the tetrahedra of the half that faces the camera, the cut in the colours of regions, or, of
-// one region, in another than the boundary.
-// Throws Error if the file cannot be written.
+// one region, in another than the boundary. Throws Error if the file cannot be written.
 BISECTOR_API void write_tet_preview(const std::string& path, const TetMesh& mesh);
 
 }  // namespace bisector

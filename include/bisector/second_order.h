@@ -36,9 +36,9 @@ struct SecondOrderReport {
 };
 
 // Nodes for the edges of a mesh whose boundary lies near a surface; interfaces between regions count as boundary, and
-// the surface has them then. Nodes inside are the middles of their edges; those
-// of the mesh's feature edges are the points nearest to these on the surface's `features`, if there are any, and others
-// on the boundary the nearest ones of the surface. Where an element's Jacobian would fall below a tenth of that of its
+// the surface has them then. Nodes inside are the middles of their edges; those of the mesh's feature edges are the
+// points nearest to these on the surface's `features`, if there are any, and others on the boundary the nearest ones of
+// the surface. Where an element's Jacobian would fall below a tenth of that of its
 // straight form, the nodes of its edges go back half way, until none does. The determinant is a cubic polynomial, and
 // its coefficients in Bernstein's form bound it (Johnen, Remacle and Geuzaine 2013, "Geometrical validity of
 // curvilinear finite elements", section 3), so that it is positive everywhere in each element. Throws Error if the

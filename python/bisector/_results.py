@@ -240,7 +240,8 @@ class RemeshResult(SurfaceResult, _WithData):
 
 
 class TetResult(SurfaceResult, _WithData):
-    """Tetrahedra. `faces` are the triangles of the boundary, and `labels` theirs; boundary vertices come first."""
+    """Tetrahedra. `faces` are the triangles of the boundary and of interfaces between regions, and `labels` theirs;
+    the vertices of these come first."""
 
     @property
     def cell_data(self) -> "dict[str, npt.NDArray[Any]]":

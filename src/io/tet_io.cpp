@@ -220,6 +220,7 @@ RequiredElements read_required(const std::string& path) {
   const bool binary = extension == ".meshb";
   if (!binary && extension != ".mesh") return {};
   const std::string bytes = read_bytes(path);
+  if (!binary && bytes.find("Required") == std::string::npos) return {};
   const TetSoup soup = (binary ? read_medit_binary : read_medit)(path, bytes);
   const auto indices = [&](const std::vector<std::int64_t>& listed, std::size_t count, const char* what) {
     std::vector<Index> found;
