@@ -41,7 +41,9 @@ std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::
   }
   const auto component = [&](const SurfaceSample& s) { return label[surface.mesh.triangles[s.triangle][0]]; };
   std::vector<std::size_t> have(parts.size(), 0);
-  for (const SurfaceSample& s : samples) ++have[component(s)];
+  if (parts.size() == 1) have[0] = samples.size();
+  if (parts.size() > 1)
+    for (const SurfaceSample& s : samples) ++have[component(s)];
   std::vector<Vec3> added;
   for (Index c = 0; c < parts.size() && count >= kPerComponent * parts.size(); ++c) {
     if (parts[c].empty() || have[c] >= kPerComponent) continue;
@@ -51,11 +53,11 @@ std::vector<Vec3> initial_seeds(const Surface& surface, std::size_t count, std::
   }
   std::size_t surplus = added.size();
   std::vector<Vec3> seeds = std::move(added);
+  seeds.reserve(seeds.size() + samples.size());
   for (const SurfaceSample& s : samples) {
-    std::size_t& left = have[component(s)];
-    if (surplus > 0 && left > kPerComponent) {
+    if (std::size_t* left = surplus > 0 ? &have[component(s)] : nullptr; left && *left > kPerComponent) {
       --surplus;
-      --left;
+      --*left;
     } else {
       seeds.push_back(s.point);
     }

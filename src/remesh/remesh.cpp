@@ -420,9 +420,9 @@ void Pipeline::extract() {
   if (run_.has_features()) features_ = check_features(trace_, curves_, run_.seeds.places(), diagram);
   const Divided divided = divide_sheets();
   const Dual dual = divided.polygons ? extract_dual(*divided.polygons) : diagram.dual;
-  result_.mesh = dual_mesh(divided.vertices, dual);
-  analyse_result();
   const std::vector<Index> vertex_of = dual_vertices(dual, divided.vertices.size());
+  result_.mesh = dual_mesh(divided.vertices, dual, vertex_of);
+  analyse_result();
   result_.places.resize(result_.mesh.vertices.size());
   for (Index i = 0; i < run_.seeds.size(); ++i)
     if (vertex_of[i] != kNone) result_.places[vertex_of[i]] = run_.seeds.place(i);

@@ -8,6 +8,7 @@
 
 #include "bisector/quality.h"
 #include "core/geometry.h"
+#include "core/parallel.h"
 #include "mesh/topology.h"
 #include "remesh/improve_patch.h"
 
@@ -22,34 +23,49 @@ constexpr double kHopeless = 0.05;
 // Edges to be had in a sliver's place, by its height, and at least this part of its own: equilateral triangles have
 // 1.15 times their height as edges.
 constexpr double kPerHeight = 1.15, kLeast = 0.5;
+constexpr std::size_t kTrianglesAtOnce = 4096;
 
 }  // namespace
 
 Slivers find_slivers(const TriangleMesh& mesh) {
+  const ShapeGoal goal = shape_goal(kSliver, 180);
+  const auto corners = [&](std::size_t t) {
+    const Triangle& v = mesh.triangles[t];
+    return std::array{mesh.vertices[v[0]], mesh.vertices[v[1]], mesh.vertices[v[2]]};
+  };
+  struct Thin {
+    std::size_t triangle;
+    double under;  // degrees that its smallest angle lacks
+  };
+  std::vector<std::vector<Thin>> thin((mesh.triangles.size() + kTrianglesAtOnce - 1) / kTrianglesAtOnce);
+  parallel_chunks(mesh.triangles.size(), kTrianglesAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto [a, b, d] = corners(t);
+      if (const double under = shape_excess(a, b, d, goal).under; under > 0) thin[c].push_back({t, under});
+    }
+  });
+
   Slivers found;
   std::size_t count = 0;
   bool has_bad_one = false;
-  const ShapeGoal goal = shape_goal(kSliver, 180);
-  for (const Triangle& t : mesh.triangles) {
-    std::array<Vec3, 3> p;
-    for (int k = 0; k < 3; ++k) p[k] = mesh.vertices[t[k]];
-    const double under = shape_excess(p[0], p[1], p[2], goal).under;
-    if (under <= 0) continue;
-    if (angle_is_imposed(p, edges_among(t, mesh.feature_edges))) continue;
-    double longest = 0, perimeter = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double length = norm(p[(k + 1) % 3] - p[k]);
-      longest = std::max(longest, length);
-      perimeter += length;
+  for (const std::vector<Thin>& chunk : thin)
+    for (const auto [t, under] : chunk) {
+      const std::array<Vec3, 3> p = corners(t);
+      if (angle_is_imposed(p, edges_among(mesh.triangles[t], mesh.feature_edges))) continue;
+      double longest = 0, perimeter = 0;
+      for (int k = 0; k < 3; ++k) {
+        const double length = norm(p[(k + 1) % 3] - p[k]);
+        longest = std::max(longest, length);
+        perimeter += length;
+      }
+      ++count;
+      has_bad_one |= kSliver - under < kWorst;
+      const double height = longest > 0 ? norm(twice_area_normal(p[0], p[1], p[2])) / longest : 0;
+      for (const Vec3& corner : p) {
+        found.bounds.points.push_back(corner);
+        found.bounds.lengths.push_back(std::max(kPerHeight * height, kLeast * perimeter / 3));
+      }
     }
-    ++count;
-    has_bad_one |= kSliver - under < kWorst;
-    const double height = longest > 0 ? norm(twice_area_normal(p[0], p[1], p[2])) / longest : 0;
-    for (const Vec3& corner : p) {
-      found.bounds.points.push_back(corner);
-      found.bounds.lengths.push_back(std::max(kPerHeight * height, kLeast * perimeter / 3));
-    }
-  }
   const double share =
       static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(mesh.triangles.size(), 1));
   found.hopeless = share >= kHopeless;

@@ -518,20 +518,19 @@ class Control {
 
 }  // namespace
 
-TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual) {
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual, const std::vector<Index>& vertex_of) {
   TriangleMesh mesh;
-  mesh.triangles = dual.triangles;
-  std::vector<Index> index(seeds.size(), kNone);
-  for (const Triangle& t : mesh.triangles)
-    for (Index v : t) index[v] = 0;
   for (std::size_t v = 0; v < seeds.size(); ++v)
-    if (index[v] != kNone) {
-      index[v] = static_cast<Index>(mesh.vertices.size());
-      mesh.vertices.push_back(seeds[v]);
-    }
-  for (Triangle& t : mesh.triangles)
-    for (Index& v : t) v = index[v];
+    if (vertex_of[v] != kNone) mesh.vertices.push_back(seeds[v]);
+  mesh.triangles.resize(dual.triangles.size());
+  parallel_each(dual.triangles.size(), [&](std::size_t t) {
+    for (std::size_t k = 0; k < 3; ++k) mesh.triangles[t][k] = vertex_of[dual.triangles[t][k]];
+  });
   return mesh;
+}
+
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual) {
+  return dual_mesh(seeds, dual, dual_vertices(dual, seeds.size()));
 }
 
 bool same_topology(const MeshTopology& dual, const MeshTopology& input) {

@@ -15,6 +15,8 @@
 namespace bisector {
 
 // A restricted Delaunay triangulation as a mesh: its vertices are the seeds that have triangles, in their order.
+// `vertex_of` are dual_vertices of the two.
+TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual, const std::vector<Index>& vertex_of);
 TriangleMesh dual_mesh(const std::vector<Vec3>& seeds, const Dual& dual);
 
 // Whether `dual` is manifold, oriented, closed and of Euler characteristic and components as the input.

@@ -67,7 +67,7 @@ std::vector<Index> hilbert_order(const std::vector<Vec3>& points) {
     return a.index < b.index;
   });
   std::vector<Index> order(points.size());
-  for (std::size_t k = 0; k < keys.size(); ++k) order[k] = keys[k].index;
+  parallel_each(keys.size(), [&](std::size_t k) { order[k] = keys[k].index; });
   return order;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <numeric>
 #include <optional>
 
 #include "core/parallel.h"
@@ -22,6 +23,7 @@ constexpr int kTrials = 12;
 constexpr double kGrowth = 1.6;  // of the radius, from level to level
 constexpr int kRingLevel = 6;    // the rung at which `nearest` turns to the Delaunay triangulation
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t kSeedsAtOnce = 4096;
 
 // Distances are compared after rounding; this keeps what a list leaves out beyond its radius all the same.
 constexpr double kBelow = 1 - 1e-9;
@@ -35,20 +37,28 @@ std::uint64_t sort_key(double squared, std::size_t place) {
 }  // namespace
 
 SortedSeeds sort_seeds(const std::vector<Vec3>& seeds) {
-  SortedSeeds sorted;
-  sorted.id = hilbert_order(seeds);
-  sorted.slot.assign(seeds.size(), kNone);
-  sorted.x.reserve(seeds.size());
+  const std::vector<Index> order = hilbert_order(seeds);
   // Equal seeds are neighbours in Hilbert order, the lowest index first.
-  std::size_t n = 0;
-  for (std::size_t k = 0; k < sorted.id.size(); ++k) {
-    const Index i = sorted.id[k];
-    if (n && sorted.x.back() == seeds[i]) continue;
-    sorted.slot[i] = static_cast<Index>(n);
-    sorted.id[n++] = i;
-    sorted.x.push_back(seeds[i]);
-  }
-  sorted.id.resize(n);
+  const auto is_first = [&](std::size_t k) { return k == 0 || !(seeds[order[k]] == seeds[order[k - 1]]); };
+  std::vector<std::size_t> slot((order.size() + kSeedsAtOnce - 1) / kSeedsAtOnce + 1, 0);  // the first of each chunk
+  parallel_chunks(order.size(), kSeedsAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) slot[c + 1] += is_first(k);
+  });
+  std::partial_sum(slot.begin(), slot.end(), slot.begin());
+  SortedSeeds sorted;
+  sorted.id.resize(slot.back());
+  sorted.x.resize(slot.back());
+  sorted.slot.assign(seeds.size(), kNone);
+  parallel_chunks(order.size(), kSeedsAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    std::size_t n = slot[c];
+    for (std::size_t k = begin; k < end; ++k) {
+      if (!is_first(k)) continue;
+      const Index i = order[k];
+      sorted.slot[i] = static_cast<Index>(n);
+      sorted.id[n] = i;
+      sorted.x[n++] = seeds[i];
+    }
+  });
   sorted.extent = bounding_box(sorted.x).diagonal();
   return sorted;
 }
