@@ -125,15 +125,16 @@ void main() {
   // Twice as many seeds as a list has, around the own.
   const uint leaves = nodes_of(0), home = own_slot / kTreeArity, beside = (kMost + kTreeArity - 1) / kTreeArity;
   const uint begin = home > beside ? home - beside : 0, end = min(home + beside + 1, leaves);
-  // Each invocation goes on to its next leaf before any leaf is seen: a leaf takes far longer than a box, and all take
-  // theirs together.
+  // One loop for both, as it is long once it is unrolled.
   uint leaf = begin, level = top_level, node = 0, opened = 0;
   bool more = true;
-  [[dont_unroll]] while (true) {
-    uint next = kNone;
-    if (leaf < end) next = leaf++;
-    [[dont_unroll]] while (next == kNone && more && opened < kOpened) {
+  [[dont_unroll]] while (more && opened < kOpened) {
+    uint next = leaf;
+    if (leaf < end) {
+      ++leaf;
+    } else {
       ++opened;
+      next = kNone;
       if (box_distance(level, node, at) <= squares[kMost - 1]) {
         if (level > 0) {
           --level;
@@ -144,8 +145,7 @@ void main() {
       }
       more = next_node(level, node);
     }
-    if (next == kNone) break;
-    see_leaf(next);
+    if (next != kNone) see_leaf(next);
   }
   // Of seeds at the same distance all are listed or none, so that lists do not depend on the order of slots.
   const float farthest = squares[kMost - 1], bound = left_out <= farthest ? farthest : kFarthest;

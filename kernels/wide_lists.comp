@@ -8,6 +8,7 @@
 #include "points.glsl"
 
 layout(constant_id = 0) const uint kWide = 128;  // entries of a list that is not the widest, a power of two
+layout(constant_id = 1) const uint kMostRounds = 96;  // through the stack
 
 layout(std430, binding = 0) readonly buffer Seeds { real seed_words[]; };
 layout(std430, binding = 1) readonly buffer Ids { uvec4 ids[]; };
@@ -28,14 +29,13 @@ const uint kBatch = kGroupSize * kTreeArity;  // of seeds, a leaf for each invoc
 const uint kStack = 512;                      // nodes that are still to be looked at
 const uint kReserved = 96;                    // of them, for what one node at a time may add
 const uint kLevelShift = 28;
-const uint kMostRounds = 96;  // through the stack; more would end llvmpipe's loops
 
 // The list, ascending, and from kNew on what was collected for it.
 const uint kNew = kWidestList;
 shared float squares[kNew + kBatch];
 shared uint found[kNew + kBatch];
 shared uint stack[kStack];
-shared uint stack_size, new_count, list_first, swaps, least_left_out, incomplete;
+shared uint stack_size, first_held, new_count, list_first, swaps, least_left_out, incomplete;
 
 uint lane, most, own_slot;
 Point own;
@@ -121,16 +121,21 @@ bool search(uint begin, uint end) {
   [[dont_unroll]] for (uint round = 0; round < kMostRounds; ++round) {
     const uint size = stack_size;
     if (size == 0) return true;
-    const uint room = size + kReserved < kStack ? (kStack - kReserved - size) / (kTreeArity - 1) : 0;
-    const uint taken = min(min(size, kGroupSize), max(room, 1u));
-    const uint top = lane < taken ? stack[size - 1 - lane] : 0;
+    const uint top = lane < size ? stack[size - 1 - lane] : 0;
+    const uint level = top >> kLevelShift, node = top & ((1u << kLevelShift) - 1);
+    const bool near = lane < size && box_distance(level, node, at) <= squares[most - 1];
+    if (lane == 0) first_held = min(size, kGroupSize);
     barrier();
+    // Boxes whose parts there is no room for are held back, all but one; leaves and what is too far take none.
+    const uint room = size + kReserved < kStack ? (kStack - kReserved - size) / (kTreeArity - 1) : 0;
+    if (near && level > 0 && lane >= max(room, 1u)) atomicMin(first_held, lane);
+    barrier();
+    const uint taken = first_held;
     if (lane == 0) stack_size = size - taken;
     barrier();
-    if (lane < taken) {
-      const uint level = top >> kLevelShift, node = top & ((1u << kLevelShift) - 1);
+    if (near && lane < taken) {
       if (level == 0) {
-        if (box_distance(0, node, at) <= squares[most - 1]) collect(node);
+        collect(node);
       } else {
         const uint last = min((node + 1) * kTreeArity, nodes_of(level - 1));
         [[dont_unroll]] for (uint child = node * kTreeArity; child < last; ++child) {

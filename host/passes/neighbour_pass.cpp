@@ -21,6 +21,9 @@ constexpr float kUnlimited = 2e37f;
 // Relative, by which squared radii are made smaller, for rounding them to single precision may make none larger.
 constexpr double kRadiusMargin = 1e-6;
 constexpr std::size_t kWord = sizeof(std::uint32_t);
+// Through the stack of a wider list. llvmpipe would end loops of more; elsewhere the search always ends before, as
+// whether it does must not depend on the order in which invocations push boxes.
+constexpr std::uint32_t kSoftwareRounds = 96, kMostRounds = 1u << 20;
 
 }  // namespace
 
@@ -71,7 +74,8 @@ void NeighbourPass::widen(Commands& commands, const DeviceSeeds& seeds, const Bu
   WideListsPush push = tree_.push<WideListsPush>(seeds);
   push.wide_capacity = static_cast<uint>(wide_capacity_);
   push.may_grow = may_grow_;
-  commands.dispatch_indirect(kernel("wide_lists", double_, {sizes_.wide}),
+  const std::uint32_t rounds = device_.description().kind == "software" ? kSoftwareRounds : kMostRounds;
+  commands.dispatch_indirect(kernel("wide_lists", double_, {sizes_.wide, rounds}),
                              {reads(seeds.words), reads(seeds.ids), reads(tree_.boxes()), writes(wide_lists_),
                               updates(info_), updates(counters), reads(targets_)},
                              push, counters, (kGroups + 3 * kWorkTargets) * kWord);
