@@ -21,16 +21,23 @@ namespace {
 class Surface {
  public:
   Surface(const TriangleMesh& mesh, const std::string& name) {
+    const auto corners = [&](std::size_t i) {
+      const Triangle& t = mesh.triangles[i];
+      return std::array{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+    };
+    std::vector<double> areas(mesh.triangles.size());
+    parallel_each(areas.size(), [&](std::size_t i) {
+      const auto [a, b, c] = corners(i);
+      areas[i] = triangle_area(a, b, c);
+    });
     std::vector<char> used(mesh.vertices.size(), 0);
     double area = 0;
-    for (const Triangle& t : mesh.triangles) {
-      const std::array<Vec3, 3> p{mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
-      const double a = triangle_area(p[0], p[1], p[2]);
-      if (!(a > 0)) continue;
-      area += a;
+    for (std::size_t i = 0; i < areas.size(); ++i) {
+      if (!(areas[i] > 0)) continue;
+      area += areas[i];
       areas_.push_back(area);
-      corners_.push_back(p);
-      for (const Index v : t) used[v] = 1;
+      corners_.push_back(corners(i));
+      for (const Index v : mesh.triangles[i]) used[v] = 1;
     }
     if (corners_.empty()) throw Error("distance: the " + name + " has no area; check the mesh");
     for (std::size_t v = 0; v < used.size(); ++v)

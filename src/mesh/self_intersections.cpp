@@ -4,6 +4,8 @@
 #include <CGAL/intersections.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <functional>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -11,6 +13,7 @@
 
 #include "bisector/quality.h"
 #include "core/degenerate.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 
 namespace bisector {
@@ -28,9 +31,14 @@ TriangleMesh merge_equal_points(const TriangleMesh& mesh) {
   std::iota(order.begin(), order.end(), Index{0});
   const auto key = [&](Index v) {
     const Vec3& p = mesh.vertices[v];
-    return std::tuple(p.x, p.y, p.z);
+    return std::tuple(p.x, p.y, p.z, v);
   };
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return key(a) < key(b); });
+  sort_in_parallel(order, [&](Index a, Index b) { return key(a) < key(b); });
+  std::vector<char> has_area(mesh.triangles.size());
+  parallel_each(mesh.triangles.size(), [&](std::size_t i) {
+    const auto [a, b, c] = mesh.triangles[i];
+    has_area[i] = !collinear(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+  });
 
   TriangleMesh welded;
   std::vector<Index> vertex(mesh.vertices.size());
@@ -41,7 +49,7 @@ TriangleMesh merge_equal_points(const TriangleMesh& mesh) {
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const Triangle& t = mesh.triangles[i];
-    if (collinear(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]])) continue;
+    if (!has_area[i]) continue;
     welded.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
     welded.face_of_triangle.push_back(static_cast<Index>(i));
   }
@@ -77,57 +85,99 @@ bool intersect_beyond_shared(const std::vector<Vec3>& vertices, Triangle s, Tria
   }
 }
 
-// Calls visit(pair) for every pair of welded triangles that intersect.
-template <class Visit>
-void visit_intersections(const TriangleMesh& welded, const Context& context, const Visit& visit) {
-  std::vector<TriangleBox> boxes;
-  boxes.reserve(welded.triangles.size());
-  for (std::size_t i = 0; i < welded.triangles.size(); ++i) {
-    CGAL::Bbox_3 box;
-    for (const Index v : welded.triangles[i]) {
-      const Vec3& p = welded.vertices[v];
-      box += CGAL::Bbox_3(p.x, p.y, p.z, p.x, p.y, p.z);
-    }
-    boxes.emplace_back(box, i);
+// Space between planes across the widest extent of a mesh, with about as many triangles that begin in each slab. A pair
+// of boxes belongs to the slab in which the second of the two begins.
+class Slabs {
+ public:
+  explicit Slabs(const TriangleMesh& welded) : boxes_(welded.triangles.size()) {
+    parallel_each(boxes_.size(), [&](std::size_t i) {
+      CGAL::Bbox_3 box;
+      for (const Index v : welded.triangles[i]) {
+        const Vec3& p = welded.vertices[v];
+        box += CGAL::Bbox_3(p.x, p.y, p.z, p.x, p.y, p.z);
+      }
+      boxes_[i] = TriangleBox(box, i);
+    });
+    const Box box = bounding_box(welded.vertices);
+    for (int k = 1; k < 3; ++k)
+      if (box.hi[k] - box.lo[k] > box.hi[axis_] - box.lo[axis_]) axis_ = k;
+    std::vector<double> begins(boxes_.size());
+    parallel_each(boxes_.size(), [&](std::size_t i) { begins[i] = boxes_[i].min_coord(axis_); });
+    sort_in_parallel(begins, std::less<>());
+    const std::size_t count = std::clamp<std::size_t>(boxes_.size() / kLeastInSlab, 1, kMostSlabs);
+    for (std::size_t k = 1; k < count; ++k) planes_.push_back(begins[k * begins.size() / count]);
+    planes_.erase(std::unique(planes_.begin(), planes_.end()), planes_.end());
+    first_.resize(boxes_.size());
+    last_.resize(boxes_.size());
+    parallel_each(boxes_.size(), [&](std::size_t i) {
+      first_[i] = static_cast<std::uint8_t>(slab_of(boxes_[i].min_coord(axis_)));
+      last_[i] = static_cast<std::uint8_t>(slab_of(boxes_[i].max_coord(axis_)));
+    });
   }
 
-  std::vector<Pair> candidates;
-  std::vector<char> intersect;
-  const auto test_candidates = [&] {
-    intersect.resize(candidates.size());
-    parallel_each(candidates.size(), [&](std::size_t i) {
-      context.check();
-      const auto [s, t] = candidates[i];
-      intersect[i] = intersect_beyond_shared(welded.vertices, welded.triangles[s], welded.triangles[t]);
+  std::size_t size() const { return planes_.size() + 1; }
+
+  // Calls visit(pair) for the slab's pairs of boxes that overlap.
+  template <class Visit>
+  void visit_overlaps(std::size_t slab, const Visit& visit) const {
+    std::vector<TriangleBox> within;
+    for (std::size_t i = 0; i < boxes_.size(); ++i)
+      if (first_[i] <= slab && last_[i] >= slab) within.push_back(boxes_[i]);
+    CGAL::box_self_intersection_d(within.begin(), within.end(), [&](const TriangleBox& a, const TriangleBox& b) {
+      const Pair pair{a.info(), b.info()};
+      if (std::max(first_[pair[0]], first_[pair[1]]) == slab) visit(pair);
     });
-    for (std::size_t i = 0; i < candidates.size(); ++i)
-      if (intersect[i]) visit(candidates[i]);
-    candidates.clear();
-  };
-  context.check();
-  constexpr std::size_t kBatch = std::size_t{1} << 20;  // bounds the memory however many boxes overlap
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
-    candidates.push_back({a.info(), b.info()});
-    if (candidates.size() == kBatch) test_candidates();
-  });
-  test_candidates();
+  }
+
+ private:
+  static constexpr std::size_t kLeastInSlab = 4096, kMostSlabs = 64;
+
+  std::size_t slab_of(double coordinate) const {
+    return static_cast<std::size_t>(std::upper_bound(planes_.begin(), planes_.end(), coordinate) - planes_.begin());
+  }
+
+  std::vector<TriangleBox> boxes_;
+  int axis_ = 0;
+  std::vector<double> planes_;              // between the slabs, ascending
+  std::vector<std::uint8_t> first_, last_;  // slabs that each box reaches
+};
+
+// The pairs of welded triangles that intersect: `take(slab, pair)` is called for each, for all slabs at once.
+template <class Take>
+void take_intersections(const TriangleMesh& welded, const Slabs& slabs, const Context& context, const Take& take) {
+  parallel_each(
+      slabs.size(),
+      [&](std::size_t slab) {
+        context.check();
+        slabs.visit_overlaps(slab, [&](const Pair& pair) {
+          context.check();
+          const auto [s, t] = pair;
+          if (intersect_beyond_shared(welded.vertices, welded.triangles[s], welded.triangles[t])) take(slab, pair);
+        });
+      },
+      1);
 }
 
 }  // namespace
 
 std::size_t count_self_intersections(const TriangleMesh& mesh, const Context& context) {
-  std::size_t count = 0;
-  visit_intersections(merge_equal_points(mesh), context, [&](const Pair&) { ++count; });
-  return count;
+  const TriangleMesh welded = merge_equal_points(mesh);
+  const Slabs slabs(welded);
+  std::vector<std::size_t> counts(slabs.size(), 0);
+  take_intersections(welded, slabs, context, [&](std::size_t slab, const Pair&) { ++counts[slab]; });
+  return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
 }
 
 std::vector<std::array<Index, 2>> find_self_intersections(const TriangleMesh& mesh, const Context& context) {
   const TriangleMesh welded = merge_equal_points(mesh);
-  std::vector<std::array<Index, 2>> pairs;
-  visit_intersections(welded, context, [&](const Pair& pair) {
+  const Slabs slabs(welded);
+  std::vector<std::vector<std::array<Index, 2>>> found(slabs.size());
+  take_intersections(welded, slabs, context, [&](std::size_t slab, const Pair& pair) {
     const auto [low, high] = std::minmax(pair[0], pair[1]);
-    pairs.push_back({welded.face_of_triangle[low], welded.face_of_triangle[high]});
+    found[slab].push_back({welded.face_of_triangle[low], welded.face_of_triangle[high]});
   });
+  std::vector<std::array<Index, 2>> pairs;
+  for (const auto& of_slab : found) pairs.insert(pairs.end(), of_slab.begin(), of_slab.end());
   std::sort(pairs.begin(), pairs.end());
   return pairs;
 }

@@ -290,6 +290,28 @@ TEST(SelfIntersections, AgreeWithPiercedEdgesInSoup) {
   EXPECT_EQ(count_self_intersections(mesh), pairs);
 }
 
+TEST(SelfIntersections, OfOneTriangleThroughManyFarApart) {
+  // Crosses of an upright and a lying triangle in a row, and one triangle through all that are upright.
+  constexpr Index kCrosses = 10000;
+  TriangleMesh mesh;
+  const auto add = [&](const Vec3& a, const Vec3& b, const Vec3& c) {
+    const auto first = static_cast<Index>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {a, b, c});
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  };
+  add({-1, -0.05, -0.5}, {kCrosses, 0, -0.5}, {-1, 0.05, -0.5});
+  for (Index i = 0; i < kCrosses; ++i) {
+    const double x = i;
+    add({x, -1, -1}, {x, 1, -1}, {x, 0, 1});
+    add({x - 0.2, -0.1, 0}, {x + 0.2, -0.1, 0}, {x, 0.2, 0});
+  }
+  EXPECT_EQ(count_self_intersections(mesh), 2 * kCrosses);
+  std::vector<std::array<Index, 2>> pairs;
+  for (Index i = 0; i < kCrosses; ++i) pairs.push_back({0, 2 * i + 1});
+  for (Index i = 0; i < kCrosses; ++i) pairs.push_back({2 * i + 1, 2 * i + 2});
+  EXPECT_EQ(find_self_intersections(mesh), pairs);
+}
+
 TEST(Quality, OfRealModels) {
   for (const char* name : {"bunny.off", "igea.ply", "homer.obj"}) {
     const std::string model = shared_model(name);
