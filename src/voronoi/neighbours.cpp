@@ -21,7 +21,9 @@ constexpr std::uint64_t kPlaceMask = 1023;
 constexpr std::size_t kCandidates = kPlaceMask + 1;  // and with a smaller one beyond these
 constexpr int kTrials = 12;
 constexpr double kGrowth = 1.6;  // of the radius, from level to level
-constexpr int kRingLevel = 6;    // the rung at which `nearest` turns to the Delaunay triangulation
+constexpr int kRingLevel = 6;    // from this rung on `nearest` may turn to the Delaunay triangulation
+// Entries of all lists from that rung on, per seed, before it does: they take about as long as the triangulation then.
+constexpr std::size_t kLongEntriesPerSeed = 32;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kSeedsAtOnce = 4096;
 
@@ -116,7 +118,8 @@ struct Neighbours::Grown {
 
 struct Neighbours::LastRung {
   std::once_flag once;
-  std::optional<Csr<Index>> rings;  // by slot, ascending distance
+  std::optional<Csr<Index>> rings;                // by slot, ascending distance
+  std::atomic<std::size_t> entries_without_it = 0;  // of lists
 };
 
 Neighbours::Neighbours(ListLength length, LongLists long_lists) : length_(length), long_lists_(long_lists) {}
@@ -311,7 +314,8 @@ NeighbourList Neighbours::wider(Index slot, const NeighbourList& shorter) const 
 std::unique_ptr<Neighbours::Grown> Neighbours::grow(Index slot, int level, double radius) const {
   auto grown = std::make_unique<Grown>();
   grown->level = level;
-  if (level >= kRingLevel && last_rung().rings) {
+  const bool is_long = level >= kRingLevel;
+  if (is_long && last_rung_->entries_without_it > kLongEntriesPerSeed * seeds_->x.size() && last_rung().rings) {
     const auto& rings = *last_rung_->rings;
     grown->values.assign(rings.begin(slot), rings.end(slot));
     grown->radius = kInfinity;
@@ -332,6 +336,7 @@ std::unique_ptr<Neighbours::Grown> Neighbours::grow(Index slot, int level, doubl
   }
   std::sort(candidates.begin(), candidates.end());
   for (const Candidate& c : candidates) grown->values.push_back(c.slot);
+  if (is_long) last_rung_->entries_without_it += candidates.size();
   return grown;
 }
 
