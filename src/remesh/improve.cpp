@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/grouping.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
 #include "remesh/feature_recovery.h"
@@ -52,6 +53,7 @@ constexpr std::size_t kTriesToRestore = 8;
 constexpr double kDrift = 0.005, kSearchDrift = 0.02;
 // Diagrams that are computed to find out which changes hold together.
 constexpr int kReverts = 4;
+constexpr std::size_t kSeedsAtOnce = 4096, kCandidatesAtOnce = 8192;
 
 enum class Star : unsigned char { disk, fan, other };
 
@@ -75,15 +77,11 @@ struct Snapshot {
 };
 
 Csr<Index> stars_of(const Dual& dual, std::size_t seeds) {
-  Csr<Index> stars;
-  stars.offsets.assign(seeds + 1, 0);
-  for (const Triangle& t : dual.triangles)
-    for (const Index v : t) ++stars.offsets[v + 1];
-  std::partial_sum(stars.offsets.begin(), stars.offsets.end(), stars.offsets.begin());
-  stars.values.resize(3 * dual.triangles.size());
-  std::vector<std::size_t> next(stars.offsets.begin(), stars.offsets.end() - 1);
-  for (Index k = 0; k < dual.triangles.size(); ++k)
-    for (const Index v : dual.triangles[k]) stars.values[next[v]++] = k;
+  Csr<Index> stars = scatter_into_rows<Index>(
+      seeds, 3 * dual.triangles.size(), [&](std::size_t h) { return dual.triangles[h / 3][h % 3]; },
+      [](std::size_t h) { return static_cast<Index>(h / 3); });
+  Index* const all = stars.values.data();
+  parallel_each(seeds, [&](std::size_t v) { std::sort(all + stars.offsets[v], all + stars.offsets[v + 1]); });
   return stars;
 }
 
@@ -193,6 +191,14 @@ class Improver {
   Change best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const;
   std::optional<ImprovePatch> try_one(const ImprovePatch& start, Aim aim, std::size_t& trials) const;
   std::optional<ImprovePatch> search(const ImprovePatch& start, std::size_t rank, std::size_t& trials) const;
+  // A seed around which a change may be tried.
+  struct Candidate {
+    Index seed;
+    double excess, cost;
+  };
+  std::optional<Candidate> candidate(Index seed, Aim aim) const;
+  // All of them, the worst first.
+  std::vector<Candidate> candidates(Aim aim) const;
   std::vector<Index> choose_middles(Aim aim);
   std::vector<char> choose_changes(const std::vector<Change>& changes, Aim aim) const;
   // Changes made around some seeds.
@@ -263,11 +269,13 @@ void Improver::measure(Snapshot& s) {
   s.kinds.resize(n);
   std::vector<std::vector<Index>> rings(n);
   parallel_each(n, [&](std::size_t v) { s.kinds[v] = ring_and_kind(dual, s.stars, static_cast<Index>(v), rings[v]); });
-  s.rings = {};
-  for (const std::vector<Index>& ring : rings) {
-    s.rings.values.insert(s.rings.values.end(), ring.begin(), ring.end());
-    s.rings.offsets.push_back(s.rings.values.size());
-  }
+  s.rings.offsets.assign(n + 1, 0);
+  for (std::size_t v = 0; v < n; ++v) s.rings.offsets[v + 1] = s.rings.offsets[v] + rings[v].size();
+  s.rings.values.resize(s.rings.offsets.back());
+  parallel_each(n, [&](std::size_t v) {
+    std::copy(rings[v].begin(), rings[v].end(),
+              s.rings.values.begin() + static_cast<std::ptrdiff_t>(s.rings.offsets[v]));
+  });
   const auto vertices = std::count_if(rings.begin(), rings.end(), [](const auto& ring) { return !ring.empty(); });
   const auto edges = static_cast<long long>(s.rings.values.size() / 2);
   s.euler = vertices - edges + static_cast<long long>(dual.triangles.size());
@@ -519,56 +527,74 @@ Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::siz
   return change;
 }
 
-// Seeds of triangles beyond the goal, then of poor ones, worst first; their patches share no triangle.
-std::vector<Index> Improver::choose_middles(Aim aim) {
-  struct Candidate {
-    Index seed;
-    double excess, cost;
-  };
-  std::vector<Candidate> candidates;
-  for (Index v = 0; v < now_.seeds.size(); ++v) {
-    if (tried_[v] >= (aim == Aim::no_bad_angles ? kSearches : 1) || now_.stars.size(v) == 0 ||
-        now_.kinds[v] == Star::other)
-      continue;
-    double sum = 0, worst = 0;
-    for (const Index* t = now_.stars.begin(v); t != now_.stars.end(v); ++t) {
-      sum += now_.costs[*t];
-      worst = std::max(worst, now_.costs[*t]);
-    }
-    double excess = 0;
-    if (aim == Aim::no_bad_angles) {
-      excess = angle_missing(v);
-      if (!(excess > bad_excess())) continue;
-    } else if (!counts(aim)) {
-      excess = worst_excess(now_, v).most();
-    }
-    const Candidate candidate{v, excess, sum / static_cast<double>(now_.stars.size(v)) + worst};
-    if (counts(aim) || candidate.excess > 0 || candidate.cost > 2 * kPoor * now_.average)
-      candidates.push_back(candidate);
+std::optional<Improver::Candidate> Improver::candidate(Index v, Aim aim) const {
+  if (tried_[v] >= (aim == Aim::no_bad_angles ? kSearches : 1) || now_.stars.size(v) == 0 ||
+      now_.kinds[v] == Star::other)
+    return {};
+  double sum = 0, worst = 0;
+  for (const Index* t = now_.stars.begin(v); t != now_.stars.end(v); ++t) {
+    sum += now_.costs[*t];
+    worst = std::max(worst, now_.costs[*t]);
   }
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+  double excess = 0;
+  if (aim == Aim::no_bad_angles) {
+    excess = angle_missing(v);
+    if (!(excess > bad_excess())) return {};
+  } else if (!counts(aim)) {
+    excess = worst_excess(now_, v).most();
+  }
+  const double cost = sum / static_cast<double>(now_.stars.size(v)) + worst;
+  if (!counts(aim) && !(excess > 0) && !(cost > 2 * kPoor * now_.average)) return {};
+  return Candidate{v, excess, cost};
+}
+
+std::vector<Improver::Candidate> Improver::candidates(Aim aim) const {
+  const std::size_t n = now_.seeds.size();
+  std::vector<std::vector<Candidate>> chunks((n + kSeedsAtOnce - 1) / kSeedsAtOnce);
+  parallel_chunks(n, kSeedsAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v)
+      if (const std::optional<Candidate> found = candidate(static_cast<Index>(v), aim)) chunks[c].push_back(*found);
+  });
+  std::vector<Candidate> all;
+  for (const std::vector<Candidate>& chunk : chunks) all.insert(all.end(), chunk.begin(), chunk.end());
+  sort_in_parallel(all, [](const Candidate& a, const Candidate& b) {
     return a.excess != b.excess ? a.excess > b.excess : a.cost != b.cost ? a.cost > b.cost : a.seed < b.seed;
   });
+  return all;
+}
+
+// Seeds of triangles beyond the goal, then of poor ones, worst first; their patches share no triangle.
+std::vector<Index> Improver::choose_middles(Aim aim) {
+  const std::vector<Candidate> all = candidates(aim);
   const auto missing = static_cast<long long>(wanted()) - static_cast<long long>(now_.seeds.size());
   std::size_t most = now_.seeds.size();
   if (aim == Aim::no_bad_angles) most = searches_left_;
   if (counts(aim)) most = kTriesToRestore * static_cast<std::size_t>(std::abs(missing));
   std::vector<char> taken(now_.dual().triangles.size(), 0);
+  const auto is_taken = [&](Index t) { return taken[t] != 0; };
+  std::vector<std::vector<Index>> patches(std::min(all.size(), kCandidatesAtOnce));
   std::vector<Index> middles;
-  for (const Candidate& candidate : candidates) {
-    const bool poor = aim == Aim::better && candidate.excess == 0;
-    if (middles.size() == most || (poor && poor_left_ == 0)) break;
-    const std::vector<Index> seeds = seeds_around(candidate.seed);
-    const auto for_each_triangle = [&](const auto& visit) {
-      for (const Index v : seeds)
-        for (const Index* t = now_.stars.begin(v); t != now_.stars.end(v); ++t) visit(taken[*t]);
-    };
-    bool overlaps = false;
-    for_each_triangle([&](char& t) { overlaps |= t; });
-    if (overlaps) continue;
-    for_each_triangle([](char& t) { t = 1; });
-    middles.push_back(candidate.seed);
-    if (poor) --poor_left_;
+  for (std::size_t first = 0; first < all.size(); first += kCandidatesAtOnce) {
+    // The triangles of the next patches; of those that overlap one that is chosen already, none.
+    const std::size_t count = std::min(kCandidatesAtOnce, all.size() - first);
+    parallel_each(
+        count,
+        [&](std::size_t k) {
+          patches[k].clear();
+          for (const Index v : seeds_around(all[first + k].seed))
+            patches[k].insert(patches[k].end(), now_.stars.begin(v), now_.stars.end(v));
+          if (std::any_of(patches[k].begin(), patches[k].end(), is_taken)) patches[k].clear();
+        },
+        64);
+    for (std::size_t k = 0; k < count; ++k) {
+      const Candidate& next = all[first + k];
+      const bool poor = aim == Aim::better && next.excess == 0;
+      if (middles.size() == most || (poor && poor_left_ == 0)) return middles;
+      if (patches[k].empty() || std::any_of(patches[k].begin(), patches[k].end(), is_taken)) continue;
+      for (const Index t : patches[k]) taken[t] = 1;
+      middles.push_back(next.seed);
+      if (poor) --poor_left_;
+    }
   }
   return middles;
 }
@@ -771,8 +797,7 @@ void Improver::smooth() {
   std::vector<PatchVertex> vertices(n);
   parallel_each(n, [&](std::size_t v) { vertices[v] = vertex_of(static_cast<Index>(v), map); });
   ImprovePatch all(map, &run_.curves(), goal_);
-  for (const PatchVertex& vertex : vertices) all.add_vertex(vertex);
-  for (const Triangle& t : now_.dual().triangles) all.add_triangle(t);
+  all.set_mesh(vertices, now_.dual().triangles, now_.stars);
   const std::vector<std::vector<Index>> classes = colours(vertices);
   for (int sweep = 0; sweep < kSmoothingSweeps; ++sweep) {
     run_.context().check();
@@ -782,11 +807,12 @@ void Improver::smooth() {
   }
 
   const PointSet points{now_.seeds.positions()};
-  const KdTree tree(3, points);
+  std::optional<KdTree> tree;  // few meshes need it
   const auto seeds_within = [&](const Vec3& x, double squared) {
     std::vector<std::pair<Index, double>> found;
     const double q[3] = {x.x, x.y, x.z};
-    tree.radiusSearch(q, squared, found, nanoflann::SearchParams());
+    if (!tree) tree.emplace(3, points);
+    tree->radiusSearch(q, squared, found, nanoflann::SearchParams());
     std::vector<Index> seeds;
     for (const auto& [seed, distance] : found) seeds.push_back(seed);
     return seeds;

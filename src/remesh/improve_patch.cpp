@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/parallel.h"
 #include "cvt/constrain.h"
 
 namespace bisector {
@@ -125,12 +126,26 @@ Index ImprovePatch::add_vertex(const PatchVertex& vertex) {
   return static_cast<Index>(vertices_.size() - 1);
 }
 
+ImprovePatch::PatchTriangle ImprovePatch::make_triangle(const Triangle& t) const {
+  const Vec3 &a = vertices_[t[0]].x, &b = vertices_[t[1]].x, &c = vertices_[t[2]].x;
+  PatchTriangle triangle{t, unit(cross(b - a, c - a)), 0, true};
+  triangle.cost = cost_of(triangle);
+  return triangle;
+}
+
 void ImprovePatch::add_triangle(const Triangle& t) {
   const Index index = static_cast<Index>(triangles_.size());
-  const Vec3 &a = vertices_[t[0]].x, &b = vertices_[t[1]].x, &c = vertices_[t[2]].x;
-  triangles_.push_back({t, unit(cross(b - a, c - a)), 0, true});
-  triangles_.back().cost = cost_of(triangles_.back());
+  triangles_.push_back(make_triangle(t));
   for (const Index v : t) stars_[v].push_back(index);
+}
+
+void ImprovePatch::set_mesh(const std::vector<PatchVertex>& vertices, const std::vector<Triangle>& triangles,
+                            const Csr<Index>& stars) {
+  vertices_ = vertices;
+  triangles_.resize(triangles.size());
+  parallel_each(triangles.size(), [&](std::size_t t) { triangles_[t] = make_triangle(triangles[t]); });
+  stars_.resize(vertices.size());
+  parallel_each(vertices.size(), [&](std::size_t v) { stars_[v].assign(stars.begin(v), stars.end(v)); });
 }
 
 void ImprovePatch::lock(std::vector<LockedEdge> edges) {

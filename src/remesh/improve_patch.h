@@ -85,6 +85,9 @@ class ImprovePatch {
 
   Index add_vertex(const PatchVertex& vertex);
   void add_triangle(const Triangle& t);
+  // All at once, in place of what was there; `stars` are the triangles at each vertex.
+  void set_mesh(const std::vector<PatchVertex>& vertices, const std::vector<Triangle>& triangles,
+                const Csr<Index>& stars);
   // `degree`: triangles at the vertex, here and outside.
   void set_outside(Index v, std::size_t degree) {
     vertices_[v].outside = static_cast<Index>(degree - stars_[v].size());
@@ -134,6 +137,7 @@ class ImprovePatch {
     bool alive = true;
   };
 
+  PatchTriangle make_triangle(const Triangle& t) const;
   double cost_of(const PatchTriangle& t) const;
   double star_cost(Index v) const;
   int excess_degree(Index v) const;

@@ -118,7 +118,7 @@ struct Neighbours::Grown {
 
 struct Neighbours::LastRung {
   std::once_flag once;
-  std::optional<Csr<Index>> rings;                // by slot, ascending distance
+  std::optional<Csr<Index>> rings;                  // by slot, ascending distance
   std::atomic<std::size_t> entries_without_it = 0;  // of lists
 };
 
