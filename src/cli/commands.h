@@ -4,7 +4,10 @@
 #include <CLI/CLI.hpp>
 
 #include <functional>
+#include <string>
 #include <vector>
+
+#include "bisector/error.h"
 
 namespace bisector::cli {
 
@@ -23,6 +26,13 @@ struct CommandText {
   const char* notes = "";  // below the examples
 };
 
+// Some jobs of a batch are not done.
+class JobsFailed : public Error {
+ public:
+  JobsFailed(const std::string& what, std::size_t count) : Error(what), jobs(count) {}
+  std::size_t jobs;
+};
+
 // A subcommand whose options have been added to the program.
 struct Command {
   CLI::App* app;
@@ -32,7 +42,10 @@ struct Command {
   // Reads the input, calls the library, and writes and prints the result. Throws Error and Cancelled; then no output
   // was written, except for a check whose report tells what does not agree.
   std::function<void()> run;
+  // Of errors, those of usage too; jobs that failed are counted by exit codes up to kMostJobs.
+  int failure = 0;  // 0: those of the program
 };
+inline constexpr int kMostJobs = 100;
 
 Command add_remesh(CLI::App& program);
 Command add_rvd(CLI::App& program);
@@ -42,5 +55,6 @@ Command add_tree(CLI::App& program);
 Command add_quality(CLI::App& program);
 Command add_devices(CLI::App& program);
 Command add_check(CLI::App& program);
+Command add_batch(CLI::App& program);
 
 }  // namespace bisector::cli

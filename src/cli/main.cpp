@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
-#include <functional>
 #include <new>
 #include <string>
 #include <vector>
@@ -18,20 +17,23 @@ namespace {
 
 using namespace bisector::cli;
 
-int fail_usage(const std::string& message, const CLI::App* command) {
-  const std::string help = command ? "bisector " + command->get_name() + " --help" : "bisector --help";
+int fail_usage(const std::string& message, const Command* command) {
+  const std::string help = command ? "bisector " + command->app->get_name() + " --help" : "bisector --help";
   print_error(message + "; see " + help);
-  return kUsage;
+  return command && command->failure ? command->failure : kUsage;
 }
 
 // Runs the command and maps what it throws to an exit code.
-int run_guarded(const std::function<void()>& command) {
+int run_guarded(const Command& command) {
   try {
-    command();
+    command.run();
     return kSuccess;
   } catch (const bisector::Cancelled&) {
     std::fputs("bisector: cancelled\n", stderr);
     return kInterrupted;
+  } catch (const JobsFailed& error) {
+    print_error(error.what());
+    return static_cast<int>(std::min<std::size_t>(error.jobs, kMostJobs));
   } catch (const std::bad_alloc&) {
     print_error(bisector::job::kNoMemory);
   } catch (const bisector::Error& error) {
@@ -39,7 +41,7 @@ int run_guarded(const std::function<void()>& command) {
   } catch (const std::exception& error) {
     print_error(error.what());
   }
-  return kFailure;
+  return command.failure ? command.failure : kFailure;
 }
 
 }  // namespace
@@ -58,7 +60,7 @@ int main(int argc, char** argv) {
     if (chosen() && chosen()->check_usage) chosen()->check_usage();
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    return fail_usage(error.what(), chosen() ? chosen()->app : nullptr);
+    return fail_usage(error.what(), chosen());
   }
   if (!chosen()) {
     std::fputs(app.help().c_str(), stdout);
@@ -66,5 +68,5 @@ int main(int argc, char** argv) {
   }
 
   watch_interrupts();
-  return run_guarded(chosen()->run);
+  return run_guarded(*chosen());
 }

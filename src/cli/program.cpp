@@ -48,8 +48,8 @@ Program make_program() {
   app.set_version_flag("--version", std::string("bisector ") + BISECTOR_VERSION, "print the version and exit");
   app.get_help_ptr()->description("print this and exit");
   app.require_subcommand(0, 1);
-  program.commands = {add_remesh(app), add_rvd(app),     add_tet(app),     add_segment(app),
-                      add_tree(app),   add_quality(app), add_devices(app), add_check(app)};
+  program.commands = {add_remesh(app),  add_rvd(app),     add_tet(app),   add_segment(app), add_tree(app),
+                      add_quality(app), add_devices(app), add_check(app), add_batch(app)};
   return program;
 }
 

@@ -1,0 +1,172 @@
+#include "batch/batch.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "batch/record.h"
+#include "batch/summary.h"
+#include "bisector/error.h"
+#include "io/files.h"
+
+namespace bisector::batch {
+namespace {
+
+namespace fs = std::filesystem;
+using job::Json;
+
+constexpr double kLookEvery = 0.02;  // seconds
+
+// Keeps others from running the same shard; the system lets go of it however this process ends.
+class Lock {
+ public:
+  explicit Lock(const std::string& path) : descriptor_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+    if (descriptor_ < 0) throw Error(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+    if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
+    close(descriptor_);
+    throw Error(path + ": these jobs are being run by another process; wait for it, or name another folder");
+  }
+  ~Lock() { close(descriptor_); }
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
+class Batch {
+ public:
+  Batch(const std::vector<BatchJob>& jobs, const BatchOptions& options, const Ended& ended)
+      : jobs_(jobs), options_(options), ended_(ended), records_(jobs.size()) {}
+
+  BatchResult run(const std::atomic<bool>& cancel);
+
+ private:
+  struct Running {
+    std::size_t job;
+    std::unique_ptr<Child> child;
+  };
+
+  std::string file(const BatchJob& job, const char* ending) const { return options_.folder + "/" + job.name + ending; }
+  bool is_mine(std::size_t k) const { return k % options_.shards == options_.shard; }
+  void read_records();
+  std::vector<std::string> words_of(const BatchJob& job) const;
+  void start(std::size_t k);
+  void collect();
+  void finish(const Running& running);
+
+  const std::vector<BatchJob>& jobs_;
+  const BatchOptions& options_;
+  const Ended& ended_;
+  std::vector<Json> records_;
+  std::vector<std::size_t> waiting_;  // the next one last
+  std::vector<Running> running_;
+  BatchResult result_;
+};
+
+void Batch::read_records() {
+  for (std::size_t k = jobs_.size(); k-- > 0;) {
+    const bool retry = options_.retry && is_mine(k);
+    if (std::optional<Json> record = read_record(file(jobs_[k], ".json"), jobs_[k], retry)) {
+      records_[k] = *std::move(record);
+      result_.known += is_mine(k);
+    } else if (is_mine(k)) {
+      waiting_.push_back(k);
+    }
+  }
+}
+
+std::vector<std::string> Batch::words_of(const BatchJob& job) const {
+  std::vector<std::string> words{options_.program};
+  words.insert(words.end(), job.words.begin(), job.words.end());
+  words.insert(words.end(), {"--report", file(job, ".report.json")});
+  if (options_.at_once > 1 && !job.options.contains("threads")) {
+    const unsigned cores = std::max(std::thread::hardware_concurrency(), 1u);
+    words.push_back(fmt::format("--threads={}", std::max(cores / options_.at_once, 1u)));
+  }
+  return words;
+}
+
+void Batch::start(std::size_t k) {
+  const BatchJob& job = jobs_[k];
+  std::error_code error;
+  for (const char* old : {".json", ".report.json"}) fs::remove(file(job, old), error);
+  for (const std::string& output : job.outputs)
+    if (const fs::path folder = fs::path(output).parent_path(); !folder.empty()) fs::create_directories(folder, error);
+  running_.push_back({k, std::make_unique<Child>(words_of(job), file(job, ".log"), options_.limits)});
+}
+
+void Batch::collect() {
+  for (std::size_t k = 0; k < running_.size();) {
+    if (running_[k].child->has_ended()) {
+      const Running ended = std::move(running_[k]);
+      running_.erase(running_.begin() + static_cast<std::ptrdiff_t>(k));
+      finish(ended);
+    } else {
+      ++k;
+    }
+  }
+}
+
+void Batch::finish(const Running& running) {
+  const BatchJob& job = jobs_[running.job];
+  const Outcome& outcome = running.child->outcome();
+  const std::string report_file = file(job, ".report.json");
+  std::ifstream report(report_file);
+  Json& record = records_[running.job];
+  record = make_record(job, outcome, message_of(outcome, options_.limits, last_error(file(job, ".log"))),
+                       report ? Json::parse(report, nullptr, false) : Json());
+  if (record["report"].is_discarded()) record["report"] = nullptr;
+  write_file(file(job, ".json"), record.dump(1) + "\n");
+  std::error_code error;
+  fs::remove(report_file, error);
+  ++result_.ran;
+  ended_(job, record);
+}
+
+BatchResult Batch::run(const std::atomic<bool>& cancel) {
+  std::error_code error;
+  fs::create_directories(options_.folder, error);
+  if (error) throw Error(fmt::format("{}: the folder cannot be made: {}", options_.folder, error.message()));
+  const Lock lock(fmt::format("{}/.shard-{}-of-{}.lock", options_.folder, options_.shard, options_.shards));
+  read_records();
+  while (!cancel && (!waiting_.empty() || !running_.empty())) {
+    while (!waiting_.empty() && running_.size() < options_.at_once) {
+      start(waiting_.back());
+      waiting_.pop_back();
+    }
+    wait_for_children(kLookEvery);
+    collect();
+  }
+  for (const Running& running : running_) running.child->stop();
+  while (!running_.empty()) {
+    wait_for_children(kLookEvery);
+    std::erase_if(running_, [](const Running& running) { return running.child->has_ended(); });
+  }
+  for (std::size_t k = 0; k < jobs_.size(); ++k)
+    if (is_mine(k) && !records_[k].is_null() && records_[k]["status"] != word_of(Ending::done))
+      result_.failed.push_back(jobs_[k].name);
+  result_.summary = summary_of(jobs_, records_);
+  write_summary(options_.folder, result_.summary);
+  if (cancel) throw Cancelled();
+  return std::move(result_);
+}
+
+}  // namespace
+
+BatchResult run_batch(const std::vector<BatchJob>& jobs, const BatchOptions& options, const std::atomic<bool>& cancel,
+                      const Ended& ended) {
+  return Batch(jobs, options, ended).run(cancel);
+}
+
+}  // namespace bisector::batch

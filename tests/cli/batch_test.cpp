@@ -1,0 +1,201 @@
+// Batches as scripts see them: what fails costs nothing but itself, and nothing is done twice.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/command_line.h"
+
+namespace bisector {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Json;
+using test::read_text;
+using test::Result;
+
+class CliBatch : public test::Cli {
+ protected:
+  std::string line(const std::string& name, int vertices) const {
+    return fmt::format("{{\"command\": \"remesh\", \"input\": \"{}\", \"output\": \"{}\", \"n\": {}}}\n",
+                       in("sphere.off"), in(name + ".off"), vertices);
+  }
+
+  // A program that does what the name of its output says, or else what bisector does; it notes each call.
+  std::string misbehaving() const {
+    write_text("program.sh", fmt::format(R"(#!/bin/bash
+echo "$4" >>{0}
+case $4 in
+*crash*) kill -SEGV $$ ;;
+*hang*) trap '' TERM; while :; do sleep 0.05; done ;;
+*eat*) exec tail /dev/zero ;;
+*leave*) sleep 1000 & exit 3 ;;
+*slow*) sleep 0.3 ;;
+esac
+exec {1} "$@"
+)",
+                                         in("calls"), BISECTOR_PROGRAM));
+    fs::permissions(in("program.sh"), fs::perms::owner_all);
+    return in("program.sh");
+  }
+
+  std::map<std::string, int> calls() const {
+    std::map<std::string, int> counts;
+    std::ifstream file(in("calls"));
+    for (std::string name; std::getline(file, name);) ++counts[fs::path(name).stem()];
+    return counts;
+  }
+
+  Json record(const std::string& name) const { return Json::parse(read_text(in("results/" + name + ".json"))); }
+  Json summary() const { return Json::parse(read_text(in("results/summary.json"))); }
+  std::vector<std::string> batch(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"batch", in("jobs.jsonl"), "-o", in("results")});
+    return more;
+  }
+};
+
+TEST_F(CliBatch, RunsEachJobOnce) {
+  write_text("jobs.jsonl", line("a", 100) + "\n" + line("b", 200) +
+                               fmt::format("{{\"name\": \"measured\", \"command\": \"quality\", \"input\": \"{}\"}}\n",
+                                           in("sphere.off")));
+  const Result first = run(batch({"--jobs", "2"}));
+  EXPECT_EQ(first.code, 0) << first.err;
+  EXPECT_EQ(first.err, "");
+  EXPECT_EQ(record("a")["status"], "done");
+  EXPECT_EQ(record("b")["report"]["output"]["vertices"], 200);
+  EXPECT_EQ(record("measured")["report"]["command"], "quality");
+  const Json table = summary();
+  ASSERT_EQ(table["rows"].size(), 3u);
+  EXPECT_EQ(table["statuses"], (Json{{"done", 3}}));
+  EXPECT_EQ(table["rows"][0]["name"], "a");
+  EXPECT_EQ(table["rows"][1]["vertices"], 200);
+  EXPECT_GT(table["rows"][1]["theta_min"], 30);
+  EXPECT_GT(table["rows"][1]["memory_mib"], 1);
+
+  // The same result as the command's, and again the same summary, byte for byte, for nothing is run.
+  EXPECT_EQ(run({"remesh", in("sphere.off"), "-o", in("b-alone.off"), "-n", "200"}).code, 0);
+  EXPECT_EQ(read_text(in("b.off")), read_text(in("b-alone.off")));
+  const std::string before = read_text(in("results/summary.json"));
+  const Result second = run(batch());
+  EXPECT_EQ(second.code, 0);
+  EXPECT_NE(second.out.find("3 of them before"), std::string::npos) << second.out;
+  EXPECT_EQ(read_text(in("results/summary.json")), before);
+
+  // A changed line, a missing output and a changed input are done again, and nothing else.
+  write_text("jobs.jsonl", line("a", 101) + line("b", 200) + line("c", 100));
+  EXPECT_NE(run(batch()).out.find("1 of them before"), std::string::npos);
+  fs::remove(in("b.off"));
+  EXPECT_NE(run(batch()).out.find("2 of them before"), std::string::npos);
+  fs::last_write_time(in("sphere.off"), fs::file_time_type::clock::now() + std::chrono::hours(1));
+  EXPECT_NE(run(batch()).out.find("0 of them before"), std::string::npos);
+}
+
+TEST_F(CliBatch, WhatFailsCostsNothingButItself) {
+  std::string jobs;
+  for (const char* name : {"a", "crash", "b", "hang", "c", "eat", "leave", "d"}) jobs += line(name, 100);
+  jobs += fmt::format("{{\"command\": \"remesh\", \"input\": \"{}\", \"output\": \"{}\", \"n\": 100}}\n",
+                      in("missing.off"), in("e.off"));
+  write_text("jobs.jsonl", jobs);
+  const Result result = run(batch({"--jobs", "3", "--timeout", "4", "--memory", "300MB", "--program", misbehaving()}));
+  EXPECT_EQ(result.code, 5) << result.err;
+  EXPECT_NE(result.err.find("5 of 9 jobs failed: crash, hang, eat, leave, e;"), std::string::npos) << result.err;
+  for (const char* name : {"a", "b", "c", "d"}) {
+    EXPECT_EQ(record(name)["status"], "done") << name;
+    EXPECT_TRUE(fs::exists(in(std::string(name) + ".off"))) << name;
+  }
+  EXPECT_EQ(record("crash")["status"], "crashed");
+  EXPECT_EQ(record("crash")["signal"], SIGSEGV);
+  EXPECT_EQ(record("hang")["status"], "timeout");
+  EXPECT_EQ(record("eat")["status"], "memory");
+  EXPECT_EQ(record("leave")["exit_code"], 3);
+  EXPECT_EQ(record("e")["status"], "failed");
+  EXPECT_NE(record("e")["message"].get<std::string>().find("missing.off"), std::string::npos);
+  // What a job left behind is gone.
+  std::size_t sleeping = 0;
+  for (const auto& process : fs::directory_iterator("/proc"))
+    sleeping += read_text(process.path() / "cmdline") == std::string("sleep\0001000\0", 11);
+  EXPECT_EQ(sleeping, 0u);
+
+  std::istringstream csv(read_text(in("results/summary.csv")));
+  std::size_t lines = 0;
+  for (std::string text; std::getline(csv, text);) ++lines;
+  EXPECT_EQ(lines, 10u);
+  EXPECT_TRUE(fs::exists(in("results/summary.html")));
+
+  // What failed counts as done, unless it is to be tried again.
+  const std::map<std::string, int> before = calls();
+  EXPECT_EQ(run(batch({"--program", misbehaving()})).code, 5);
+  EXPECT_EQ(calls(), before);
+  write_text("jobs.jsonl", line("a", 100) + line("crash", 100));
+  EXPECT_EQ(run(batch({"--retry"})).code, 0);
+  EXPECT_EQ(record("crash")["status"], "done");
+}
+
+TEST_F(CliBatch, GoesOnWhereItWasKilled) {
+  std::string jobs;
+  for (int k = 0; k < 12; ++k) jobs += line(fmt::format("slow-{}", k), 50 + k);
+  write_text("jobs.jsonl", jobs);
+  const std::string program = misbehaving();
+  for (const int signal : {SIGKILL, SIGTERM}) {
+    const pid_t process = start(batch({"--jobs", "2", "--program", program}));
+    std::this_thread::sleep_for(std::chrono::milliseconds(900));
+    kill(process, signal);
+    const Result result = finish(process);
+    EXPECT_EQ(result.code, signal == SIGTERM ? 130 : -1) << result.err;
+  }
+  std::size_t done = 0;
+  for (int k = 0; k < 12; ++k) done += fs::exists(in(fmt::format("results/slow-{}.json", k)));
+  EXPECT_GT(done, 0u);
+  EXPECT_LT(done, 12u);
+  EXPECT_EQ(run(batch({"--jobs", "2", "--program", program})).code, 0);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 12}}));
+  // At most those that ran when it was killed were begun a second time.
+  int again = 0;
+  for (const auto& [name, count] : calls()) again += count - 1;
+  EXPECT_LE(again, 4);
+}
+
+TEST_F(CliBatch, ShardsMakeOneTable) {
+  std::string jobs;
+  for (int k = 0; k < 5; ++k) jobs += line(fmt::format("{}", k), 60);
+  write_text("jobs.jsonl", jobs);
+  EXPECT_EQ(run(batch({"--shard", "1/2"})).code, 0);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 2}, {"waiting", 3}}));
+  EXPECT_EQ(run(batch({"--shard", "0/2"})).code, 0);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 5}}));
+}
+
+TEST_F(CliBatch, BadJobsAreOneLineAndNothingIsRun) {
+  const std::string good = line("a", 100);
+  const auto expect = [&](const std::string& text, const std::string& part) {
+    write_text("jobs.jsonl", text);
+    expect_failure(255, batch(), part);
+  };
+  expect("", "has no jobs");
+  expect(good + "remesh in.off\n", "line 2: is not JSON");
+  expect("[1]\n", "line 1: is no JSON object");
+  expect("{\"command\": \"mesh\", \"input\": \"a.off\"}\n", "line 1: there is no command \"mesh\"");
+  expect("{\"command\": \"remesh\", \"output\": \"a.off\"}\n", "line 1: \"input\" is missing");
+  expect(good + "\n" + line("b", 100).insert(1, "\"vertecis\": 5, "), "line 3: The following argument");
+  expect(line("a", 100).insert(1, "\"report\": \"r.json\", "), "\"report\" cannot be given");
+  expect(good + good, "line 2: " + in("a.off") + " is written by line 1, too");
+  expect(line("a", 100).insert(1, "\"name\": \"x/y\", "), "\"x/y\" cannot be the name");
+  expect(line("a", 100).insert(1, "\"name\": \"x\", ") + line("b", 100).insert(1, "\"name\": \"x\", "),
+         "line 2: the name \"x\" is that of line 1");
+  write_text("jobs.jsonl", good);
+  expect_failure(255, batch({"--shard", "2/2"}), "--shard 2/2 is not INDEX/COUNT");
+  expect_failure(255, {"batch", in("none.jsonl"), "-o", in("results")}, "none.jsonl: cannot be opened");
+  expect_failure(255, {"batch", in("jobs.jsonl")}, "-o is required");
+}
+
+}  // namespace
+}  // namespace bisector
