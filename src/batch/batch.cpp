@@ -27,18 +27,23 @@ using job::Json;
 
 constexpr double kLookEvery = 0.02;  // seconds
 
-// Keeps others from running the same shard; the system lets go of it however this process ends.
+// A file that one process at a time holds; the system lets go of it however that process ends.
 class Lock {
  public:
   explicit Lock(const std::string& path) : descriptor_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
     if (descriptor_ < 0) throw Error(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
-    if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
-    close(descriptor_);
-    throw Error(path + ": these jobs are being run by another process; wait for it, or name another folder");
   }
   ~Lock() { close(descriptor_); }
   Lock(const Lock&) = delete;
   Lock& operator=(const Lock&) = delete;
+
+  // Whether it is free and now held.
+  bool try_to_hold() { return flock(descriptor_, LOCK_EX | LOCK_NB) == 0; }
+  // Waits until it is.
+  void hold() {
+    while (flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+  }
 
  private:
   int descriptor_;
@@ -59,7 +64,9 @@ class Batch {
 
   std::string file(const BatchJob& job, const char* ending) const { return options_.folder + "/" + job.name + ending; }
   bool is_mine(std::size_t k) const { return k % options_.shards == options_.shard; }
+  void read_record_of(std::size_t k);
   void read_records();
+  void write_summary_of_all();
   std::vector<std::string> words_of(const BatchJob& job) const;
   void start(std::size_t k);
   void collect();
@@ -74,16 +81,28 @@ class Batch {
   BatchResult result_;
 };
 
+void Batch::read_record_of(std::size_t k) {
+  const bool retry = options_.retry && is_mine(k);
+  records_[k] = read_record(file(jobs_[k], ".json"), jobs_[k], retry).value_or(Json());
+}
+
 void Batch::read_records() {
   for (std::size_t k = jobs_.size(); k-- > 0;) {
-    const bool retry = options_.retry && is_mine(k);
-    if (std::optional<Json> record = read_record(file(jobs_[k], ".json"), jobs_[k], retry)) {
-      records_[k] = *std::move(record);
-      result_.known += is_mine(k);
-    } else if (is_mine(k)) {
-      waiting_.push_back(k);
-    }
+    if (!is_mine(k)) continue;
+    read_record_of(k);
+    if (records_[k].is_null()) waiting_.push_back(k);
+    else ++result_.known;
   }
+}
+
+// Shards may end at the same time: the last one that comes here finds the records of all others.
+void Batch::write_summary_of_all() {
+  Lock lock(options_.folder + "/.summary.lock");
+  lock.hold();
+  for (std::size_t k = 0; k < jobs_.size(); ++k)
+    if (!is_mine(k)) read_record_of(k);
+  result_.summary = summary_of(jobs_, records_);
+  write_summary(options_.folder, result_.summary);
 }
 
 std::vector<std::string> Batch::words_of(const BatchJob& job) const {
@@ -138,7 +157,11 @@ BatchResult Batch::run(const std::atomic<bool>& cancel) {
   std::error_code error;
   fs::create_directories(options_.folder, error);
   if (error) throw Error(fmt::format("{}: the folder cannot be made: {}", options_.folder, error.message()));
-  const Lock lock(fmt::format("{}/.shard-{}-of-{}.lock", options_.folder, options_.shard, options_.shards));
+  const std::string lock_file =
+      fmt::format("{}/.shard-{}-of-{}.lock", options_.folder, options_.shard, options_.shards);
+  Lock lock(lock_file);
+  if (!lock.try_to_hold())
+    throw Error(lock_file + ": these jobs are being run by another process; wait for it, or name another folder");
   read_records();
   while (!cancel && (!waiting_.empty() || !running_.empty())) {
     while (!waiting_.empty() && running_.size() < options_.at_once) {
@@ -156,8 +179,7 @@ BatchResult Batch::run(const std::atomic<bool>& cancel) {
   for (std::size_t k = 0; k < jobs_.size(); ++k)
     if (is_mine(k) && !records_[k].is_null() && records_[k]["status"] != word_of(Ending::done))
       result_.failed.push_back(jobs_[k].name);
-  result_.summary = summary_of(jobs_, records_);
-  write_summary(options_.folder, result_.summary);
+  write_summary_of_all();
   if (cancel) throw Cancelled();
   return std::move(result_);
 }

@@ -55,14 +55,18 @@ std::string csv_cell(const Json& value) {
 
 Json summary_of(const std::vector<BatchJob>& jobs, const std::vector<Json>& records) {
   std::map<std::string, std::size_t> counts;
-  Json rows = Json::array();
+  Json rows = Json::array(), failed = Json::array();
   for (std::size_t k = 0; k < jobs.size(); ++k) {
     rows.push_back(row_of(jobs[k], records[k]));
-    ++counts[rows.back()["status"]];
+    const Json& row = rows.back();
+    ++counts[row["status"]];
+    if (row.contains("message"))
+      failed.push_back({{"name", row["name"]}, {"status", row["status"]}, {"message", row["message"]}});
   }
   Json summary = job::start_report("batch");
   summary["jobs"] = jobs.size();
   for (const auto& [status, count] : counts) summary["statuses"][status] = count;
+  summary["failed"] = std::move(failed);
   summary["rows"] = std::move(rows);
   return summary;
 }

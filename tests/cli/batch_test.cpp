@@ -57,6 +57,24 @@ exec {1} "$@"
 
   Json record(const std::string& name) const { return Json::parse(read_text(in("results/" + name + ".json"))); }
   Json summary() const { return Json::parse(read_text(in("results/summary.json"))); }
+  static bool has_program(const std::string& name) {
+    return std::system(("PATH=$PATH:/usr/sbin command -v " + name + " >/dev/null").c_str()) == 0;
+  }
+
+  // The exit code of a command in the folder of the files, with the program as $BISECTOR.
+  int shell(const std::string& command) const {
+    const int status = std::system(
+        fmt::format("cd '{}' && export BISECTOR='{}' && {} >{} 2>&1", in(""), BISECTOR_PROGRAM, command, in("shell"))
+            .c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  std::string shard_jobs() const {
+    std::string jobs;
+    for (int k = 0; k < 5; ++k) jobs += line(fmt::format("{}", k), 60);
+    return jobs;
+  }
+
   std::vector<std::string> batch(std::vector<std::string> more = {}) const {
     more.insert(more.begin(), {"batch", in("jobs.jsonl"), "-o", in("results")});
     return more;
@@ -119,6 +137,9 @@ TEST_F(CliBatch, WhatFailsCostsNothingButItself) {
   EXPECT_EQ(record("leave")["exit_code"], 3);
   EXPECT_EQ(record("e")["status"], "failed");
   EXPECT_NE(record("e")["message"].get<std::string>().find("missing.off"), std::string::npos);
+  ASSERT_EQ(summary()["failed"].size(), 5u);
+  EXPECT_EQ(summary()["failed"][1]["name"], "hang");
+  EXPECT_EQ(summary()["failed"][1]["message"], "took longer than 4 s");
   // What a job left behind is gone.
   std::size_t sleeping = 0;
   for (const auto& process : fs::directory_iterator("/proc"))
@@ -145,17 +166,20 @@ TEST_F(CliBatch, GoesOnWhereItWasKilled) {
   for (int k = 0; k < 12; ++k) jobs += line(fmt::format("slow-{}", k), 50 + k);
   write_text("jobs.jsonl", jobs);
   const std::string program = misbehaving();
+  const auto records = [&] {
+    std::size_t count = 0;
+    for (int k = 0; k < 12; ++k) count += fs::exists(in(fmt::format("results/slow-{}.json", k)));
+    return count;
+  };
   for (const int signal : {SIGKILL, SIGTERM}) {
     const pid_t process = start(batch({"--jobs", "2", "--program", program}));
-    std::this_thread::sleep_for(std::chrono::milliseconds(900));
+    const std::size_t before = records();
+    while (records() < before + 3) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     kill(process, signal);
     const Result result = finish(process);
     EXPECT_EQ(result.code, signal == SIGTERM ? 130 : -1) << result.err;
   }
-  std::size_t done = 0;
-  for (int k = 0; k < 12; ++k) done += fs::exists(in(fmt::format("results/slow-{}.json", k)));
-  EXPECT_GT(done, 0u);
-  EXPECT_LT(done, 12u);
+  EXPECT_LT(records(), 12u);
   EXPECT_EQ(run(batch({"--jobs", "2", "--program", program})).code, 0);
   EXPECT_EQ(summary()["statuses"], (Json{{"done", 12}}));
   // At most those that ran when it was killed were begun a second time.
@@ -165,12 +189,53 @@ TEST_F(CliBatch, GoesOnWhereItWasKilled) {
 }
 
 TEST_F(CliBatch, ShardsMakeOneTable) {
-  std::string jobs;
-  for (int k = 0; k < 5; ++k) jobs += line(fmt::format("{}", k), 60);
-  write_text("jobs.jsonl", jobs);
+  write_text("jobs.jsonl", shard_jobs());
   EXPECT_EQ(run(batch({"--shard", "1/2"})).code, 0);
   EXPECT_EQ(summary()["statuses"], (Json{{"done", 2}, {"waiting", 3}}));
   EXPECT_EQ(run(batch({"--shard", "0/2"})).code, 0);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 5}}));
+
+  // Whoever ends last has the others' records, though they came while it ran.
+  fs::remove_all(in("results"));
+  std::vector<pid_t> shards;
+  for (int k = 0; k < 3; ++k) shards.push_back(start(batch({"--shard", fmt::format("{}/3", k)})));
+  for (const pid_t shard : shards) EXPECT_EQ(finish(shard).code, 0);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 5}}));
+}
+
+TEST_F(CliBatch, OneProcessRunsAShard) {
+  write_text("jobs.jsonl", line("slow-a", 60) + line("slow-b", 60));
+  const std::string program = misbehaving();
+  const pid_t first = start(batch({"--program", program}));
+  while (!fs::exists(in("calls"))) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  expect_failure(255, batch(), "are being run by another process");
+  EXPECT_EQ(finish(first).code, 0);
+}
+
+// The recipes of cli.md.
+TEST_F(CliBatch, GnuParallelRunsShards) {
+  if (!has_program("parallel")) GTEST_SKIP() << "GNU parallel is not installed";
+  write_text("jobs.jsonl", shard_jobs());
+  EXPECT_EQ(shell("parallel --will-cite --jobs 2 $BISECTOR batch jobs.jsonl -o results --quiet --shard {}/3 ::: 0 1 2"),
+            0);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 5}}));
+  // Its exit code is the number of shards in which a job failed.
+  write_text("jobs.jsonl", shard_jobs() + line("missing", 60).replace(0, 1, "{\"keep_vertices\": \"no.txt\", "));
+  EXPECT_EQ(shell("parallel --will-cite --jobs 2 $BISECTOR batch jobs.jsonl -o results --quiet --shard {}/3 ::: 0 1 2"),
+            1);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 5}, {"failed", 1}}));
+}
+
+TEST_F(CliBatch, SlurmRunsShards) {
+  if (!has_program("slurmctld") || !has_program("munged")) GTEST_SKIP() << "Slurm is not installed";
+  write_text("jobs.jsonl", shard_jobs());
+  write_text("array.sh", R"(#!/bin/bash
+$BISECTOR batch jobs.jsonl -o results --shard $SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT --jobs $SLURM_CPUS_ON_NODE
+)");
+  fs::create_directory(in("slurm"));
+  const int code = shell(BISECTOR_SOURCE_DIR "/tests/cli/with_slurm slurm sbatch --quiet --wait --array=0-2 array.sh");
+  if (code == 77) GTEST_SKIP() << "Slurm's daemons do not start here";
+  EXPECT_EQ(code, 0);
   EXPECT_EQ(summary()["statuses"], (Json{{"done", 5}}));
 }
 

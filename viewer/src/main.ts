@@ -51,7 +51,7 @@ function cell(value: Json, column = ""): string {
 
 // Arrays of objects, as devices and the rows of a check.
 function showTables(report: Json): void {
-  for (const [key, title] of [["devices", "Devices"], ["rows", "Cases"], ["trees", "Trees"]]) {
+  for (const [key, title] of [["devices", "Devices"], ["failed", "Failed"], ["rows", "Cases"], ["trees", "Trees"]]) {
     const rows: Json[] = report[key] ?? [];
     if (rows.length === 0) continue;
     const columns = [...new Set(rows.flatMap((row) => Object.keys(row)))];
