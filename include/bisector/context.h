@@ -9,6 +9,8 @@
 
 namespace bisector {
 
+class Checkpoint;
+
 struct Progress {
   std::string phase;   // "level 1/3", "on the surface", ...
   int iteration = 0;   // within the phase
@@ -22,6 +24,7 @@ struct Context {
   std::function<void(const Progress&)> progress;    // may be empty
   std::function<void(const std::string&)> warning;  // one line each; may be empty
   const std::atomic<bool>* cancel = nullptr;        // may be null; polled at phase boundaries
+  Checkpoint* checkpoint = nullptr;                 // may be null (bisector/checkpoint.h)
 
   void report(const Progress& p) const {
     if (progress) progress(p);

@@ -79,6 +79,12 @@ void Console::print(std::string_view line) {
   fmt::print(out_, "{}\n", line);
 }
 
+void Console::note(std::string_view line) {
+  if (quiet_) return;
+  clear_line();
+  fmt::print(stderr, "bisector: {}\n", job::one_line(line));
+}
+
 void Console::print_written(const std::vector<std::string>& paths) {
   std::string line;
   for (const std::string& path : paths)

@@ -33,6 +33,8 @@ class Console {
   job::Journal& journal() { return journal_; }
   // One line of the summary.
   void print(std::string_view line);
+  // One line on stderr beside the summary.
+  void note(std::string_view line);
   // The line that a summary ends with; empty names and "-" are left out.
   void print_written(const std::vector<std::string>& paths);
 

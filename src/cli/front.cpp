@@ -43,6 +43,16 @@ void add_common_options(CLI::App* app, CommonOptions& options, const char* about
 
 namespace {
 
+void compute(job::Job& job, Console& console) {
+  try {
+    job.compute(console.journal());
+  } catch (const Cancelled&) {
+    const std::string file = job.goes_on_from();
+    if (!file.empty()) console.note(file + " has what was done; --resume goes on from it");
+    throw;
+  }
+}
+
 void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary) {
   const Stopwatch total;
   const std::string& report_path = files.common.report;
@@ -61,7 +71,7 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
   for (const job::OutputKind& kind : kinds)
     if (const std::string& path = files.outputs.at(kind.name); !path.empty())
       job.check_format(kind.name, path, journal);
-  job.compute(journal);
+  compute(job, console);
   job::Json report;
   view::Scene scene;
   if (!report_path.empty()) report = job.report(journal);
@@ -80,6 +90,7 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
     report["seconds"] = job.seconds;
     job::write_report(report_path, report, journal.warnings(), scene);
   }
+  job.finish();
   print_summary(console, job, files);
   std::vector<std::string> written;
   for (const job::OutputKind& kind : kinds) written.push_back(files.outputs.at(kind.name));

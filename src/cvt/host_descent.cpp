@@ -158,6 +158,24 @@ void HostDescent::start() {
   set_weights();
 }
 
+void HostDescent::go_on() {
+  now.known = {};
+  measure(now);
+  set_weights();
+}
+
+void HostDescent::write_pairs(const Lbfgs& history, ByteWriter& out) const {
+  for (const std::size_t number : history.numbers())
+    out.put_all(vectors_.pairs[number].step).put_all(vectors_.pairs[number].change);
+}
+
+void HostDescent::read_pairs(const Lbfgs& history, ByteReader& in) {
+  for (const std::size_t number : history.numbers()) {
+    in.get_all(vectors_.pairs[number].step);
+    in.get_all(vectors_.pairs[number].change);
+  }
+}
+
 // From masses that do not vanish with the cell, or all steps of a neighbourhood without any from the mean.
 void HostDescent::set_weights() {
   const std::vector<double>& masses = now.moments().step_mass;

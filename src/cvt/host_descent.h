@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "backend/seed_descent.h"
+#include "checkpoint/bytes.h"
+#include "cvt/lbfgs.h"
 #include "cvt/run.h"
 
 namespace bisector {
@@ -62,6 +64,11 @@ class HostDescent : public SeedDescent {
   // Makes `now` the iterate: puts its seeds to where they are held, and evaluates them; those of empty cells are put
   // where the energy is highest. Throws Error if the diagram does not cover the domain.
   void start();
+  // The same for seeds that an earlier descent left where they are held, with the normals of `now`.
+  void go_on();
+  // The pairs that take part in the next direction.
+  void write_pairs(const Lbfgs& history, ByteWriter& out) const;
+  void read_pairs(const Lbfgs& history, ByteReader& in);
   DescentVectors& vectors() override { return vectors_; }
   StepResult step(double length, std::size_t pair) override;
   void accept() override;

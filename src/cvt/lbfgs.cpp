@@ -1,5 +1,6 @@
 #include "cvt/lbfgs.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 
@@ -10,6 +11,24 @@ void Lbfgs::push(double sy, double ss, double yy) {
   if (pairs_.size() == memory_) pairs_.pop_front();
   pairs_.push_back({next_, sy, 1 / sy});
   next_ = (next_ + 1) % (memory_ + 1);
+}
+
+std::vector<std::size_t> Lbfgs::numbers() const {
+  std::vector<std::size_t> numbers;
+  for (const Pair& pair : pairs_) numbers.push_back(pair.number);
+  return numbers;
+}
+
+void Lbfgs::write(ByteWriter& out) const { out.put(next_).put_all(std::vector<Pair>(pairs_.begin(), pairs_.end())); }
+
+void Lbfgs::read(ByteReader& in) {
+  std::vector<Pair> pairs;
+  in.get(next_);
+  in.get_all(pairs);
+  const auto is_wrong = [&](const Pair& pair) { return pair.number > memory_; };
+  if (next_ > memory_ || pairs.size() > memory_ || std::any_of(pairs.begin(), pairs.end(), is_wrong))
+    throw Error("the checkpoint's optimiser remembers more steps than this one");
+  pairs_.assign(pairs.begin(), pairs.end());
 }
 
 void Lbfgs::set_direction(DescentVectors& vectors) const {

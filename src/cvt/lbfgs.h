@@ -3,8 +3,10 @@
 #pragma once
 
 #include <deque>
+#include <vector>
 
 #include "backend/seed_descent.h"
+#include "checkpoint/bytes.h"
 
 namespace bisector {
 
@@ -20,6 +22,11 @@ class Lbfgs {
   std::size_t free_pair() const { return next_; }
   // Keeps the free pair, whose products these are. It is dropped if it has no positive curvature.
   void push(double sy, double ss, double yy);
+  // Numbers of the pairs that take part in the next direction.
+  std::vector<std::size_t> numbers() const;
+  // All but the vectors of the pairs.
+  void write(ByteWriter& out) const;
+  void read(ByteReader& in);
   // direction := -H gradient, with the initial inverse Hessian gamma diag(w), gamma = s'y / (y' diag(w) y) of the last
   // pair, or 1.
   void set_direction(DescentVectors& vectors) const;

@@ -6,10 +6,12 @@
 #include <memory>
 #include <utility>
 
+#include "checkpoint/bytes.h"
 #include "core/stopwatch.h"
 #include "cvt/constrain.h"
 #include "cvt/host_descent.h"
 #include "cvt/lbfgs.h"
+#include "cvt/saved_step.h"
 
 namespace bisector {
 namespace {
@@ -25,8 +27,8 @@ constexpr std::size_t kMemory = 8;          // energies that a step is measured 
 // The iterates of one optimisation, with the run's seeds, diagram and normals while it lasts.
 class Descent {
  public:
-  Descent(CvtRun& run, const OptimiseOptions& options)
-      : run_(run), options_(options), on_host_(run, options.constrained) {
+  Descent(CvtRun& run, const OptimiseOptions& options, SavedStep& saved)
+      : run_(run), options_(options), saved_(saved), on_host_(run, options.constrained) {
     on_host_.now.seeds = std::move(run.seeds);
     on_host_.now.known = std::move(run.diagram_);
     on_host_.now.normals = std::move(run.normals_);
@@ -46,9 +48,14 @@ class Descent {
   bool is_done() const;
   void go_on_without_device(const DeviceError& error);
   void hand_back();
+  bool go_on();
+  void begin();
+  void keep_state() const;
+  bool take_step();
 
   CvtRun& run_;
   const OptimiseOptions& options_;
+  SavedStep& saved_;
   HostDescent on_host_;
   std::unique_ptr<ResidentDescent> on_device_;  // none: the iterate is on the host
   std::size_t entered_at_ = 0;                  // how many energies there were when it went to the device
@@ -58,9 +65,11 @@ class Descent {
   double energy_ = 0, gradient_norm_ = 0, first_norm_ = 0;
   int iteration_ = 0;
   bool restarted_ = false;
+  bool moving_ = false;  // the iterate is no longer what it was before the step
 };
 
 void Descent::start() {
+  moving_ = true;
   on_host_.start();
   energy_ = on_host_.now.moments().energy;
   gradient_norm_ = std::sqrt(square_of(on_host_.now.gradient));
@@ -123,6 +132,7 @@ bool Descent::line_search() {
 // Goes to the point that the line search found. Where a cell has become empty there, its seed is put elsewhere, and the
 // history says nothing about that.
 void Descent::accept() {
+  moving_ = true;
   ++run_.totals.iterations;
   space().accept();
   if (on_device_) on_host_.now.known.report = next_.report;
@@ -194,17 +204,69 @@ void Descent::hand_back() {
   run_.gradient_norm = gradient_norm_;
 }
 
-void Descent::minimise() {
+void Descent::begin() {
   start();
   energies_.assign(1, energy_);
   first_norm_ = gradient_norm_;
   enter_device();
+}
+
+// All that the next steps hang on, but for what the seeds determine. What a device has of it stays there.
+void Descent::keep_state() const {
+  if (on_device_) return;
+  ByteWriter state;
+  write_seeds(on_host_.now.seeds, state);
+  state.put_all(on_host_.now.normals).put_all(energies_);
+  state.put(energy_).put(gradient_norm_).put(first_norm_).put(iteration_).put(restarted_);
+  saved_.write_counts(state);
+  history_.write(state);
+  on_host_.write_pairs(history_, state);
+  saved_.keep_state(state.take());
+}
+
+// From the state that was kept, if there is one. It stays on the host, where the pairs are.
+bool Descent::go_on() {
+  const std::optional<std::string> kept = saved_.state();
+  if (!kept) return false;
+  ByteReader state(*kept);
+  Iterate& now = on_host_.now;
+  now.seeds = read_seeds(run_.curves(), state);
+  state.get_all(now.normals);
+  state.get_all(energies_);
+  state.get(energy_);
+  state.get(gradient_norm_);
+  state.get(first_norm_);
+  state.get(iteration_);
+  state.get(restarted_);
+  saved_.read_counts(state);
+  history_.read(state);
+  on_host_.read_pairs(history_, state);
+  state.end();
+  on_host_.go_on();
+  if (now.moments().energy != energy_ || std::sqrt(square_of(now.gradient)) != gradient_norm_)
+    throw Error("the checkpoint's seeds have another energy here; go on with the program that wrote it");
+  return true;
+}
+
+// False if there is none that helps. A run that is cancelled meanwhile can go on from before it.
+bool Descent::take_step() {
+  if (saved_.state_is_due()) keep_state();
+  moving_ = false;
+  try {
+    run_.context().check();
+    return !is_done() && advance();
+  } catch (const Cancelled&) {
+    if (!moving_) keep_state();
+    throw;
+  }
+}
+
+void Descent::minimise() {
+  if (!go_on()) begin();
   for (;;) {
     try {
-      for (; iteration_ < options_.iterations; ++iteration_) {
-        run_.context().check();
-        if (is_done() || !advance()) break;
-      }
+      for (; iteration_ < options_.iterations; ++iteration_)
+        if (!take_step()) break;
       return hand_back();
     } catch (const DeviceError& error) {
       go_on_without_device(error);
@@ -215,7 +277,11 @@ void Descent::minimise() {
 void optimise(CvtRun& run, const OptimiseOptions& options) {
   const Stopwatch watch;
   const DiagramSeconds before = run.totals.seconds;
-  Descent(run, options).minimise();
+  SavedStep saved(run, options.iterations, options.tolerance, options.constrained);
+  if (!saved.restore()) {
+    Descent(run, options, saved).minimise();
+    saved.keep();
+  }
   const DiagramSeconds& after = run.totals.seconds;
   run.totals.seconds_lbfgs += watch.seconds() - (after.delaunay - before.delaunay) -
                               (after.neighbours - before.neighbours) - (after.pairs - before.pairs) -

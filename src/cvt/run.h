@@ -77,6 +77,7 @@ class CvtRun {
 
  private:
   friend class Descent;
+  friend class SavedStep;
   friend struct CvtGradient complete(CvtRun& run, bool constrained);
 
   void count(const EvaluationReport& report);

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <filesystem>
 #include <iterator>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -52,6 +53,14 @@ class File {
       bytes.remove_prefix(static_cast<std::size_t>(n));
     }
     return true;
+  }
+  // Until it is on the disk, for a file that is to replace another is not to be empty after a power cut. What is no
+  // file on a disk has nothing to wait for.
+  bool flush() { return ::fdatasync(descriptor_) == 0 || errno == EINVAL || errno == ENOTSUP; }
+  // Gives a name to a file without one.
+  bool link_to(const std::string& path) {
+    const std::string self = "/proc/self/fd/" + std::to_string(descriptor_);
+    return ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) == 0;
   }
   // A full disk may show only here.
   bool close() { return ::close(std::exchange(descriptor_, -1)) == 0; }
@@ -369,11 +378,16 @@ void write_file(const std::string& path, const std::string& bytes) {
 
   static std::atomic<unsigned> serial = 0;
   const fs::path temporary = target.parent_path() / fmt::format(".bisector-{}-{}.tmp", ::getpid(), serial++);
-  File file(temporary.string(), O_WRONLY | O_CREAT | O_EXCL);
-  if (!file.is_open()) fail_write(path, errno);
-  if (!file.write(bytes) || !file.close() || ::rename(temporary.c_str(), target.c_str()) != 0) {
+  // Nothing is left of a file without a name if the program is killed; not all file systems have such.
+  const std::string folder = target.has_parent_path() ? target.parent_path().string() : ".";
+  std::optional<File> file(std::in_place, folder, O_WRONLY | O_TMPFILE);
+  bool named = !file->is_open() || ::access("/proc/self/fd", X_OK) != 0;
+  if (named) file.emplace(temporary.string(), O_WRONLY | O_CREAT | O_EXCL);
+  if (!file->is_open()) fail_write(path, errno);
+  if (!file->write(bytes) || !file->flush() || !(named || (named = file->link_to(temporary.string()))) ||
+      !file->close() || ::rename(temporary.c_str(), target.c_str()) != 0) {
     const int reason = errno;
-    ::unlink(temporary.c_str());
+    if (named) ::unlink(temporary.c_str());
     fail_write(path, reason);
   }
 }

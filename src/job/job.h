@@ -136,6 +136,11 @@ class Job {
     return none;
   }
 
+  // A file from which a run that was cancelled can go on; empty if there is none.
+  virtual std::string goes_on_from() const { return {}; }
+  // Once all results are where they are wanted.
+  virtual void finish() {}
+
   Json seconds = {{"total", 0.0}};  // of the report
 
  protected:

@@ -234,6 +234,21 @@ void Usage::refuse(const char* option, const char* why) const {
   if (given(option)) throw CLI::ValidationError(std::string(option) + ": " + why);
 }
 
+std::string Usage::words_of_result() const {
+  static const std::set<std::string> none = {"device", "threads", "neighbors"};
+  std::set<std::string> words;
+  for (const CLI::Option* option : app_.get_options()) {
+    const std::string name = option->get_single_name(), group = option->get_group();
+    if (option->count() == 0 || option->get_positional() || group == "Output" || group == "Checkpoint" ||
+        none.count(name) > 0)
+      continue;
+    for (const std::string& value : option->results()) words.insert(name + '=' + value + '\n');
+  }
+  std::string all;
+  for (const std::string& word : words) all += word;
+  return all;
+}
+
 void Usage::check_number_of_vertices() const {
   const int sizes = given("-n") + given("--edge-length") + given("--edge-length-relative");
   if (!given("--seeds") && sizes == 0)

@@ -62,6 +62,8 @@ class Usage {
   bool given(const char* option) const {
     return in_memory_.count(option) > 0 || (app_.get_option_no_throw(option) && app_.count(option) > 0);
   }
+  // The options that were given and that results hang on, with their values: not files to write, nor what computes.
+  std::string words_of_result() const;
   // Throws CLI::ValidationError if the option was given.
   void refuse(const char* option, const char* why) const;
 

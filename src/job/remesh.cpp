@@ -186,6 +186,7 @@ void RemeshJob::add_options(CLI::App* app) {
       ->group("Optimisation");
   add_compute_options(app, options_.compute);
   add_threads(app, threads);
+  saved_.add_options(app);
 }
 
 void RemeshJob::add_distance_options(CLI::App* app) {
@@ -210,6 +211,7 @@ void RemeshJob::add_distance_options(CLI::App* app) {
 
 void RemeshJob::check_usage(const Usage& usage) {
   usage.check_number_of_vertices();
+  saved_.check_usage(usage);
   usage.check_wrap(attribute_);
   if (usage.given("--seeds")) {
     for (const char* option : {"--edge-min", "--edge-max"})
@@ -303,9 +305,18 @@ void RemeshJob::check_format(std::string_view output, const std::string& path, J
   if (!lost.empty()) journal.warn(lost);
 }
 
+Fingerprint RemeshJob::fingerprint() const {
+  Fingerprint all = fingerprint_of(remeshed_surface());
+  all.add_all(options_.seeds).add_all(options_.sizing.attribute).add_all(options_.features.given);
+  all.add_all(options_.keep_vertices).add_all(options_.keep_edges).add_all(options_.keep_triangles);
+  return all;
+}
+
 void RemeshJob::compute(Journal& journal) {
   journal.phase("preparing");
-  result = remesh(remeshed_surface(), options_, journal.context());
+  Context context = journal.context();
+  saved_.open(fingerprint(), context);
+  result = remesh(remeshed_surface(), options_, context);
   require_sound(result);
   warn_of_features(journal, result);
   if (options_.topology != TopologyControl::off) warn_of_topology(journal, result);

@@ -10,6 +10,7 @@
 #include "bisector/remesh.h"
 #include "job/job.h"
 #include "job/outputs.h"
+#include "job/saved_run.h"
 
 namespace bisector::job {
 
@@ -32,6 +33,8 @@ class RemeshJob final : public Job {
   void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
   std::vector<ArrayView> arrays() override;
   const std::vector<Attribute>& attributes() const override { return result.mesh.attributes; }
+  std::string goes_on_from() const override { return saved_.path(); }
+  void finish() override { saved_.remove(); }
 
   std::shared_ptr<const TriangleMesh> surface;  // the input
   RemeshResult result;
@@ -42,6 +45,7 @@ class RemeshJob final : public Job {
   void complete_options();
   void check_distance(const Usage& usage) const;
   void keep();
+  Fingerprint fingerprint() const;
   void carry(Journal& journal);
   std::string map_text() const;
   Index face_of(Index triangle) const {
@@ -61,6 +65,7 @@ class RemeshJob final : public Job {
   std::vector<Index> map_faces_;      // for arrays(); none if it is not wanted
   WrapOption wrap_;
   RemeshOptions options_;
+  SavedRun saved_;
   TriangleMesh wrap_mesh_;
   Json wrapped_;  // null: no wrap
 };

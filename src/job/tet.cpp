@@ -206,10 +206,12 @@ void TetJob::add_options(CLI::App* app) {
                 "share per iteration; default 1e-6");
   add_compute_options(app, options_.compute);
   add_threads(app, threads);
+  saved_.add_options(app);
 }
 
 void TetJob::check_usage(const Usage& usage) {
   usage.check_number_of_vertices();
+  saved_.check_usage(usage);
   usage.check_wrap(attribute_);
   if (usage.given("--wrap")) usage.refuse("--regions", "a wrap encloses one region only; leave one of the two out");
   if (usage.given("--sizes")) usage.refuse("--density", "sizes come from --sizes; leave one of the two out");
@@ -288,8 +290,18 @@ void TetJob::curve(Journal& journal) {
   seconds["second_order"] = curving.seconds();
 }
 
+Fingerprint TetJob::fingerprint() const {
+  Fingerprint all = !wrapped_.is_null() ? fingerprint_of(wrap_mesh_)
+                    : domain.tets       ? fingerprint_of(*domain.tets)
+                                        : fingerprint_of(*domain.surface);
+  all.add_all(options_.seeds).add_all(options_.sizing.field.attribute).add_all(options_.features.given);
+  all.add_all(options_.sizing.sizes.points).add_all(options_.sizing.sizes.lengths);
+  return all;
+}
+
 void TetJob::compute(Journal& journal) {
-  const Context context = journal.context();
+  Context context = journal.context();
+  saved_.open(fingerprint(), context);
   result = !wrapped_.is_null() ? tetrahedralise(wrap_mesh_, options_, context)
            : domain.tets       ? tetrahedralise(*domain.tets, options_, context)
                                : tetrahedralise(*domain.surface, options_, context);

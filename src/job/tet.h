@@ -10,6 +10,7 @@
 #include "job/inputs.h"
 #include "job/job.h"
 #include "job/outputs.h"
+#include "job/saved_run.h"
 
 namespace bisector::job {
 
@@ -34,6 +35,8 @@ class TetJob final : public Job {
   view::Scene scene(const std::string& output) override;
   void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
   std::vector<ArrayView> arrays() override;
+  std::string goes_on_from() const override { return saved_.path(); }
+  void finish() override { saved_.remove(); }
   const std::vector<Attribute>& attributes() const override { return result.mesh.attributes; }
 
   Domain domain;  // the input
@@ -45,6 +48,7 @@ class TetJob final : public Job {
   void complete_options();
   // What the walls of the result follow: the input's surface with the interfaces between its regions, or its wrap.
   const TriangleMesh& walls() const { return wrapped_.is_null() ? *walls_ : wrap_mesh_; }
+  Fingerprint fingerprint() const;
   void carry(Journal& journal);
   void curve(Journal& journal);
 
@@ -54,6 +58,7 @@ class TetJob final : public Job {
   double weld_ = -1;                 // not given
   WrapOption wrap_;
   TetOptions options_;
+  SavedRun saved_;
   std::shared_ptr<const TriangleMesh> walls_;  // on the input's vertices
   TriangleMesh wrap_mesh_;
   Json wrapped_;  // null: no wrap

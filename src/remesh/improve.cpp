@@ -9,6 +9,7 @@
 
 #include "core/grouping.h"
 #include "core/parallel.h"
+#include "cvt/saved_step.h"
 #include "mesh/topology.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/improve_patch.h"
@@ -921,7 +922,15 @@ ImproveReport Improver::run() {
 }  // namespace
 
 ImproveReport improve(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options) {
-  return Improver(run, trace, options).run();
+  SavedStep saved(run, options.min_angle, options.max_angle, options.vertices);
+  ImproveReport report;
+  if (const std::optional<std::string> known = saved.restore()) {
+    ByteReader(*known).get(report);
+    return report;
+  }
+  report = Improver(run, trace, options).run();
+  saved.keep(ByteWriter().put(report).take());
+  return report;
 }
 
 }  // namespace bisector

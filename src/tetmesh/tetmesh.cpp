@@ -9,6 +9,9 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "checkpoint/bytes.h"
+#include "checkpoint/fingerprint.h"
+#include "checkpoint/step_store.h"
 #include "compute/compute.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -94,6 +97,44 @@ void extract(const CvtRun& sites, const TriangleMesh& boundary, TetResult& resul
   result.seconds.extract = watch.seconds();
 }
 
+void write_improved(const TetImproveResult& improved, ByteWriter& out) {
+  const TetMesh& mesh = improved.mesh;
+  out.put_all(mesh.vertices).put_all(mesh.tets).put_all(mesh.regions).put_all(mesh.boundary);
+  out.put_all(mesh.boundary_labels).put_all(mesh.feature_edges).put(improved.report);
+}
+
+void read_improved(ByteReader in, TetImproveResult& improved) {
+  TetMesh& mesh = improved.mesh;
+  in.get_all(mesh.vertices);
+  in.get_all(mesh.tets);
+  in.get_all(mesh.regions);
+  in.get_all(mesh.boundary);
+  in.get_all(mesh.boundary_labels);
+  in.get_all(mesh.feature_edges);
+  in.get(improved.report);
+  in.end();
+}
+
+// Or what a checkpoint knows of it.
+TetImproveResult improved_tets(const TetMesh& mesh, const TetImproveOptions& options, const Context& context) {
+  if (!context.checkpoint) return improve_tets(mesh, options, context);
+  const Stopwatch watch;
+  StepStore& store = context.checkpoint->steps();
+  Fingerprint start;
+  start.add_all(mesh.vertices).add_all(mesh.tets).add_all(mesh.regions).add_all(mesh.boundary).add(options.goal);
+  const StepKey step = store.begin(start.value());
+  TetImproveResult improved;
+  if (const std::optional<std::string> known = store.result(step)) {
+    read_improved(ByteReader(*known), improved);
+    return improved;
+  }
+  improved = improve_tets(mesh, options, context);
+  ByteWriter out;
+  write_improved(improved, out);
+  store.keep_result(step, out.take(), watch.seconds(), context);
+  return improved;
+}
+
 void remove_slivers(double min_dihedral, const Context& context, TetResult& result) {
   const Stopwatch watch;
   if (min_dihedral > 0) {
@@ -101,7 +142,7 @@ void remove_slivers(double min_dihedral, const Context& context, TetResult& resu
     improve.insert_below = min_dihedral;
     improve.goal = min_dihedral + kGoalBeyond;
     context.report({"improving", 0, 1, result.energy, result.gradient_norm, kExtracted});
-    TetImproveResult improved = improve_tets(result.mesh, improve, context);
+    TetImproveResult improved = improved_tets(result.mesh, improve, context);
     result.mesh = std::move(improved.mesh);
     result.improved = std::move(improved.report);
   }
