@@ -34,6 +34,8 @@ class SavedStep {
   // After the step. `outcome`: bytes of what it did beside moving seeds.
   void keep(const std::string& outcome = {});
 
+  // Whether there is a checkpoint.
+  bool is_kept() const { return store_ != nullptr; }
   bool state_is_due() const { return store_ && store_->state_is_due(); }
   std::optional<std::string> state() const;
   void keep_state(const std::string& bytes);

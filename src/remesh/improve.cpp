@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "core/grouping.h"
@@ -147,12 +148,14 @@ struct Change {
 
 class Improver {
  public:
-  Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options);
+  Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options, SavedStep& saved);
 
   ImproveReport run();
 
  private:
   enum class Aim { better, no_bad_angles, fewer, more };
+  // Of the pass, in order; each has rounds.
+  enum class Part : int { better, no_bad_angles, count };
 
   // Whether the number of seeds is the aim.
   static bool counts(Aim aim) { return aim == Aim::fewer || aim == Aim::more; }
@@ -223,10 +226,18 @@ class Improver {
   void hand_over();
   void smooth();
   std::vector<std::vector<Index>> colours(const std::vector<PatchVertex>& vertices) const;
+  void take(PlacedSeeds seeds, DiagramOfSeeds known = {});
+  void begin_part();
+  bool round();
+  void rounds();
+  // What the next round hangs on, and from it.
+  std::string state() const;
+  bool go_on();
 
   CvtRun& run_;
   const FeatureTrace& trace_;
   const ImproveOptions& options_;
+  SavedStep& saved_;
   ShapeGoal goal_;
   std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
   std::size_t poor_left_ = 0;                      // poor seeds that may still be tried
@@ -237,10 +248,14 @@ class Improver {
   RestrictedPolygons polygons_;
   bool polygons_are_current_ = false;  // those of now_
   ImproveReport report_;
+  Part part_ = Part::better;
+  int round_ = 0;
+  double first_average_ = 0;  // cost
 };
 
-Improver::Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options)
-    : run_(run), trace_(trace), options_(options), goal_(shape_goal(options.min_angle, options.max_angle)) {
+Improver::Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options, SavedStep& saved)
+    : run_(run), trace_(trace), options_(options), saved_(saved),
+      goal_(shape_goal(options.min_angle, options.max_angle)) {
   if (!has_curves()) return;
   corner_curves_.resize(run.curves().graph().corners.size());
   for (Index curve = 0; curve < run.curves().size(); ++curve)
@@ -876,40 +891,96 @@ void Improver::hand_over() {
   run_.adopt(std::move(now_.seeds), std::move(now_.known));
 }
 
-ImproveReport Improver::run() {
-  Snapshot first;
-  first.seeds = run_.seeds;
-  first.known = run_.take_diagram(parts());
-  measure(first);
-  accept(std::move(first));
-  if (now_.dual().triangles.empty()) {
-    hand_over();
-    return report_;
-  }
-  drop_idle();
-  const double average = now_.average;
+void Improver::take(PlacedSeeds seeds, DiagramOfSeeds known) {
+  Snapshot taken;
+  taken.seeds = std::move(seeds);
+  taken.known = std::move(known);
+  measure(taken);
+  accept(std::move(taken));
+}
+
+void Improver::begin_part() {
+  tried_.assign(now_.seeds.size(), 0);
+  if (part_ == Part::no_bad_angles) searches_left_ = kMostSearches + now_.seeds.size() / kSeedsPerSearch;
+  if (part_ != Part::better) return;
   poor_left_ = kPoorTried + now_.seeds.size() / kPoorShare;
-  tried_.assign(now_.seeds.size(), 0);
   smooth();
-  for (int round = 0; round < kBatches; ++round) {
-    run_.context().report({"improving", round + 1, kBatches, now_.moments().energy, 0, 1});
-    if (batch(Aim::better).made == 0) break;
+}
+
+// Whether another may help.
+bool Improver::round() {
+  const auto report = [&](const char* phase) {
+    run_.context().report({phase, round_ + 1, kBatches, now_.moments().energy, 0, 1});
+  };
+  switch (part_) {
+    case Part::better: report("improving"); return batch(Aim::better).made > 0;
+    case Part::no_bad_angles: report("bad angles"); return batch(Aim::no_bad_angles).tried > 0;
+    case Part::count: break;
   }
-  tried_.assign(now_.seeds.size(), 0);
-  searches_left_ = kMostSearches + now_.seeds.size() / kSeedsPerSearch;
-  for (int round = 0; round < kBatches; ++round) {
-    run_.context().report({"bad angles", round + 1, kBatches, now_.moments().energy, 0, 1});
-    if (batch(Aim::no_bad_angles).tried == 0) break;
+  if (now_.seeds.size() != wanted()) batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
+  return now_.seeds.size() != wanted();
+}
+
+std::string Improver::state() const {
+  ByteWriter out;
+  write_seeds(now_.seeds, out);
+  out.put_all(tried_).put(poor_left_).put(searches_left_).put(report_);
+  return out.put(part_).put(round_).put(first_average_).take();
+}
+
+bool Improver::go_on() {
+  const std::optional<std::string> kept = saved_.state();
+  if (!kept) return false;
+  ByteReader in(*kept);
+  PlacedSeeds seeds = read_seeds(run_.curves(), in);
+  in.get_all(tried_);
+  in.get(poor_left_);
+  in.get(searches_left_);
+  in.get(report_);
+  in.get(part_);
+  in.get(round_);
+  in.get(first_average_);
+  in.end();
+  if (tried_.size() != seeds.size()) throw Error("the checkpoint's quality pass has other seeds than marks");
+  take(std::move(seeds));
+  return true;
+}
+
+// A run that is cancelled within a round can go on from before it.
+void Improver::rounds() {
+  for (;;) {
+    for (; round_ < kBatches; ++round_) {
+      const std::string before = saved_.is_kept() ? state() : std::string();
+      if (saved_.state_is_due()) saved_.keep_state(before);
+      try {
+        if (!round()) break;
+      } catch (const Cancelled&) {
+        saved_.keep_state(before);
+        throw;
+      }
+    }
+    if (part_ == Part::count) return;
+    part_ = static_cast<Part>(static_cast<int>(part_) + 1);
+    round_ = 0;
+    begin_part();
   }
-  tried_.assign(now_.seeds.size(), 0);
-  for (int round = 0; round < kBatches && now_.seeds.size() != wanted(); ++round)
-    batch(now_.seeds.size() > wanted() ? Aim::fewer : Aim::more);
+}
+
+ImproveReport Improver::run() {
+  if (!go_on()) {
+    take(run_.seeds, run_.take_diagram(parts()));
+    if (now_.dual().triangles.empty()) {
+      hand_over();
+      return report_;
+    }
+    drop_idle();
+    first_average_ = now_.average;
+    begin_part();
+  }
+  rounds();
   if (report_.made > 0) smooth();
-  if (now_.average > average) {
-    Snapshot start;
-    start.seeds = run_.seeds;
-    measure(start);
-    accept(std::move(start));
+  if (now_.average > first_average_) {
+    take(run_.seeds);
     report_ = {report_.trials, 0, 0, 0, 0};
   }
 
@@ -928,7 +999,7 @@ ImproveReport improve(CvtRun& run, const FeatureTrace& trace, const ImproveOptio
     ByteReader(*known).get(report);
     return report;
   }
-  report = Improver(run, trace, options).run();
+  report = Improver(run, trace, options, saved).run();
   saved.keep(ByteWriter().put(report).take());
   return report;
 }
