@@ -82,6 +82,9 @@ def remesh(
     precision: Optional[str] = None,
     neighbors: Optional[str] = None,
     threads: Optional[int] = None,
+    checkpoint: Optional[Path] = None,
+    checkpoint_every: Optional[Number] = None,
+    resume: Optional[bool] = None,
     map: bool = False,
     labels: Any = None,
     feature_edges: Any = None,
@@ -103,6 +106,9 @@ def remesh(
     Numbers of vertices, faces and their corners come with the mesh or in `vertex_data`, `face_data` and `corner_data`,
     dicts of arrays of n, m or (m, 3) rows by name, and are those of the result at the same place (docs/cli.md,
     "Attributes"). `map` asks for where on the input each vertex of the result is.
+
+    `checkpoint` is a file that keeps what has been computed; with `resume` a run that was cut off goes on from it to
+    the same result. It stays until you delete it.
 
     `progress` is called with a Progress now and then. Ctrl-C, or an exception in `progress`, ends the run within about
     a second. Raises Error for bad input and options, DeviceError if the device asked for is missing or fails, and
@@ -149,6 +155,9 @@ def tetrahedralize(
     precision: Optional[str] = None,
     neighbors: Optional[str] = None,
     threads: Optional[int] = None,
+    checkpoint: Optional[Path] = None,
+    checkpoint_every: Optional[Number] = None,
+    resume: Optional[bool] = None,
     labels: Any = None,
     feature_edges: Any = None,
     vertex_data: "Optional[Mapping[str, Any]]" = None,

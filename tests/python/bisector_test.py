@@ -500,6 +500,30 @@ class Running(unittest.TestCase):
         self.assertEqual(fractions, sorted(fractions))
         self.assertTrue(any(p.phase.startswith("reading") for p, _ in heard))
 
+    def test_an_interrupted_run_goes_on(self):
+        mesh = cube()
+        seeds = np.random.default_rng(1).random((300, 3))
+        options = {"seeds": seeds, "iterations": 20, "checkpoint_every": 0}
+
+        def progress(p):
+            if p.iteration == 12:
+                raise StopIteration
+
+        with tempfile.TemporaryDirectory() as folder:
+            checkpoint = pathlib.Path(folder) / "cube.checkpoint"
+            with self.assertRaises(StopIteration):
+                bs.remesh(mesh, checkpoint=checkpoint, progress=progress, **options)
+            for thread in threading.enumerate():
+                if thread.name == "bisector":
+                    thread.join(20)
+            with self.assertRaisesRegex(bs.Error, "checkpoint"):
+                bs.remesh(mesh, checkpoint=checkpoint, resume=True, **{**options, "seeds": seeds[::-1]})
+            heard = []
+            made = bs.remesh(mesh, checkpoint=checkpoint, resume=True, progress=heard.append, **options)
+            self.assertTrue(checkpoint.exists())
+        self.assertGreater(next(p.iteration for p in heard if p.phase == "optimising"), 5, heard)
+        self.assertTrue(np.array_equal(made.vertices, bs.remesh(mesh, **{**options, "checkpoint_every": None}).vertices))
+
     def test_threads_at_once(self):
         expected = {n: bs.remesh(cube(), n=n).vertices for n in (60, 90)}
         results = {}
