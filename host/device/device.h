@@ -20,6 +20,8 @@ namespace bisector::host {
 
 // Never throws for lack of a loader, a driver or a device.
 DeviceList list_devices();
+// Without software devices, which are not opened: their drivers compile for a while, and crash where memory is limited.
+DeviceList list_gpus();
 
 struct DeviceLimits {
   std::size_t storage_range = 0;      // bytes of one storage buffer binding

@@ -70,11 +70,14 @@ std::unique_ptr<Device> Device::open(const DeviceRequest& request) {
   throw DeviceError(refusal, Reason::no_such_device);
 }
 
-DeviceList list_devices() {
+namespace {
+
+DeviceList list_devices(bool with_software) {
   DeviceList list;
   try {
     const auto instance = Instance::shared();
     for (const Candidate& candidate : enumerate_candidates(*instance)) {
+      if (!with_software && candidate.description.kind == "software") continue;
       DeviceDescription& description = list.devices.emplace_back(candidate.description);
       if (!description.rejected.empty()) continue;
       try {
@@ -89,5 +92,10 @@ DeviceList list_devices() {
   }
   return list;
 }
+
+}  // namespace
+
+DeviceList list_devices() { return list_devices(true); }
+DeviceList list_gpus() { return list_devices(false); }
 
 }  // namespace bisector::host

@@ -97,7 +97,7 @@ bisector_status guarded(const Body& body) noexcept {
       return fail(BISECTOR_NO_MEMORY, job::kNoMemory);
     }
   } catch (const std::exception& error) {
-    return fail(BISECTOR_FAILED, error.what());
+    return fail(BISECTOR_FAILED, job::wants_thread(error) ? job::kNoThread : error.what());
   } catch (...) {
     return fail(BISECTOR_FAILED, "an unknown error; please report this as a bug");
   }

@@ -118,8 +118,11 @@ void StepStore::index() {
   if (!read_at(descriptor_, line.data(), line.size(), 0)) fail(path_, "cannot be read");
   // A run that was killed as it began has left less than the first line.
   if (line.size() == head_line_.size() || !head_line_.starts_with(line)) check_head_line(line);
-  if (line.size() < head_line_.size() && !write_at(descriptor_, head_line_, 0))
-    fail(path_, fmt::format("cannot be written: {}", std::strerror(errno)));
+  if (line.size() < head_line_.size() && !write_at(descriptor_, head_line_, 0)) {
+    const int error = errno;
+    remove();
+    fail(path_, fmt::format("cannot be written: {}", std::strerror(error)));
+  }
   end_ = head_line_.size();
   Head head;
   while (end_ + sizeof head <= size && read_at(descriptor_, reinterpret_cast<char*>(&head), sizeof head, end_)) {

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "job/outputs.h"
@@ -55,6 +56,7 @@ void compute(job::Job& job, Console& console) {
 
 void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary) {
   const Stopwatch total;
+  if (files.memory) limit_memory(files.memory);
   const std::string& report_path = files.common.report;
   const std::vector<job::OutputKind> kinds = job.outputs();
   std::vector<job::Output> outputs;
@@ -112,6 +114,12 @@ Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandT
         ->required(kind.required)
         ->group("Output");
   job->add_options(app);
+  app->add_option("--memory", files->memory,
+                  "end with an error before it holds more, such as 8GB;\n"
+                  "default: what the system gives")
+      ->type_name("SIZE")
+      ->transform(CLI::AsSizeValue(false))
+      ->group("Computation");
   add_common_options(app, files->common, report_help);
   const auto check_usage = [=] {
     for (const auto& [name, path] : files->outputs)

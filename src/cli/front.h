@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -39,6 +40,7 @@ void add_common_options(CLI::App* app, CommonOptions& options, const char* about
 
 // What a summary speaks of beside the job: the file that each output goes to, empty if it is not wanted.
 struct JobFiles {
+  std::uint64_t memory = 0;                    // bytes that the run may hold; 0: any
   std::map<std::string, std::string> outputs;  // by OutputKind::name
   CommonOptions common;
 };

@@ -2,6 +2,8 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -10,6 +12,7 @@
 
 #include "bisector/error.h"
 #include "console.h"
+#include "core/memory_limit.h"
 #include "job/messages.h"
 #include "program.h"
 
@@ -21,6 +24,13 @@ int fail_usage(const std::string& message, const Command* command) {
   const std::string help = command ? "bisector " + command->app->get_name() + " --help" : "bisector --help";
   print_error(message + "; see " + help);
   return command && command->failure ? command->failure : kUsage;
+}
+
+void print_no_memory() {
+  const std::uint64_t limit = bisector::memory_limit();
+  if (limit == 0) return print_error(bisector::job::kNoMemory);
+  print_error("not enough memory: the limit is " + std::to_string(limit >> 20) +
+              " MiB; raise it (--memory), ask for fewer vertices or use a larger machine");
 }
 
 // Runs the command and maps what it throws to an exit code.
@@ -35,11 +45,11 @@ int run_guarded(const Command& command) {
     print_error(error.what());
     return static_cast<int>(std::min<std::size_t>(error.jobs, kMostJobs));
   } catch (const std::bad_alloc&) {
-    print_error(bisector::job::kNoMemory);
+    print_no_memory();
   } catch (const bisector::Error& error) {
     print_error(bisector::job::with_advice(error));
   } catch (const std::exception& error) {
-    print_error(error.what());
+    print_error(bisector::job::wants_thread(error) ? bisector::job::kNoThread : error.what());
   }
   return command.failure ? command.failure : kFailure;
 }
@@ -68,5 +78,6 @@ int main(int argc, char** argv) {
   }
 
   watch_interrupts();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   return run_guarded(*chosen());
 }

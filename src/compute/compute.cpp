@@ -66,7 +66,7 @@ Compute::Compute(const ComputeOptions& options, const Context& context) : option
 }
 
 void Compute::choose_best() {
-  const DeviceList list = list_devices();
+  const DeviceList list = host::list_gpus();
   device_ = best_gpu(list, options_.precision);
   if (device_) return;
   const std::optional<DeviceRequest> other = best_gpu(list);

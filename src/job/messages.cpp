@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <system_error>
+
 namespace bisector::job {
 
 std::string one_line(std::string_view text) {
@@ -35,6 +37,12 @@ std::string with_advice(const Error& error) {
     case Reason::no_solid: return what + ", or wrap it (--wrap)";
   }
   return what;
+}
+
+bool wants_thread(const std::exception& error) {
+  if (const auto* system = dynamic_cast<const std::system_error*>(&error))
+    return system->code() == std::errc::resource_unavailable_try_again;
+  return std::string_view(error.what()).starts_with("pthread_create");  // TBB's, of no type of its own
 }
 
 }  // namespace bisector::job

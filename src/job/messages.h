@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <string>
 #include <string_view>
 
@@ -22,5 +23,9 @@ std::string describe(const MeshTopology& topology);
 // An error of the library with the options that help.
 std::string with_advice(const Error& error);
 inline constexpr const char* kNoMemory = "not enough memory; ask for fewer vertices or use a larger machine";
+// Whether the system refused a thread, which it does for want of memory, too.
+bool wants_thread(const std::exception& error);
+inline constexpr const char* kNoThread =
+    "the system refuses another thread; give fewer --threads, or raise the limits of memory and processes";
 
 }  // namespace bisector::job

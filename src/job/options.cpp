@@ -235,7 +235,7 @@ void Usage::refuse(const char* option, const char* why) const {
 }
 
 std::string Usage::words_of_result() const {
-  static const std::set<std::string> none = {"device", "threads", "neighbors"};
+  static const std::set<std::string> none = {"device", "threads", "neighbors", "memory"};
   std::set<std::string> words;
   for (const CLI::Option* option : app_.get_options()) {
     const std::string name = option->get_single_name(), group = option->get_group();

@@ -21,6 +21,7 @@
 #include <utility>
 
 #include "bisector/error.h"
+#include "core/memory_limit.h"
 #include "core/orientation.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -86,6 +87,7 @@ class Child {
       id_ = -1;
       fail_start(program, error);
     }
+    share_memory_limit(id_);
     for (const int descriptor : {channel_.get(), messages_.get()})
       ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK);
   }

@@ -161,6 +161,18 @@ TEST_F(StepStoreFile, ThatCannotGrowIsAWarningAndStaysWhole) {
   EXPECT_FALSE(kept.result({1, 2}));
 }
 
+TEST_F(StepStoreFile, ThatCannotBeBegunIsNotThere) {
+  const auto before = signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const rlimit small{10, limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_THROW(open(false), Error);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  signal(SIGXFSZ, before);
+  EXPECT_NO_THROW(open(false));
+}
+
 TEST(CheckpointBytes, ComeBackAndAreChecked) {
   ByteWriter out;
   out.put(7).put_all(std::vector<double>{1, 2, 3});

@@ -1,0 +1,135 @@
+// Runs that the system gives too little memory or disk, or whose reader goes away.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "support/command_line.h"
+
+namespace bisector {
+namespace {
+
+namespace fs = std::filesystem;
+using test::read_text;
+using test::Result;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;  // whose own memory is without measure
+#else
+constexpr bool kSanitized = false;
+#endif
+
+class CliLimits : public test::Cli {
+ protected:
+  CliLimits() {
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> turn(0, 6.283), up(0, 3);
+    std::string points;
+    for (int k = 0; k < 3000; ++k) {
+      const double angle = turn(random);
+      points += std::to_string(0.1 * std::cos(angle)) + ' ' + std::to_string(0.1 * std::sin(angle)) + ' ' +
+                std::to_string(up(random)) + '\n';
+    }
+    write_text("stem.xyz", points);
+  }
+
+  // Runs that leave the file "out.*" that they name.
+  struct Run {
+    std::vector<std::string> words;
+    std::string output;
+  };
+  std::vector<Run> runs() const {
+    const std::string sphere = in("sphere.off");
+    return {{{"remesh", sphere, "-n", "800", "-o", in("out.off")}, "out.off"},
+            {{"rvd", sphere, "-n", "200", "-o", in("out.ply")}, "out.ply"},
+            {{"tet", sphere, "-n", "400", "-o", in("out.mesh")}, "out.mesh"},
+            {{"segment", sphere, "--proxies", "8", "-o", in("out.ply")}, "out.ply"},
+            {{"tree", in("stem.xyz"), "-o", in("out.obj")}, "out.obj"},
+            {{"quality", sphere, "--report", in("out.json")}, "out.json"}};
+  }
+
+  // One line of error, and of files only the old one.
+  void expect_nothing_lost(const Result& result, const Run& run, const std::string& what) const {
+    EXPECT_EQ(result.code, 1) << what;
+    EXPECT_TRUE(result.err.starts_with("bisector: error: ")) << what << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << what << result.err;
+    EXPECT_EQ(read_text(in(run.output)), "old") << what;
+  }
+};
+
+TEST_F(CliLimits, TooLittleMemoryIsSaidAndNothingIsLost) {
+  if (kSanitized) GTEST_SKIP() << "sanitizers need more memory than that";
+  for (const Run& one : runs()) {
+    std::string whole;
+    if (one.words.front() != "quality") {
+      ASSERT_EQ(run(one.words).code, 0);
+      whole = read_text(in(one.output));
+    }
+    int refused = 0, done = 0;
+    for (const int mebibytes : {2, 10, 14, 18, 26, 1000}) {
+      write_text(one.output, "old");
+      const std::set<std::string> before = files();
+      std::vector<std::string> words = one.words;
+      const std::string memory = std::to_string(mebibytes) + "MB";
+      words.insert(words.end(), {"--threads", "2", "--memory", memory});
+      const std::string what = one.words.front() + " in " + memory + ": ";
+      const Result result = run(words);
+      EXPECT_EQ(files(), before) << what;
+      (result.code == 0 ? done : refused)++;
+      if (result.code != 0) {
+        expect_nothing_lost(result, one, what);
+      } else if (!whole.empty()) {
+        EXPECT_EQ(read_text(in(one.output)), whole) << what;
+      }
+    }
+    EXPECT_GT(refused, 0) << one.words.front();
+    EXPECT_GT(done, 0) << one.words.front();
+  }
+}
+
+TEST_F(CliLimits, MemoryIsASize) {
+  for (const char* size : {"0x", "-5MB", "much"})
+    expect_failure(2, {"quality", in("sphere.off"), "--memory", size}, "--memory");
+}
+
+// The limit of files stands for a full disk.
+TEST_F(CliLimits, AFullDiskIsSaidAndNothingIsLost) {
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+  const rlimit small{600, limit.rlim_max};
+  for (const Run& one : runs()) {
+    write_text(one.output, "old");
+    const std::set<std::string> before = files();
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const pid_t process = start(one.words);
+    setrlimit(RLIMIT_FSIZE, &limit);
+    const Result result = finish(process);
+    expect_nothing_lost(result, one, one.words.front() + ": ");
+    EXPECT_NE(result.err.find(in(one.output) + ": cannot be written"), std::string::npos) << result.err;
+    EXPECT_EQ(files(), before) << one.words.front();
+  }
+}
+
+TEST_F(CliLimits, StandardStreamsThatAreClosedAreNotTheOutputs) {
+  const std::string whole = in("whole.off"), output = in("out.off"), report = in("out.json");
+  ASSERT_EQ(run({"remesh", in("sphere.off"), "-n", "200", "-o", whole}).code, 0);
+  const std::string words = std::string(BISECTOR_PROGRAM) + " remesh " + in("sphere.off") + " -n 200 --verbose -o " +
+                            output + " --report " + report;
+  for (const char* closed : {" >&-", " 2>&-", " <&- >&- 2>&-", " | true"}) {
+    fs::remove(output);
+    fs::remove(report);
+    ASSERT_NE(std::system((words + closed).c_str()), -1);
+    EXPECT_EQ(read_text(output), read_text(whole)) << closed;
+    EXPECT_TRUE(test::Json::accept(read_text(report))) << closed;
+  }
+}
+
+}  // namespace
+}  // namespace bisector
