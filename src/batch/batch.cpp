@@ -146,7 +146,7 @@ void Batch::finish(const Running& running) {
   record = make_record(job, outcome, message_of(outcome, options_.limits, last_error(file(job, ".log"))),
                        report ? Json::parse(report, nullptr, false) : Json());
   if (record["report"].is_discarded()) record["report"] = nullptr;
-  write_file(file(job, ".json"), record.dump(1) + "\n");
+  write_file(file(job, ".json"), record.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   std::error_code error;
   fs::remove(report_file, error);
   ++result_.ran;

@@ -12,6 +12,7 @@
 
 #include "bisector/error.h"
 #include "job/job.h"
+#include "job/messages.h"
 
 namespace bisector::batch {
 namespace {
@@ -55,7 +56,8 @@ class LineReader {
         fail(fmt::format("\"{}\" cannot be given; a batch keeps the report of each job", key));
       const auto output = outputs.find(key);
       if (output != outputs.end()) {
-        if (!value.is_string()) fail(fmt::format("\"{}\" is to be the name of a file", key));
+        if (!value.is_string() || value.get<std::string>().empty())
+          fail(fmt::format("\"{}\" is to be the name of a file", key));
         job.outputs.push_back(value.get<std::string>());
         job.words.insert(job.words.end(), {output->second, job.outputs.back()});
         continue;
@@ -70,7 +72,7 @@ class LineReader {
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const { batch::fail(path_, line_, what); }
+  [[noreturn]] void fail(const std::string& what) const { batch::fail(path_, line_, job::one_line(what)); }
 
   std::string text_of(const Json& object, const char* key) const {
     const auto found = object.find(key);
@@ -82,7 +84,10 @@ class LineReader {
   void add_option(const std::string& name, const Json& value, std::vector<std::string>& words) const {
     if (value.is_null() || value == false) return;
     if (value.is_array()) {
-      for (const Json& one : value) add_option(name, one, words);
+      for (const Json& one : value) {
+        if (one.is_array()) fail(fmt::format("\"{}\" has lists in a list; use one list", name));
+        add_option(name, one, words);
+      }
       return;
     }
     if (value.is_object()) fail(fmt::format("\"{}\" is an object; use a string or a number", name));

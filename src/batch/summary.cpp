@@ -34,7 +34,9 @@ Json row_of(const BatchJob& job, const Json& record) {
   const Json report = record.value("report", Json());
   if (report.is_object()) {
     for (const auto& [key, path] : kOfReport) {
-      const Json value = report.value(Json::json_pointer(path), Json());
+      const Json::json_pointer pointer(path);
+      if (!report.contains(pointer)) continue;
+      const Json& value = report[pointer];
       if (value.is_primitive() && !value.is_null()) row[key] = value;
     }
     if (report.contains("warnings")) row["warnings"] = report["warnings"].size();

@@ -29,6 +29,7 @@ class LegacyReader {
     VtkArrays* data = nullptr;
     for (std::string_view word = in_.word(); !word.empty(); word = in_.word()) {
       if (same_word(word, "POINTS")) {
+        if (!grid_.points.empty()) fail_twice(word);
         const std::size_t n = in_.count("points");
         const std::string_view type = in_.need_word("the type of points");
         const std::vector<double> values = read_array(n, 3, type);
@@ -38,8 +39,10 @@ class LegacyReader {
             if (const char* flaw = coordinate_flaw(grid_.points[i][k])) in_.fail(fmt::format("vertex {}: {}", i, flaw));
         }
       } else if (same_word(word, "CELLS")) {
+        if (cells_ > 0) fail_twice(word);
         cells_ = read_cells();
       } else if (same_word(word, "CELL_TYPES")) {
+        if (!grid_.types.empty()) fail_twice(word);
         const std::size_t n = in_.count("cell types");
         grid_.types = integers(read_array(n, 1, "int"));
       } else if (same_word(word, "CELL_DATA") || same_word(word, "POINT_DATA")) {
@@ -66,6 +69,9 @@ class LegacyReader {
   }
 
  private:
+  [[noreturn]] void fail_twice(std::string_view word) const {
+    in_.fail("'" + printable(word) + "' occurs twice; " + kExportAgain);
+  }
   void read_header() {
     if (!in_.line().starts_with("# vtk DataFile Version"))
       in_.fail(std::string("a VTK file starts with '# vtk DataFile'; ") + kExportAgain);

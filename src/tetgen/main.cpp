@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <new>
 #include <vector>
 
@@ -49,6 +50,8 @@ void read_points(tetgenio& io, std::size_t n) {
 void read_triangles(tetgenio& io, std::size_t n) {
   std::vector<std::int32_t> corners(3 * n);
   read_all(corners.data(), corners.size() * sizeof(std::int32_t));
+  for (const std::int32_t corner : corners)
+    if (corner < 0 || corner >= io.numberofpoints) std::_Exit(kBadRequest);
   io.numberoffacets = static_cast<int>(n);
   io.facetlist = new tetgenio::facet[n];
   for (std::size_t i = 0; i < n; ++i) {
@@ -64,7 +67,8 @@ void read_triangles(tetgenio& io, std::size_t n) {
 int run() {
   Request request;
   read_all(&request, sizeof request);
-  if (request.magic != kMagic) return kBadRequest;
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max() / 3;
+  if (request.magic != kMagic || request.points > kMost || request.triangles > kMost) return kBadRequest;
   tetgenio surface, result;
   read_points(surface, request.points);
   read_triangles(surface, request.triangles);

@@ -28,15 +28,17 @@ constexpr double kPerVolume = 2 * 0.9235 * 0.9235 * 0.9235;
 // Vertices of an equilateral triangulation per area, 2 / sqrt(3), of which each counts half: the other half of its cell
 // is outside.
 constexpr double kPerArea = 1 / std::numbers::sqrt3;
-constexpr double kMostVertices = 1e8;         // that may be asked for
-constexpr double kMostFactor = 2;             // of lengths beside a bound, in lengths without
-constexpr double kLongest = 2;                // lengths h at an edge's end, beyond which the edge is bisected
-constexpr double kReach = 0.87;               // of a tetrahedron from the middle of its longest edge, by that
-constexpr std::size_t kMostTets = 2'000'000;  // unless the input has more
-constexpr int kRounds = 6;                    // of refinement and calibration
-constexpr int kTrials = 40;                   // factors tried by a calibration
-constexpr double kCalibrated = 1e-3;          // relative error of the edge length, at which a calibration ends
-constexpr double kNarrowest = 1e-9;           // relative width of the interval of factors, at which it gives up
+constexpr double kMostVertices = 1e8;  // that may be asked for
+constexpr double kMostFactor = 2;      // of lengths beside a bound, in lengths without
+constexpr double kLongest = 2;         // lengths h at an edge's end, beyond which the edge is bisected
+constexpr double kReach = 0.87;        // of a tetrahedron from the middle of its longest edge, by that
+// Tetrahedra of a refined solid at most, unless the input has more. Those that carry a field are about as many as will
+// be asked for; needles of wild proportions take ever more.
+constexpr std::size_t kMostTets = 2'000'000, kMostTetsPerVertex = 100, kFewestTets = 50'000;
+constexpr int kRounds = 6;            // of refinement and calibration
+constexpr int kTrials = 40;           // factors tried by a calibration
+constexpr double kCalibrated = 1e-3;  // relative error of the edge length, at which a calibration ends
+constexpr double kNarrowest = 1e-9;   // relative width of the interval of factors, at which it gives up
 constexpr double kOutside = -1e-6;  // least barycentric coordinate of a point that counts as within the background mesh
 constexpr double kLeastDensity = 1e-100, kMostDensity = 1e100;  // of an attribute
 
@@ -493,7 +495,8 @@ SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, c
   }
   if (bound) most = more_vertices ? factor : kMostFactor * factor;
   ScaledField field(samples, options.field, sized.edge_length, bound);
-  const std::size_t limit = std::max(kMostTets, mesh.tets.size());
+  const std::size_t limit =
+      std::max(mesh.tets.size(), std::clamp(kMostTetsPerVertex * sized.vertices, kFewestTets, kMostTets));
   for (int round = 0;; ++round) {
     surface.vertices = sized.mesh.vertices;
     const Extent extent(sized.mesh, surface);

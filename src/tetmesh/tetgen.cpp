@@ -29,6 +29,7 @@
 #include "mesh/tet_topology.h"
 #include "tetgen/protocol.h"
 #include "tetmesh/carve.h"
+#include "tetmesh/tetgen_reply.h"
 
 extern char** environ;
 
@@ -235,32 +236,6 @@ std::string make_request(const TriangleMesh& surface, const std::vector<Index>& 
   return out;
 }
 
-struct Tets {
-  std::vector<Vec3> points;
-  std::vector<Tetrahedron> tets;
-};
-
-Tets parse_reply(const std::string& bytes) {
-  tetgen::Reply reply;
-  const auto damaged = [] {
-    throw Error("the program that calls TetGen gave an incomplete answer; check that it belongs to this version");
-  };
-  if (bytes.size() < sizeof reply) damaged();
-  std::memcpy(&reply, bytes.data(), sizeof reply);
-  if (reply.magic != tetgen::kMagic || reply.points > bytes.size() || reply.tets > bytes.size() ||
-      bytes.size() != sizeof reply + reply.points * sizeof(Vec3) + reply.tets * sizeof(Tetrahedron))
-    damaged();
-  Tets result{std::vector<Vec3>(reply.points), std::vector<Tetrahedron>(reply.tets)};
-  if (reply.points) std::memcpy(result.points.data(), bytes.data() + sizeof reply, reply.points * sizeof(Vec3));
-  if (reply.tets)
-    std::memcpy(result.tets.data(), bytes.data() + sizeof reply + reply.points * sizeof(Vec3),
-                reply.tets * sizeof(Tetrahedron));
-  for (const Tetrahedron& t : result.tets)
-    for (const Index v : t)
-      if (v >= reply.points) damaged();
-  return result;
-}
-
 // The index among `vertices` of each of TetGen's points, which come in an order of its own; its Steiner points are
 // appended.
 std::vector<Index> identify(const std::vector<Vec3>& points, std::vector<Vec3>& vertices,
@@ -376,7 +351,7 @@ Filled run_tetgen(const TriangleMesh& surface, const TetgenOptions& options, con
   Child child(program);
   const std::string reply = child.talk(make_request(surface, used), options.time_limit, context);
   explain(child.wait(), child);
-  Tets given = parse_reply(reply);
+  TetgenReply given = parse_reply(reply);
 
   Filled filled;
   filled.vertices = surface.vertices;

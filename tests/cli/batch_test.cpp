@@ -249,6 +249,9 @@ TEST_F(CliBatch, BadJobsAreOneLineAndNothingIsRun) {
   expect(good + "remesh in.off\n", "line 2: is not JSON");
   expect("[1]\n", "line 1: is no JSON object");
   expect("{\"command\": \"mesh\", \"input\": \"a.off\"}\n", "line 1: there is no command \"mesh\"");
+  expect("{\"command\": \"me\\nsh\", \"input\": \"a.off\"}\n", "line 1: there is no command \"me sh\"");
+  expect("{\"command\": \"remesh\", \"input\": \"a.off\", \"output\": \"\"}\n", "is to be the name of a file");
+  expect(line("a", 100).insert(1, "\"features\": [[30]], "), "\"features\" has lists in a list");
   expect("{\"command\": \"remesh\", \"output\": \"a.off\"}\n", "line 1: \"input\" is missing");
   expect(good + "\n" + line("b", 100).insert(1, "\"vertecis\": 5, "), "line 3: The following argument");
   expect(line("a", 100).insert(1, "\"report\": \"r.json\", "), "\"report\" cannot be given");

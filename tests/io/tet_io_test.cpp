@@ -396,6 +396,12 @@ TEST_F(TetIo, RefusesBadFilesInOneLine) {
   expect_error("a.vtk", replaced(legacy, "4 0 2 1 3", "4 0 2 1 4"), "cell 0: index 4 is out of range");
   expect_error("a.vtk", replaced(legacy, "4 0 2 1 3", "4 0 2 1 -3"), "cell 0: index -3 is out of range");
   expect_error("a.vtk", replaced(legacy, "10 5 3", "12 5 3"), "cell 0: its type is 12");
+  for (const std::string section : {"POINTS 1 double\n0 0 0\n", "CELLS 1 2\n1 0\n", "CELL_TYPES 1\n1\n"}) {
+    const std::string word = section.substr(0, section.find(' '));
+    expect_error("a.vtk", legacy + section, "'" + word + "' occurs twice");
+    if (word != "CELL_TYPES")
+      expect_error("a.vtk", replaced(legacy, word + " ", "CELL_DATA 3\nx y z\n" + word + " "), "");
+  }
   expect_error("a.vtk", replaced(legacy, "4 0 2 1 3", "5 0 2 1 3"), "cell 0: it has 5 vertices");
   expect_error("a.vtk", replaced(legacy, "CELLS 3 12", "CELLS 3 1200000000"), "more than the file can hold");
   expect_error("a.vtk", replaced(legacy, "UNSTRUCTURED_GRID", "STRUCTURED_POINTS"), "UNSTRUCTURED_GRID");
