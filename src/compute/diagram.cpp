@@ -9,18 +9,12 @@
 #include "bisector/error.h"
 #include "compute/compute.h"
 #include "core/geometry.h"
+#include "core/magnitude.h"
 #include "voronoi/clipped.h"
 #include "voronoi/tiling.h"
 
 namespace bisector {
 namespace {
-
-void check_finite(const std::vector<Vec3>& points, const char* kind) {
-  for (std::size_t i = 0; i < points.size(); ++i)
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(points[i][k]))
-        throw Error(fmt::format("{} {} has a coordinate that is not finite; correct it", kind, i));
-}
 
 void check_indices(const TriangleMesh& mesh) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -57,8 +51,8 @@ Result result_of(const Backend& backend, const EvaluationReport& report, const D
 
 SurfaceDiagram compute_diagram(const TriangleMesh& mesh, const std::vector<double>& density,
                                const std::vector<Vec3>& seeds, const DiagramOptions& options, const Context& context) {
-  check_finite(mesh.vertices, "vertex");
-  check_finite(seeds, "seed");
+  require_moderate(mesh.vertices, "vertex");
+  require_moderate(seeds, "seed");
   check_indices(mesh);
   const Surface surface(mesh, density);
   const std::unique_ptr<Backend> backend = make_backend(surface, options.compute, context);
@@ -75,7 +69,8 @@ SurfaceDiagram compute_diagram(const TriangleMesh& mesh, const std::vector<doubl
 
 SolidDiagram compute_diagram(const TetMesh& mesh, const std::vector<double>& density, const std::vector<Vec3>& seeds,
                              const DiagramOptions& options, const Context& context) {
-  check_finite(seeds, "seed");
+  require_moderate(mesh.vertices, "vertex");
+  require_moderate(seeds, "seed");
   const Solid solid(mesh, density);
   const std::unique_ptr<SolidBackend> backend = make_backend(solid, options.compute, context);
   context.check();

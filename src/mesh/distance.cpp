@@ -9,6 +9,7 @@
 #include "bisector/error.h"
 #include "core/degenerate.h"
 #include "core/geometry.h"
+#include "core/magnitude.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "spatial/nearest.h"
@@ -93,6 +94,8 @@ OneSided measure_one_side(const Surface& from, const Surface& to, std::size_t sa
 
 DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference, std::size_t samples,
                                 std::uint64_t random_seed, const Context& context) {
+  require_moderate(mesh.vertices, "vertex");
+  require_moderate(reference.vertices, "vertex of the reference");
   const Surface ours(mesh, "mesh");
   context.check();
   const Surface theirs(reference, "reference");

@@ -15,6 +15,7 @@
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "compute/compute.h"
+#include "core/magnitude.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "cvt/multilevel.h"
@@ -785,6 +786,8 @@ RemeshResult remesh_walls(const TriangleMesh& walls, const RemeshOptions& option
 
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
   check_options(options);
+  require_moderate(input.vertices, "vertex");
+  require_moderate(options.seeds, "seed");
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   const Stopwatch watch;

@@ -19,7 +19,8 @@ namespace {
 
 // Energies are fixed-point numbers: sums and flows are exact, and no residue of rounding keeps a path open.
 using Cost = std::int64_t;
-constexpr double kUnit = 0x1p40;  // of Cost, to the energy at the start
+constexpr double kUnit = 0x1p40;        // of Cost, to the energy at the start
+constexpr double kMostBorder = 0x1p50;  // of one edge, so that sums fit; no cut pays for it
 
 constexpr double kFar = 1e100;  // squared distances from here on are no numbers to add up
 constexpr int kSplits = 4;      // of connected changes that the topology forbids
@@ -304,7 +305,8 @@ class BorderSmoother {
 
   // A region's share in the cost of a piece of its border, so that costs obey the triangle inequality exactly.
   Cost half_cost(double length, Index region) const {
-    return static_cast<Cost>(std::llround(unit_ * length * options_.weights[region] / 2));
+    const double cost = unit_ * length * options_.weights[region] / 2;
+    return static_cast<Cost>(std::llround(cost < kMostBorder ? cost : kMostBorder));
   }
 
   // --- Changes that keep the topology ---

@@ -49,7 +49,7 @@ std::vector<Index> hilbert_order(const std::vector<Vec3>& points) {
   const Box box = bounding_box(points);
   const Vec3 extent = box.hi - box.lo;
   const double side = std::max({extent.x, extent.y, extent.z});
-  const double scale = side > 0 ? 2097151.0 / side : 0.0;
+  const double scale = side > 1e-300 ? 2097151.0 / side : 0.0;
   std::vector<Key> keys(points.size());
   parallel_each(points.size(), [&](std::size_t i) {
     const Vec3 p = scale * (points[i] - box.lo);

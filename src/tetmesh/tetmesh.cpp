@@ -13,6 +13,7 @@
 #include "checkpoint/fingerprint.h"
 #include "checkpoint/step_store.h"
 #include "compute/compute.h"
+#include "core/magnitude.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "mesh/locate.h"
@@ -308,6 +309,8 @@ TetOptions follow_vertices(const TetOptions& options, const WeldResult& welded) 
 TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, const Context& context) {
   const Stopwatch watch;
   check_options(options);
+  require_moderate(input.vertices, "vertex");
+  require_moderate(options.seeds, "seed");
   check_attribute(options, input.vertices.size());
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
@@ -326,6 +329,8 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
 
 TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const Context& context) {
   check_options(options);
+  require_moderate(solid.vertices, "vertex");
+  require_moderate(options.seeds, "seed");
   check_attribute(options, solid.vertices.size());
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "bisector/error.h"
+#include "core/magnitude.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "tree/branches.h"
@@ -58,10 +59,7 @@ void check_options(const std::vector<Vec3>& points, const TreeOptions& options) 
     throw Error(fmt::format("{} classes for {} points; give one for each", options.classes.size(), points.size()));
   if (options.scene && options.components == TreeComponents::separate)
     throw Error("the trees of a scene are told from each other; leave their components bridged");
-  for (std::size_t i = 0; i < points.size(); ++i)
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(points[i][k]))
-        throw Error(fmt::format("point {}: a coordinate is not finite; remove the point", i));
+  require_moderate(points, "point");
 }
 
 bool on_one_line(const std::vector<Vec3>& points) {
