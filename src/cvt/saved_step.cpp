@@ -1,9 +1,11 @@
 #include "cvt/saved_step.h"
 
+#include <cmath>
 #include <utility>
 #include <vector>
 
 #include "bisector/error.h"
+#include "core/magnitude.h"
 
 namespace bisector {
 void write_seeds(const PlacedSeeds& seeds, ByteWriter& out) {
@@ -15,6 +17,7 @@ void write_seeds(const PlacedSeeds& seeds, ByteWriter& out) {
 PlacedSeeds read_seeds(const FeatureCurves& curves, ByteReader& in) {
   std::vector<Vec3> positions;
   in.get_all(positions);
+  require_moderate(positions, "the checkpoint's seed");
   std::vector<SeedPlace> places(positions.size());
   for (SeedPlace& place : places) {
     in.get(place.kind);
@@ -22,7 +25,8 @@ PlacedSeeds read_seeds(const FeatureCurves& curves, ByteReader& in) {
     in.get(place.corner);
     in.get(place.position);
     const bool on_curve = place.kind == SeedPlace::Kind::curve;
-    if (place.kind > SeedPlace::Kind::interior || (place.curve == kNone ? on_curve : place.curve >= curves.size()) ||
+    if (static_cast<unsigned>(place.kind) > static_cast<unsigned>(SeedPlace::Kind::interior) ||
+        !std::isfinite(place.position) || (place.curve == kNone ? on_curve : place.curve >= curves.size()) ||
         (place.corner != kNone && place.corner >= curves.graph().corners.size()))
       throw Error("a seed of the checkpoint is on a curve or corner that is not there");
   }

@@ -50,6 +50,8 @@ constexpr std::size_t kManyFacets = 6;
 // Of the steps of the finest level, those that are made on the input after all.
 constexpr double kOnInputShare = 0.15;
 constexpr int kMendingRounds = 3;  // of features and topology
+// Edges along features and borders at most: so many, or so many times the vertices asked for.
+constexpr double kMostOnFeatures = 1e6, kMostOnFeaturesPerVertex = 1000;
 // A run starts again with edges shorter by this where cells are no disks, or along broken curves; not if more than one
 // cell, or curve, in so many is such.
 constexpr double kShorter = 0.6;
@@ -116,6 +118,7 @@ class Pipeline {
   }
 
   // Places seeds and optimises them.
+  void check_length_of_features() const;
   void place();
   // The same for seeds that a run for another density on the same surface has placed: on the finest level alone.
   void place_again(const PlacedSeeds& earlier);
@@ -453,7 +456,19 @@ void Pipeline::fit() {
   result_.seconds.fit += watch.seconds();
 }
 
+// Slivers have borders that are long for their area, and with it for the edges.
+void Pipeline::check_length_of_features() const {
+  double edges = 0;
+  for (Index c = 0; c < curves_.size(); ++c) edges += measure_.whole(c) / measure_.scale(wanted_);
+  if (!(edges < std::max(kMostOnFeatures, kMostOnFeaturesPerVertex * static_cast<double>(wanted_))))
+    throw Error(
+        fmt::format("features and borders take about {:.3g} vertices where {} are asked for; ask for more, "
+                    "or for fewer features (features)",
+                    edges, wanted_));
+}
+
 void Pipeline::place() {
+  check_length_of_features();
   const std::vector<std::size_t> counts = choose_levels();
   if (!plan_.places.empty()) {
     run_.seeds = PlacedSeeds(plan_.seeds, plan_.places);

@@ -16,7 +16,8 @@ struct NearestPoint {
 
 class NearestOnMesh {
  public:
-  // Triangles without area are left out. Throws Error if there are no others.
+  // Triangles without area, or with one whose square vanishes beside the mesh, are left out. Throws Error if there are
+  // no others.
   explicit NearestOnMesh(const TriangleMesh& mesh);
   ~NearestOnMesh();
   NearestOnMesh(const NearestOnMesh&) = delete;

@@ -1,5 +1,6 @@
 #include "tetmesh/tetgen_reply.h"
 
+#include <cmath>
 #include <cstring>
 
 #include "bisector/error.h"
@@ -22,6 +23,8 @@ TetgenReply parse_reply(const std::string& bytes) {
   if (reply.tets)
     std::memcpy(result.tets.data(), bytes.data() + sizeof reply + reply.points * sizeof(Vec3),
                 reply.tets * sizeof(Tetrahedron));
+  for (const Vec3& p : result.points)
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) damaged();
   for (const Tetrahedron& t : result.tets)
     for (const Index v : t)
       if (v >= reply.points) damaged();

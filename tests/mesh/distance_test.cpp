@@ -32,6 +32,27 @@ TEST(Distance, OfAMeshToItselfIsRounding) {
   }
 }
 
+TEST(Distance, OfAnyMagnitude) {
+  const TriangleMesh inner = icosphere(2), outer = scaled(inner, 1.25);
+  const DistanceReport expected = measure_distance(inner, outer, 500);
+  for (const double scale : {0x1p-300, 0x1p-120, 0x1p120}) {
+    const DistanceReport report = measure_distance(scaled(inner, scale), scaled(outer, scale), 500);
+    EXPECT_NEAR(report.rms, expected.rms, 1e-9 * expected.rms) << scale;
+    EXPECT_NEAR(report.max, expected.max, 1e-9 * expected.max) << scale;
+  }
+  for (const double wild : {1e41, std::nan("")})
+    EXPECT_THROW(measure_distance(inner, scaled(outer, wild), 500), Error) << wild;
+}
+
+TEST(Distance, OfTrianglesWhoseAreaVanishes) {
+  TriangleMesh needle;
+  needle.vertices = {{0, 0, 0}, {1, 0, 0}, {0.5, 1e-200, 0}};
+  needle.triangles = {{0, 1, 2}};
+  EXPECT_THROW(measure_distance(icosphere(1), needle, 100), Error);
+  const TriangleMesh both = joined(icosphere(1), needle);
+  EXPECT_LT(measure_distance(icosphere(1), both, 100).rms_to_reference, 1e-10);
+}
+
 TEST(Distance, OfParallelPlanes) {
   const TriangleMesh plane = grid_patch(4, 3);  // diagonal 5
   const DistanceReport report = measure_distance(moved(plane, {0, 0, 0.25}), plane, 3000);

@@ -423,6 +423,11 @@ TEST(RemeshErrors, AreOneLineThatSaysWhatToDo) {
     return std::string();
   };
   EXPECT_NE(message(icosphere(1), options_for(0)).find("vertices"), std::string::npos);
+  TriangleMesh far = icosphere(1);
+  far.vertices[3].y = 1e41;
+  EXPECT_NE(message(far, options_for(100)).find("vertex 3: a coordinate is beyond 1e+40"), std::string::npos);
+  far.vertices[3].y = std::nan("");
+  EXPECT_NE(message(far, options_for(100)).find("vertex 3: a coordinate is not finite"), std::string::npos);
   for (std::size_t vertices : {1u, 3u})
     EXPECT_NE(message(icosphere(1), options_for(vertices)).find("4"), std::string::npos);
   RemeshOptions seeded;
