@@ -107,12 +107,7 @@ void add_options(CLI::App* app, BatchCommand& command) {
       ->type_name("SECONDS")
       ->check(CLI::PositiveNumber)
       ->group("Computation");
-  app->add_option("--memory", options.limits.memory,
-                  "end a job that holds more, such as 8GB or 500MB;\n"
-                  "default: none")
-      ->type_name("SIZE")
-      ->transform(CLI::AsSizeValue(false))
-      ->group("Computation");
+  add_memory(app, options.limits.memory, "end a job that holds more, such as 8GB or 500MB;\ndefault: none");
   app->add_option("--shard", command.shard, "run each COUNT-th job only, from the INDEX-th on, counted\nfrom 0")
       ->type_name("INDEX/COUNT")
       ->group("Computation");

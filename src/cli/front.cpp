@@ -42,6 +42,15 @@ void add_common_options(CLI::App* app, CommonOptions& options, const char* about
   app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
 }
 
+void add_memory(CLI::App* app, std::uint64_t& bytes, const char* about) {
+  app->add_option("--memory", bytes, about)
+      ->type_name("SIZE")
+      ->check(
+          job::whole_number(1, UINT64_MAX).description(""))  // of what the transform, which is first, has made of it
+      ->transform(CLI::AsSizeValue(false).description(""))
+      ->group("Computation");
+}
+
 namespace {
 
 void compute(job::Job& job, Console& console) {
@@ -114,12 +123,9 @@ Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandT
         ->required(kind.required)
         ->group("Output");
   job->add_options(app);
-  app->add_option("--memory", files->memory,
-                  "end with an error before it holds more, such as 8GB;\n"
-                  "default: what the system gives")
-      ->type_name("SIZE")
-      ->transform(CLI::AsSizeValue(false))
-      ->group("Computation");
+  add_memory(app, files->memory,
+             "end with an error before it holds more, such as 8GB;\n"
+             "default: what the system gives");
   add_common_options(app, files->common, report_help);
   const auto check_usage = [=] {
     for (const auto& [name, path] : files->outputs)

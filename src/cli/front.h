@@ -37,6 +37,8 @@ class Help : public CLI::Formatter {
 
 // --report with the help `about`, --quiet and --verbose.
 void add_common_options(CLI::App* app, CommonOptions& options, const char* about);
+// --memory: a size in bytes, in words such as 8GB.
+void add_memory(CLI::App* app, std::uint64_t& bytes, const char* about);
 
 // What a summary speaks of beside the job: the file that each output goes to, empty if it is not wanted.
 struct JobFiles {

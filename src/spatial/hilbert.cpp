@@ -49,6 +49,7 @@ std::vector<Index> hilbert_order(const std::vector<Vec3>& points) {
   const Box box = bounding_box(points);
   const Vec3 extent = box.hi - box.lo;
   const double side = std::max({extent.x, extent.y, extent.z});
+  // Codes need not tell points apart; where the quotient would overflow they are all 0.
   const double scale = side > 1e-300 ? 2097151.0 / side : 0.0;
   std::vector<Key> keys(points.size());
   parallel_each(points.size(), [&](std::size_t i) {

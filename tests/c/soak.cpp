@@ -211,14 +211,15 @@ int main(int argc, char** argv) try {
   Soak soak(argv[1], argv[2]);
   // Arenas and caches fill up at first.
   const int settled = std::max(2, rounds / 4);
-  long before = 0;
+  long before = 0, now = 0;
   for (int k = 0; k < rounds && !soak.failed(); ++k) {
     soak.round(static_cast<std::uint64_t>(k));
-    if (k + 1 == settled) before = allocated();
-    std::printf("%zu runs, %ld KiB allocated\n", soak.runs(), allocated());
+    now = allocated();
+    if (k + 1 == settled) before = now;
+    std::printf("%zu runs, %ld KiB allocated\n", soak.runs(), now);
   }
   if (soak.failed()) return 1;
-  const long grown = allocated() - before;
+  const long grown = now - before;
   std::printf("grown by %ld KiB since %d runs\n", grown, settled * 20);
   return grown < 1024 ? 0 : 1;
 } catch (const std::exception& error) {

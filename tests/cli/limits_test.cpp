@@ -95,7 +95,7 @@ TEST_F(CliLimits, TooLittleMemoryIsSaidAndNothingIsLost) {
 }
 
 TEST_F(CliLimits, MemoryIsASize) {
-  for (const char* size : {"0x", "-5MB", "much"})
+  for (const char* size : {"0", "0x", "-5MB", "much"})
     expect_failure(2, {"quality", in("sphere.off"), "--memory", size}, "--memory");
 }
 
@@ -122,7 +122,7 @@ TEST_F(CliLimits, StandardStreamsThatAreClosedAreNotTheOutputs) {
   ASSERT_EQ(run({"remesh", in("sphere.off"), "-n", "200", "-o", whole}).code, 0);
   const std::string words = std::string(BISECTOR_PROGRAM) + " remesh " + in("sphere.off") + " -n 200 --verbose -o " +
                             output + " --report " + report;
-  for (const char* closed : {" >&-", " 2>&-", " <&- >&- 2>&-", " | true"}) {
+  for (const char* closed : {" >&-", " 2>&- >/dev/null", " <&- >&- 2>&-", " | true"}) {
     fs::remove(output);
     fs::remove(report);
     ASSERT_NE(std::system((words + closed).c_str()), -1);

@@ -74,16 +74,6 @@ class Source {
   std::string_view bytes_;
 };
 
-template <class Body>
-void guarded(const Body& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    const std::string_view line = error.what();
-    require(!line.empty() && line.find('\n') == std::string_view::npos, "an error is one line");
-  }
-}
-
 ComputeOptions cpu() {
   ComputeOptions compute;
   compute.device.kind = DeviceRequest::Kind::cpu;
@@ -113,22 +103,23 @@ void remesh_tiny(std::string_view bytes) {
   });
 }
 
+template <class Domain>
+void diagram_of(const Domain& domain, const std::vector<Vec3>& seeds) {
+  DiagramOptions options;
+  options.compute = cpu();
+  guarded([&] { require(compute_diagram(domain, {}, seeds, options).untiled == 0, "cells tile the domain"); });
+}
+
 void diagram_of_surface(std::string_view bytes) {
   Source source(bytes);
   const std::vector<Vec3> seeds = source.points(12);
-  const TriangleMesh surface = source.surface();
-  DiagramOptions options;
-  options.compute = cpu();
-  guarded([&] { require(compute_diagram(surface, {}, seeds, options).untiled == 0, "cells tile the surface"); });
+  diagram_of(source.surface(), seeds);
 }
 
 void diagram_of_solid(std::string_view bytes) {
   Source source(bytes);
   const std::vector<Vec3> seeds = source.points(12);
-  const TetMesh solid = source.solid();
-  DiagramOptions options;
-  options.compute = cpu();
-  guarded([&] { require(compute_diagram(solid, {}, seeds, options).untiled == 0, "cells tile the solid"); });
+  diagram_of(source.solid(), seeds);
 }
 
 void tet_tiny(std::string_view bytes) {
@@ -182,15 +173,14 @@ void tree_tiny(std::string_view bytes) {
 
 }  // namespace
 
-void add_pipelines(std::vector<Target>& all) {
-  const std::pair<const char*, void (*)(std::string_view)> pipelines[] = {{"remesh", remesh_tiny},
-                                                                          {"surface_diagram", diagram_of_surface},
-                                                                          {"solid_diagram", diagram_of_solid},
-                                                                          {"tet", tet_tiny},
-                                                                          {"segment", segment_tiny},
-                                                                          {"quality", quality_tiny},
-                                                                          {"tree", tree_tiny}};
-  for (const auto& [name, run] : pipelines) all.push_back({name, run});
+std::vector<Target> pipelines() {
+  return {{"remesh", remesh_tiny},
+          {"surface_diagram", diagram_of_surface},
+          {"solid_diagram", diagram_of_solid},
+          {"tet", tet_tiny},
+          {"segment", segment_tiny},
+          {"quality", quality_tiny},
+          {"tree", tree_tiny}};
 }
 
 }  // namespace bisector::fuzz

@@ -44,16 +44,6 @@ void check(const TetMesh& mesh) {
   require(mesh.boundary_labels.empty() || mesh.boundary_labels.size() == mesh.boundary.size(), "a label each");
 }
 
-template <class Body>
-void guarded(const Body& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    const std::string_view line = error.what();
-    require(!line.empty() && line.find('\n') == std::string_view::npos, "an error is one line");
-  }
-}
-
 void read_surface(std::string_view bytes, const char* name) {
   guarded([&] { check(read_mesh(file_of(bytes, name))); });
 }
@@ -187,30 +177,29 @@ void command_line(std::string_view bytes) {
 
 }  // namespace
 
-void add_readers(std::vector<Target>& all) {
-  const std::pair<const char*, void (*)(std::string_view)> readers[] = {{"off", surface<kOff>},
-                                                                        {"obj", surface<kObj>},
-                                                                        {"ply", ply},
-                                                                        {"stl", surface<kStl>},
-                                                                        {"3mf", surface<k3mf>},
-                                                                        {"vtp", surface<kVtp>},
-                                                                        {"medit", medit},
-                                                                        {"medit_binary", solid<kMeshb>},
-                                                                        {"gmsh", solid<kMsh>},
-                                                                        {"vtk", solid<kVtk>},
-                                                                        {"vtu", solid<kVtu>},
-                                                                        {"xyz", cloud<kXyz>},
-                                                                        {"pcd", cloud<kPcd>},
-                                                                        {"las", cloud<kLas>},
-                                                                        {"sol", sol},
-                                                                        {"feature_edges", feature_edges},
-                                                                        {"indices", indices},
-                                                                        {"jobs", jobs},
-                                                                        {"checkpoint", checkpoint},
-                                                                        {"kernel_cache", kernel_cache},
-                                                                        {"tetgen_reply", tetgen_reply},
-                                                                        {"command_line", command_line}};
-  for (const auto& [name, run] : readers) all.push_back({name, run});
+std::vector<Target> readers() {
+  return {{"off", surface<kOff>},
+          {"obj", surface<kObj>},
+          {"ply", ply},
+          {"stl", surface<kStl>},
+          {"3mf", surface<k3mf>},
+          {"vtp", surface<kVtp>},
+          {"medit", medit},
+          {"medit_binary", solid<kMeshb>},
+          {"gmsh", solid<kMsh>},
+          {"vtk", solid<kVtk>},
+          {"vtu", solid<kVtu>},
+          {"xyz", cloud<kXyz>},
+          {"pcd", cloud<kPcd>},
+          {"las", cloud<kLas>},
+          {"sol", sol},
+          {"feature_edges", feature_edges},
+          {"indices", indices},
+          {"jobs", jobs},
+          {"checkpoint", checkpoint},
+          {"kernel_cache", kernel_cache},
+          {"tetgen_reply", tetgen_reply},
+          {"command_line", command_line}};
 }
 
 }  // namespace bisector::fuzz

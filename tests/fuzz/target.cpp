@@ -35,9 +35,9 @@ class Folder {
 
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = [] {
-    std::vector<Target> list;
-    add_readers(list);
-    add_pipelines(list);
+    std::vector<Target> list = readers();
+    const std::vector<Target> more = pipelines();
+    list.insert(list.end(), more.begin(), more.end());
     return list;
   }();
   return all;

@@ -400,7 +400,7 @@ TEST_F(TetIo, RefusesBadFilesInOneLine) {
     const std::string word = section.substr(0, section.find(' '));
     expect_error("a.vtk", legacy + section, "'" + word + "' occurs twice");
     if (word != "CELL_TYPES")
-      expect_error("a.vtk", replaced(legacy, word + " ", "CELL_DATA 3\nx y z\n" + word + " "), "");
+      expect_error("a.vtk", replaced(legacy, word + " ", "CELL_DATA 3\n" + word + " "), "data of 3 items, but 0 items");
   }
   expect_error("a.vtk", replaced(legacy, "4 0 2 1 3", "5 0 2 1 3"), "cell 0: it has 5 vertices");
   expect_error("a.vtk", replaced(legacy, "CELLS 3 12", "CELLS 3 1200000000"), "more than the file can hold");
