@@ -43,10 +43,10 @@ void add_common_options(CLI::App* app, CommonOptions& options, const char* about
 }
 
 void add_memory(CLI::App* app, std::uint64_t& bytes, const char* about) {
+  // The check is of what the transform, which comes first, has made of the word.
   app->add_option("--memory", bytes, about)
       ->type_name("SIZE")
-      ->check(
-          job::whole_number(1, UINT64_MAX).description(""))  // of what the transform, which is first, has made of it
+      ->check(job::whole_number(1, UINT64_MAX).description(""))
       ->transform(CLI::AsSizeValue(false).description(""))
       ->group("Computation");
 }

@@ -16,28 +16,30 @@ std::uint64_t bytes_held() {
   return data * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
+rlimit limit_of_data() {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_DATA, &limit);
+  return limit;
+}
+
 }  // namespace
 
 void limit_memory(std::uint64_t bytes) {
-  rlimit limit{};
-  ::getrlimit(RLIMIT_DATA, &limit);
-  limit.rlim_cur = std::min<rlim_t>(bytes, limit.rlim_max);
+  rlimit limit = limit_of_data();
+  limit.rlim_cur = std::min<rlim_t>(bytes, limit.rlim_cur);
   ::setrlimit(RLIMIT_DATA, &limit);
 }
 
 std::uint64_t memory_limit() {
-  rlimit limit{};
-  ::getrlimit(RLIMIT_DATA, &limit);
+  const rlimit limit = limit_of_data();
   return limit.rlim_cur == RLIM_INFINITY ? 0 : limit.rlim_cur;
 }
 
 void share_memory_limit(pid_t child) {
-  const std::uint64_t limit = memory_limit();
-  if (limit == 0) return;
-  rlimit rest{};
-  ::getrlimit(RLIMIT_DATA, &rest);
-  rest.rlim_cur = limit - std::min(limit, bytes_held());
-  ::prlimit(child, RLIMIT_DATA, &rest, nullptr);
+  rlimit limit = limit_of_data();
+  if (limit.rlim_cur == RLIM_INFINITY) return;
+  limit.rlim_cur -= std::min<rlim_t>(limit.rlim_cur, bytes_held());
+  ::prlimit(child, RLIMIT_DATA, &limit, nullptr);
 }
 
 }  // namespace bisector

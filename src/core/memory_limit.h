@@ -9,6 +9,7 @@
 namespace bisector {
 
 // Bytes of this process, used or not: all that is allocated, and the stacks of threads. Devices' memory does not count.
+// A limit that is there already is not raised.
 void limit_memory(std::uint64_t bytes);
 
 // 0: none.

@@ -458,8 +458,9 @@ void Pipeline::fit() {
 
 // Slivers have borders that are long for their area, and with it for the edges.
 void Pipeline::check_length_of_features() const {
-  double edges = 0;
-  for (Index c = 0; c < curves_.size(); ++c) edges += measure_.whole(c) / measure_.scale(wanted_);
+  double length = 0;
+  for (Index c = 0; c < curves_.size(); ++c) length += measure_.whole(c);
+  const double edges = length / measure_.scale(wanted_);
   if (!(edges < std::max(kMostOnFeatures, kMostOnFeaturesPerVertex * static_cast<double>(wanted_))))
     throw Error(
         fmt::format("features and borders take about {:.3g} vertices where {} are asked for; ask for more, "
