@@ -1,4 +1,4 @@
-# What is installed, by component: program, step (where programs are built), c (the C interface at run time),
+# What is installed, by component: program, step and mpi (where they are built), c (the C interface at run time),
 # development, and python, which a plain `cmake --install` leaves out.
 
 set(BISECTOR_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Folder below the prefix for the Python package")

@@ -9,6 +9,9 @@ set(CPACK_COMPONENTS_ALL program c development python)
 if(BISECTOR_STEP)
   list(APPEND CPACK_COMPONENTS_ALL step)
 endif()
+if(BISECTOR_MPI)
+  list(APPEND CPACK_COMPONENTS_ALL mpi)
+endif()
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/cmake/FinishPackages.cmake)
@@ -41,12 +44,17 @@ bisector_package(program bisector science "high-quality meshes of surfaces and s
   "This package has the program bisector. A GPU is used where its driver has"
   "Vulkan.")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS libvulkan1)
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS bisector-step)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "bisector-step, bisector-mpi")
 
 bisector_package(step bisector-step science "STEP and IGES files of surfaces that bisector finds"
   "This package has the program bisector-step, which writes what bisector"
   "segment finds as faces for CAD systems.")
 set(CPACK_DEBIAN_STEP_PACKAGE_RECOMMENDS bisector)
+
+bisector_package(mpi bisector-mpi science "remeshing by many machines together"
+  "This package has the program bisector-mpi, which mpirun bisector starts to"
+  "divide the work on a surface among ranks of Open MPI.")
+set(CPACK_DEBIAN_MPI_PACKAGE_DEPENDS "bisector (= ${bisector_debian_version})")
 
 # CPack would have the library's scripts call ldconfig, where a trigger is asked for; so shlibs and Depends are not its
 # business either.

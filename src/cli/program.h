@@ -31,4 +31,7 @@ struct Program {
 
 Program make_program();
 
+// All of the program: reads the command line, runs the command, tells what it throws. Returns the exit code.
+int run_program(int argc, char** argv);
+
 }  // namespace bisector::cli

@@ -7,6 +7,7 @@
 #include "backend/cpu_backend.h"
 #include "backend/fallback_backend.h"
 #include "bisector/error.h"
+#include "distributed/distributed_backend.h"
 #include "host/device/ranking.h"
 #include "host/passes/vulkan_backend.h"
 #include "host/passes/vulkan_solid_backend.h"
@@ -14,8 +15,11 @@
 namespace bisector {
 namespace {
 
+Ranks* ranks_of_run = nullptr;
+
 // What the two kinds of domain differ in.
 std::unique_ptr<Backend> cpu_backend(const Surface& surface, NeighbourSource source, std::string fallback) {
+  if (ranks_of_run) return std::make_unique<DistributedBackend>(surface, source, *ranks_of_run);
   return std::make_unique<CpuBackend>(surface, source, std::move(fallback));
 }
 std::unique_ptr<SolidBackend> cpu_backend(const Solid& solid, NeighbourSource source, std::string fallback) {
@@ -47,6 +51,8 @@ void check_cpu_precision(Precision precision) {
 
 }  // namespace
 
+void set_ranks(Ranks* ranks) { ranks_of_run = ranks; }
+
 DeviceList list_devices() { return host::list_devices(); }
 
 std::optional<DeviceRequest> best_gpu(DeviceList list, Precision precision) {
@@ -66,6 +72,7 @@ Compute::Compute(const ComputeOptions& options, const Context& context) : option
 }
 
 void Compute::choose_best() {
+  if (ranks_of_run) return check_cpu_precision(options_.precision);
   const DeviceList list = host::list_gpus();
   device_ = best_gpu(list, options_.precision);
   if (device_) return;

@@ -11,9 +11,16 @@
 
 namespace bisector {
 
+class Ranks;
+
 namespace host {
 class Device;
 }
+
+// Lets backends for surfaces that are made from now on divide their work among these ranks, whose CPUs compute; null:
+// no longer. Only a process that is rank 0 of a run calls it, before and after all that it computes. A request for a
+// Vulkan device is met by rank 0 alone.
+void set_ranks(Ranks* ranks);
 
 // Where a run computes. All backends of a run come from here: the device is chosen and opened once, and stays open for
 // as long as one of them lives. Backends of one device may take turns but not compute at the same time.

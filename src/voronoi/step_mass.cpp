@@ -7,26 +7,19 @@
 namespace bisector {
 namespace {
 
-constexpr std::size_t kNear = 6;
-constexpr double kShare = 0.25;
-
 double largest_mass(const CellMoments& result) {
   double largest = 0;
   for (const Moments& cell : result.cells) largest = std::max(largest, cell.mass);
   return largest;
 }
 
-double median_nearby(const SortedSeeds& seeds, const Neighbours& neighbours, Index slot, const CellMoments& result) {
-  Index near[kNear];
-  const std::size_t count = neighbours.nearest_to(slot, kNear, near);
-  if (count == 0) return 0;
-  double masses[kNear] = {};
-  std::transform(near, near + count, masses, [&](Index j) { return result.cells[seeds.id[j]].mass; });
-  std::nth_element(masses, masses + count / 2, masses + count);
-  return masses[count / 2];
-}
-
 }  // namespace
+
+double step_mass(double own, double* nearest, std::size_t count) {
+  if (count == 0) return std::max(own, 0.0);
+  std::nth_element(nearest, nearest + count / 2, nearest + count);
+  return std::max(own, kStepShare * nearest[count / 2]);
+}
 
 void set_step_masses(const SortedSeeds& seeds, const Neighbours& neighbours, CellMoments& result) {
   result.step_mass.assign(result.cells.size(), -1);
@@ -37,18 +30,20 @@ void set_step_masses(const SortedSeeds& seeds, const Neighbours& neighbours, Cel
 void complete_step_masses(const SortedSeeds& seeds, const std::function<const Neighbours&()>& neighbours,
                           CellMoments& result) {
   const double largest = largest_mass(result);
-  // A median is at most the largest mass, so a cell of a quarter of that needs none.
   const auto needs_median = [&](std::size_t i) {
-    return result.step_mass[i] < 0 && result.cells[i].mass < kShare * largest;
+    return result.step_mass[i] < 0 && result.cells[i].mass < kStepShare * largest;
   };
-  const Neighbours* near = nullptr;
-  for (std::size_t s = 0; !near && s < seeds.x.size(); ++s)
-    if (needs_median(seeds.id[s])) near = &neighbours();
+  const Neighbours* list = nullptr;
+  for (std::size_t s = 0; !list && s < seeds.x.size(); ++s)
+    if (needs_median(seeds.id[s])) list = &neighbours();
   parallel_each(seeds.x.size(), [&](std::size_t s) {
     const Index i = seeds.id[s];
-    if (needs_median(i))
-      result.step_mass[i] =
-          std::max(result.cells[i].mass, kShare * median_nearby(seeds, *near, static_cast<Index>(s), result));
+    if (!needs_median(i)) return;
+    Index near[kStepNeighbours];
+    double masses[kStepNeighbours];
+    const std::size_t count = list->nearest_to(static_cast<Index>(s), kStepNeighbours, near);
+    for (std::size_t k = 0; k < count; ++k) masses[k] = result.cells[seeds.id[near[k]]].mass;
+    result.step_mass[i] = step_mass(result.cells[i].mass, masses, count);
   });
   parallel_each(result.step_mass.size(), [&](std::size_t i) {
     if (result.step_mass[i] < 0) result.step_mass[i] = result.cells[i].mass;

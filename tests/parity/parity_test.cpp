@@ -230,7 +230,7 @@ void expect_parity(const Problem& problem, const Setup& setup) {
   const std::unique_ptr<Backend> backend = backend_for(problem.surface, setup);
   EXPECT_LE(backend->mass_tolerance(), tolerance_of(setup.processor).sum);
   EXPECT_EQ(backend->description().precision, setup.processor == Processor::single ? "single" : "double");
-  EXPECT_EQ(backend->description().kind == "cpu", setup.processor == Processor::cpu);
+  EXPECT_EQ(backend->description().kind == "cpu", !is_device(setup.processor));
   std::vector<CellMoments> first_run;
   for (const SeedSet& set : problem.sets) {
     SCOPED_TRACE(set.name);
@@ -285,7 +285,7 @@ std::vector<DiagramCase> diagram_cases() {
     for (const Setup& setup : all_setups()) {
       // Software devices take long: there, precisions and sources of neighbours take turns where there are many models
       // of a kind. Both precisions are tried on all that are small, and on two of the large ones.
-      const bool device = setup.processor != Processor::cpu, my_turn = setup.processor == turn_of(k);
+      const bool device = is_device(setup.processor), my_turn = setup.processor == turn_of(k);
       const bool large = all[k].choice == Choice::basic && all[k].name != "anchor.off";
       if (device && setup.source == NeighbourSource::delaunay && (large || !my_turn)) continue;
       if (device && large && all[k].name != "bunny.off" && !my_turn) continue;
@@ -340,7 +340,7 @@ std::vector<Vec3> graded_seeds(const TriangleMesh& mesh, std::size_t count) {
 
 // Hardly any pair of theirs is left to the CPU.
 TEST_P(Parities, GradedSeedsStayOnTheDevice) {
-  if (GetParam().processor == Processor::cpu || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
+  if (!is_device(GetParam().processor) || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const TriangleMesh mesh = torus(60, 40);
   const Surface surface(mesh);
@@ -371,7 +371,7 @@ TEST_P(Parities, ACellMayOwnThousandsOfTriangles) {
 
 // A device waits for the host and the host for it a few times only, and however many the seeds are.
 TEST_P(Parities, AnEvaluationTakesFewSubmissions) {
-  if (GetParam().processor == Processor::cpu || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
+  if (!is_device(GetParam().processor) || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
   SKIP_WITHOUT_DEVICE(GetParam().processor);
   const TriangleMesh mesh = icosphere(6);
   const Surface surface(mesh);
@@ -396,7 +396,7 @@ TEST_P(Parities, AnEvaluationTakesFewSubmissions) {
 
 // The vectors of a descent stay on the device: per step there come down a few numbers, and the seeds every tenth.
 TEST_P(Parities, ADescentStaysOnTheDevice) {
-  if (GetParam().processor == Processor::cpu || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
+  if (!is_device(GetParam().processor) || GetParam().source != NeighbourSource::nearest) GTEST_SKIP();
   SKIP_WITHOUT_DEVICE(Processor::double_);
   const TriangleMesh mesh = torus(40, 24);
   const Surface surface(mesh);

@@ -284,7 +284,7 @@ TEST_P(Solids, AreTheCpus) {
 std::vector<ModelCase> model_cases() {
   std::vector<ModelCase> cases;
   for (const Model& model : models())
-    for (const Setup& setup : setups()) cases.push_back({setup, model});
+    for (const Setup& setup : solid_setups()) cases.push_back({setup, model});
   return cases;
 }
 
@@ -294,7 +294,7 @@ INSTANTIATE_TEST_SUITE_P(Parity, Solids, testing::ValuesIn(model_cases()), [](co
 
 class SolidParities : public testing::TestWithParam<Setup> {};
 
-INSTANTIATE_TEST_SUITE_P(Parity, SolidParities, testing::ValuesIn(setups()),
+INSTANTIATE_TEST_SUITE_P(Parity, SolidParities, testing::ValuesIn(solid_setups()),
                          [](const auto& instance) { return name_of(instance.param); });
 
 // Where nearly every decision is a tie.

@@ -23,21 +23,24 @@
 #include "host/passes/vulkan_backend.h"
 #include "host/passes/vulkan_solid_backend.h"
 #include "support/diagram.h"
+#include "support/thread_ranks.h"
 
 namespace bisector::test {
 
-enum class Processor { cpu, single, double_ };
+enum class Processor { cpu, ranks, single, double_ };
+
+inline bool is_device(Processor processor) { return processor == Processor::single || processor == Processor::double_; }
 
 struct Setup {
   Processor processor;
   NeighbourSource source;
 };
 
-inline constexpr std::array kProcessors{Processor::cpu, Processor::single, Processor::double_};
+inline constexpr std::array kProcessors{Processor::cpu, Processor::ranks, Processor::single, Processor::double_};
 inline constexpr std::array kSources{NeighbourSource::nearest, NeighbourSource::delaunay};
 
 inline std::string name_of(const Setup& setup) {
-  constexpr std::array kNames{"cpu", "single", "double"};
+  constexpr std::array kNames{"cpu", "ranks", "single", "double"};
   return std::string(kNames[static_cast<std::size_t>(setup.processor)]) +
          (setup.source == NeighbourSource::nearest ? "_nearest" : "_delaunay");
 }
@@ -61,6 +64,13 @@ inline std::vector<Setup> setups() {
   return some;
 }
 
+// Those that compute diagrams of solids.
+inline std::vector<Setup> solid_setups() {
+  std::vector<Setup> some = setups();
+  std::erase_if(some, [](const Setup& setup) { return setup.processor == Processor::ranks; });
+  return some;
+}
+
 struct Tolerance {
   double cells, sum;
 };
@@ -75,7 +85,7 @@ inline Precision precision_of(Processor processor) {
 
 // A request for a device that can do it, preferably one that is no software; nothing where there is none.
 inline std::optional<DeviceRequest> device_for(Processor processor) {
-  if (processor == Processor::cpu) return DeviceRequest{.kind = DeviceRequest::Kind::cpu};
+  if (!is_device(processor)) return DeviceRequest{.kind = DeviceRequest::Kind::cpu};
   if (const char* named = std::getenv("BISECTOR_TEST_DEVICE")) return parse_device(named);
   static const DeviceList list = list_devices();
   if (const auto gpu = best_gpu(list, precision_of(processor))) return gpu;
@@ -110,6 +120,20 @@ class SharedDevice : public testing::Environment {
 };
 inline testing::Environment* const shared_device = testing::AddGlobalTestEnvironment(new SharedDevice);
 
+// The process's ranks.
+class SharedRanks : public testing::Environment {
+ public:
+  static Ranks& root() {
+    if (!ranks_) ranks_ = std::make_unique<ThreadRanks>(3);
+    return ranks_->root();
+  }
+  void TearDown() override { ranks_.reset(); }
+
+ private:
+  static inline std::unique_ptr<ThreadRanks> ranks_;
+};
+inline testing::Environment* const shared_ranks = testing::AddGlobalTestEnvironment(new SharedRanks);
+
 inline host::VulkanOptions vulkan_options_of(const Setup& setup) {
   host::VulkanOptions options;
   options.precision = precision_of(setup.processor);
@@ -119,6 +143,8 @@ inline host::VulkanOptions vulkan_options_of(const Setup& setup) {
 
 inline std::unique_ptr<Backend> backend_for(const Surface& surface, const Setup& setup) {
   if (setup.processor == Processor::cpu) return std::make_unique<CpuBackend>(surface, setup.source);
+  if (setup.processor == Processor::ranks)
+    return std::make_unique<DistributedBackend>(surface, setup.source, SharedRanks::root());
   return host::make_vulkan_backend(surface, SharedDevice::for_processor(setup.processor), vulkan_options_of(setup));
 }
 

@@ -1,0 +1,121 @@
+// One rank's share of a restricted Voronoi diagram that many compute together.
+//
+// A rank has some of the facets and, of the seeds, all within its region enlarged by a halo: the diagram of these on
+// its facets is that of all seeds if no other can be as near to a corner of a polygon as the polygon's own seed, that
+// is, if each such ball lies in the enlarged region. For on a convex polygon the difference of two squared distances is
+// greatest at a corner. Where a ball reaches out, the halo is made as wide as the balls need; as more seeds only make
+// them smaller, once is enough. (Compare Levy, Ray, Merigot, Leclerc, arXiv 2406.04192, who fetch the neighbours that
+// cells of some of the seeds name.)
+//
+// Local indices are monotone in those of all seeds, vertices and triangles, so ties are broken alike. A cell is summed
+// where its seed is at home, from the moments of single polygons in ascending order of the triangles' indices in the
+// whole mesh: the bits do not tell how many ranks there are.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bisector/cells.h"
+#include "core/geometry.h"
+#include "distributed/ranks.h"
+#include "distributed/regions.h"
+#include "voronoi/diagram.h"
+#include "voronoi/restricted.h"
+#include "voronoi/surface.h"
+
+namespace bisector {
+
+// What a rank holds of a surface.
+struct SurfacePart {
+  TriangleMesh mesh;            // vertices in the order of the whole mesh
+  std::vector<double> density;  // of the vertices; empty means 1
+  std::vector<Index> triangle;  // of each of mesh.triangles, its index in the whole mesh; ascending
+};
+
+// What a rank has, and what its last diagram took.
+struct PartFigures {
+  std::size_t facets = 0, home_seeds = 0, halo_seeds = 0;
+  double halo = 0;               // width around the region, in which all seeds are known
+  std::uint64_t bytes_sent = 0;  // to other ranks, for the last diagram
+  int rounds = 0;                // of fetching seeds, for the last diagram
+  double cpu_seconds = 0;        // of all threads, for the last diagram
+  std::uint64_t memory = 0;      // bytes that the process has held at most
+};
+
+// Who knows which seeds: kept by the rank that has all of them.
+class SeedShares {
+ public:
+  // The message for a rank that needs all seeds in `box` enlarged by `halo`. Those of the last time are sent again, at
+  // their new positions, as long as they serve.
+  std::string share(int rank, const Box& box, double halo, const std::vector<Vec3>& seeds);
+
+ private:
+  struct Share {
+    std::vector<Index> seeds;
+    std::vector<char> has;  // of each seed
+  };
+  std::vector<Share> shares_;
+};
+
+class PartDiagram {
+ public:
+  PartDiagram(SurfacePart part, Regions regions, int rank);
+
+  // Takes part in the diagram of `seeds`, which only rank 0 knows; `halo` is a first guess. There the moments are set,
+  // and the triangles and polygons that are wanted, in the indices of the whole mesh. The counts are of all ranks.
+  PairCounts evaluate(Ranks& ranks, const std::vector<Vec3>& seeds, NeighbourSource source, Want want, double halo,
+                      Diagram& diagram);
+  PartFigures figures() const { return figures_; }
+
+ private:
+  // The moments of one polygon of a cell.
+  struct Term {
+    Index seed, triangle;
+    Moments moments;
+  };
+
+  const SortedSeeds& seeds() const { return voronoi_ ? voronoi_->seeds() : sorted_; }
+  const Neighbours& neighbours() const { return voronoi_ ? voronoi_->neighbours() : lists_; }
+  Index id_of(Index slot) const { return ids_[seeds().id[slot]]; }
+
+  void meet_seeds(Ranks& ranks, SeedShares& to_share, const std::vector<Vec3>& all, NeighbourSource source, Want want);
+  void receive(const std::string& message);
+  void trace(NeighbourSource source, Want want);
+  double needed_halo(std::size_t all_seeds) const;
+  double halo_of_polygons() const;
+  double halo_of_nearest(std::size_t all_seeds) const;
+  double depth(const Vec3& p) const;
+  std::vector<Term> fetch_terms(Ranks& ranks) const;
+  void sum_cells(const std::vector<Term>& fetched, bool list_triangles);
+  void set_step_masses(Ranks& ranks);
+  void collect_cells(Ranks& ranks, std::size_t count, bool with_triangles, CellMoments& result) const;
+  void collect_polygons(Ranks& ranks, RestrictedPolygons& result);
+
+  std::optional<Surface> surface_;  // none where the rank has no facets
+  std::vector<Index> triangle_;     // of each of the surface's, in the whole mesh
+  Regions regions_;
+  int rank_;
+  Box box_;          // of the region and the facets
+  double rounding_;  // bounds the errors of what is compared with the sides of the box
+  double halo_ = 0;
+  SeedShares shares_;
+
+  std::vector<Index> ids_;  // of the seeds that are known here, ascending
+  std::vector<Vec3> x_;
+  std::optional<RestrictedVoronoi> voronoi_;  // none without facets; then the seeds are kept here
+  SortedSeeds sorted_;
+  Neighbours lists_;
+  Diagram local_;
+  PairCounts counts_;
+  PartFigures figures_;
+
+  std::vector<Index> home_;        // slots of the seeds that are at home here
+  std::vector<Moments> cells_;     // of these
+  std::vector<double> step_mass_;  // likewise
+  Csr<Index> triangles_;           // of their cells, if wanted, in the whole mesh
+};
+
+}  // namespace bisector
