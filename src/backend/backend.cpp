@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "backend/project.h"
 #include "bisector/error.h"
 #include "voronoi/dual.h"
 
@@ -37,19 +38,29 @@ DeviceWork& operator+=(DeviceWork& a, const DeviceWork& b) {
   return a;
 }
 
+const Surface& Backend::surface() const {
+  if (!surface_) throw std::logic_error("the surface of this backend is in no one place");
+  return *surface_;
+}
+
 EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   if (seeds.empty()) throw Error("there are no seeds; give at least one");
-  const Want computed =
-      (want & (Want::polygons | Want::polyhedra)) | (includes(want, Want::dual) ? Want::labels : Want::moments);
+  const bool reads_dual = includes(want, Want::dual) && !includes(offers_, Want::dual);
+  const Want computed = reads_dual ? (want & (Want::polygons | Want::polyhedra)) | Want::labels : want;
   if (!includes(offers_, computed)) throw std::logic_error("a backend of a surface was asked for polyhedra");
   const EvaluationReport report = compute(seeds, computed, diagram);
   if (!includes(computed, Want::labels)) diagram.polygons = {};
   if (!includes(computed, Want::polygons)) diagram.polygons.vertices = {};
   if (!includes(computed, Want::polyhedra)) diagram.polyhedra = {};
-  if (includes(want, Want::dual)) diagram.dual = extract_dual(diagram.polygons);
-  else diagram.dual = {};
+  if (reads_dual) diagram.dual = extract_dual(diagram.polygons);
+  else if (!includes(want, Want::dual)) diagram.dual = {};
   diagram.has = want | computed;
   return report;
+}
+
+void Backend::project(const CellMoments& cells, std::span<const SeedPlace> places, std::span<Vec3> seeds,
+                      std::vector<Vec3>& normals) {
+  project_to_cells(surface(), cells.triangles, places, seeds, normals);
 }
 
 }  // namespace bisector

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "backend/seed_descent.h"
@@ -26,8 +27,8 @@ class Backend {
   Backend(const Backend&) = delete;
   Backend& operator=(const Backend&) = delete;
 
-  // The surface, or the boundary of the solid.
-  const Surface& surface() const { return surface_; }
+  // The surface, or the boundary of the solid. A backend whose surface is in no one place has none: std::logic_error.
+  const Surface& surface() const;
   // Integral of the density over the domain.
   double mass() const { return mass_; }
   virtual BackendDescription description() const = 0;
@@ -43,18 +44,26 @@ class Backend {
   // A descent whose seeds stay where the backend computes; null if they are to be on the host. The backend and the
   // curves must outlive it, and it may not be used any more once the backend has evaluated other seeds.
   virtual std::unique_ptr<ResidentDescent> descend(const DescentStart&) { return nullptr; }
+  // Moves seeds to the nearest points of the triangles of their cells, as project_to_cells() does. The cells are those
+  // of a diagram that had the parts of projected(): of the last one, or of the one that the last call was about.
+  virtual void project(const CellMoments& cells, std::span<const SeedPlace> places, std::span<Vec3> seeds,
+                       std::vector<Vec3>& normals);
+  virtual Want projected() const { return Want::triangles; }
   // Goes on without the device after an error of it outside evaluate(); throws the error if there is no way to.
   virtual void give_up(const DeviceError& error) { throw error; }
 
  protected:
   explicit Backend(const Surface& surface) : Backend(surface, surface.mass, Want::polygons) {}
-  Backend(const Surface& boundary, double mass, Want offers) : surface_(boundary), mass_(mass), offers_(offers) {}
+  // `offers`: of the dual, polygons and polyhedra what compute() sets.
+  Backend(const Surface& boundary, double mass, Want offers) : surface_(&boundary), mass_(mass), offers_(offers) {}
+  // Without a surface.
+  Backend(double mass, Want offers) : mass_(mass), offers_(offers) {}
 
-  // Sets the moments and, of polygons and polyhedra, those that are wanted. There are seeds.
+  // Sets the moments and, of what the backend offers, those that are wanted. There are seeds.
   virtual EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) = 0;
 
  private:
-  const Surface& surface_;
+  const Surface* surface_ = nullptr;
   double mass_;
   Want offers_;  // parts that compute() can set
 };

@@ -48,6 +48,7 @@ struct Command {
 inline constexpr int kMostJobs = 100;
 
 Command add_remesh(CLI::App& program);
+Command add_remesh_parts(CLI::App& program);
 Command add_rvd(CLI::App& program);
 Command add_tet(CLI::App& program);
 Command add_segment(CLI::App& program);

@@ -49,7 +49,7 @@ Program make_program() {
   app.get_help_ptr()->description("print this and exit");
   app.require_subcommand(0, 1);
   program.commands = {add_remesh(app),  add_rvd(app),     add_tet(app),   add_segment(app), add_tree(app),
-                      add_quality(app), add_devices(app), add_check(app), add_batch(app)};
+                      add_quality(app), add_devices(app), add_check(app), add_batch(app),   add_remesh_parts(app)};
   return program;
 }
 

@@ -15,11 +15,11 @@
 namespace bisector {
 namespace {
 
-Ranks* ranks_of_run = nullptr;
+Ranks* set_last = nullptr;
 
 // What the two kinds of domain differ in.
 std::unique_ptr<Backend> cpu_backend(const Surface& surface, NeighbourSource source, std::string fallback) {
-  if (ranks_of_run) return std::make_unique<DistributedBackend>(surface, source, *ranks_of_run);
+  if (set_last) return std::make_unique<DistributedBackend>(surface, source, *set_last);
   return std::make_unique<CpuBackend>(surface, source, std::move(fallback));
 }
 std::unique_ptr<SolidBackend> cpu_backend(const Solid& solid, NeighbourSource source, std::string fallback) {
@@ -51,7 +51,8 @@ void check_cpu_precision(Precision precision) {
 
 }  // namespace
 
-void set_ranks(Ranks* ranks) { ranks_of_run = ranks; }
+void set_ranks(Ranks* ranks) { set_last = ranks; }
+Ranks* ranks_of_run() { return set_last; }
 
 DeviceList list_devices() { return host::list_devices(); }
 
@@ -72,7 +73,7 @@ Compute::Compute(const ComputeOptions& options, const Context& context) : option
 }
 
 void Compute::choose_best() {
-  if (ranks_of_run) return check_cpu_precision(options_.precision);
+  if (set_last) return check_cpu_precision(options_.precision);
   const DeviceList list = host::list_gpus();
   device_ = best_gpu(list, options_.precision);
   if (device_) return;

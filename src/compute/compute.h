@@ -21,6 +21,8 @@ class Device;
 // no longer. Only a process that is rank 0 of a run calls it, before and after all that it computes. A request for a
 // Vulkan device is met by rank 0 alone.
 void set_ranks(Ranks* ranks);
+// Those that were set last; null: none.
+Ranks* ranks_of_run();
 
 // Where a run computes. All backends of a run come from here: the device is chosen and opened once, and stays open for
 // as long as one of them lives. Backends of one device may take turns but not compute at the same time.

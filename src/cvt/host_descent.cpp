@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "cvt/constrain.h"
 #include "cvt/multilevel.h"
 
 namespace bisector {
@@ -109,7 +108,7 @@ void HostVectors::weigh(std::optional<std::size_t> pair, double sy) {
 void HostDescent::hold(const CellMoments& moments, const std::vector<Vec3>& before, Iterate& next) const {
   const std::span<Vec3> positions = next.seeds.edit_positions();
   const std::span<SeedPlace> places = next.seeds.edit_places();
-  if (constrained_) project_to_cells(run_.surface(), moments.triangles, places, positions, next.normals);
+  if (constrained_) run_.backend().project(moments, places, positions, next.normals);
   parallel_each(places.size(), [&](std::size_t i) {
     SeedPlace& place = places[i];
     if (place.kind == Kind::fixed) positions[i] = before[i];
@@ -123,7 +122,7 @@ void HostDescent::hold(const CellMoments& moments, const std::vector<Vec3>& befo
 }
 
 void HostDescent::measure(Iterate& iterate) const {
-  const Want want = constrained_ ? Want::triangles : Want::moments;
+  const Want want = constrained_ ? run_.backend().projected() : Want::moments;
   run_.evaluate(iterate.seeds.positions(), want, iterate.known);
   iterate.gradient =
       gradient_of(iterate.moments().cells, iterate.seeds, run_.curves(), constrained_ ? &iterate.normals : nullptr);
@@ -145,7 +144,7 @@ void HostDescent::start() {
   for (int trial = 0;; ++trial) {
     run_.context().check();
     if (constrained_) {
-      run_.evaluate(now.seeds.positions(), Want::triangles, now.known);
+      run_.evaluate(now.seeds.positions(), run_.backend().projected(), now.known);
       now.normals.resize(now.seeds.size());
       hold(now.moments(), std::vector<Vec3>(now.seeds.positions()), now);
     }

@@ -8,7 +8,6 @@
 
 #include "checkpoint/bytes.h"
 #include "core/stopwatch.h"
-#include "cvt/constrain.h"
 #include "cvt/host_descent.h"
 #include "cvt/lbfgs.h"
 #include "cvt/saved_step.h"
@@ -90,7 +89,7 @@ void Descent::leave_device() {
   if (energies_.size() > entered_at_) {
     Iterate& now = on_host_.now;
     on_device_->bring_back(now.seeds, now.known.diagram.moments, now.gradient, now.normals);
-    now.known.diagram.has = options_.constrained ? Want::triangles : Want::moments;
+    now.known.diagram.has = options_.constrained ? run_.backend().projected() : Want::moments;
     now.known.positions = now.seeds.positions();
     now.known.strays = 0;
   }
@@ -289,11 +288,11 @@ void optimise(CvtRun& run, const OptimiseOptions& options) {
 }
 
 CvtGradient complete(CvtRun& run, bool constrained) {
-  const Diagram& diagram = run.diagram(constrained ? Want::triangles : Want::moments);
+  const Diagram& diagram = run.diagram(constrained ? run.backend().projected() : Want::moments);
   if (constrained) {
     std::vector<Vec3> feet = run.seeds.positions();
     run.normals_.resize(feet.size());
-    project_to_cells(run.surface(), diagram.moments.triangles, run.seeds.places(), feet, run.normals_);
+    run.backend().project(diagram.moments, run.seeds.places(), feet, run.normals_);
   }
   CvtGradient gradient;
   gradient.vectors = gradient_of(diagram.moments.cells, run.seeds, run.curves(), constrained ? &run.normals_ : nullptr);

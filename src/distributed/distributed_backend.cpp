@@ -20,13 +20,14 @@ namespace {
 constexpr double kFirstHalo = 3;
 
 struct Command {
-  enum class Kind { divide, evaluate, figures, drop, end };
+  enum class Kind { divide, read, evaluate, project, figures, drop, end };
   Kind kind = Kind::end;
   std::uint64_t domain = 0;
   NeighbourSource source = NeighbourSource::nearest;
   Want want = Want::moments;
   double halo = 0;
   unsigned threads = 0;
+  std::uint64_t number = 0;  // of a diagram; of vertices that are wanted
 };
 
 std::string bytes_of(const Command& command) { return ByteWriter().put(command).take(); }
@@ -108,9 +109,13 @@ class Server {
       case Command::Kind::divide:
         parts_[command.domain] = part_of(ranks_.exchange(nothing()).front(), ranks_.rank());
         break;
-      case Command::Kind::evaluate:
-        part(command).evaluate(ranks_, {}, command.source, command.want, command.halo, diagram_);
+      case Command::Kind::read:
+        parts_[command.domain] = read_divided(ranks_, ranks_.broadcast({}), command.number).part;
         break;
+      case Command::Kind::evaluate:
+        part(command).evaluate(ranks_, {}, command.source, command.want, command.halo, command.number, diagram_);
+        break;
+      case Command::Kind::project: part(command).project(ranks_, command.number, {}); break;
       case Command::Kind::figures: ranks_.gather(part(command).figures()); break;
       case Command::Kind::drop: parts_.erase(command.domain); break;
       case Command::Kind::end: return false;
@@ -134,7 +139,8 @@ class Server {
 }  // namespace
 
 DistributedBackend::DistributedBackend(const Surface& surface, NeighbourSource source, Ranks& ranks)
-    : Backend(surface), ranks_(ranks), source_(source), domain_(next_domain()) {
+    : Backend(surface, surface.mass, Want::polygons | Want::dual), ranks_(ranks), source_(source),
+      domain_(next_domain()), area_(surface.area) {
   ranks.together([&] {
     ranks.broadcast(bytes_of(Command{Command::Kind::divide, domain_, source, {}, 0, thread_count()}));
     const Regions regions = divide(surface, ranks.size());
@@ -142,6 +148,24 @@ DistributedBackend::DistributedBackend(const Surface& surface, NeighbourSource s
     for (int rank = 0; rank < ranks.size(); ++rank) parts.push_back(bytes_of(part_of(surface, regions, rank), regions));
     part_ = part_of(ranks.exchange(std::move(parts)).front(), 0);
   });
+}
+
+DistributedBackend::DistributedBackend(const std::string& path, std::size_t wanted, NeighbourSource source,
+                                       Ranks& ranks)
+    : DistributedBackend(read(path, wanted, ranks), source, ranks) {}
+
+DistributedBackend::DistributedBackend(ReadSurface surface, NeighbourSource source, Ranks& ranks)
+    : Backend(surface.divided.area, Want::polygons | Want::dual), ranks_(ranks), source_(source),
+      domain_(surface.domain), stays_(true), area_(surface.divided.area), divided_(std::move(surface.divided)),
+      part_(std::move(divided_.part)) {}
+
+DistributedBackend::ReadSurface DistributedBackend::read(const std::string& path, std::size_t wanted, Ranks& ranks) {
+  ReadSurface result{{}, next_domain()};
+  ranks.together([&] {
+    ranks.broadcast(bytes_of(Command{Command::Kind::read, result.domain, {}, {}, 0, thread_count(), wanted}));
+    result.divided = read_divided(ranks, ranks.broadcast(path), wanted);
+  });
+  return result;
 }
 
 DistributedBackend::~DistributedBackend() {
@@ -167,15 +191,33 @@ std::vector<PartFigures> DistributedBackend::figures() {
 
 EvaluationReport DistributedBackend::compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   EvaluationReport report;
-  const double halo = kFirstHalo * std::sqrt(surface().area / static_cast<double>(seeds.size()));
+  const double halo = kFirstHalo * std::sqrt(area_ / static_cast<double>(seeds.size()));
+  const std::uint64_t number = stays_ ? ++diagrams_ : 0;
   ranks_.together([&] {
-    ranks_.broadcast(bytes_of(Command{Command::Kind::evaluate, domain_, source_, want, halo, thread_count()}));
-    const PairCounts counts = part_->evaluate(ranks_, seeds, source_, want, halo, diagram);
+    ranks_.broadcast(bytes_of(Command{Command::Kind::evaluate, domain_, source_, want, halo, thread_count(), number}));
+    const PairCounts counts = part_->evaluate(ranks_, seeds, source_, want, halo, number, diagram);
     report.certification.pairs = counts.pairs;
     report.certification.uncertain = report.certification.cpu = counts.uncertain;
     report.certification.wider = counts.wider;
   });
   return report;
+}
+
+void DistributedBackend::project(const CellMoments& cells, std::span<const SeedPlace> places, std::span<Vec3> seeds,
+                                 std::vector<Vec3>& normals) {
+  if (!stays_) return Backend::project(cells, places, seeds, normals);
+  std::vector<PartDiagram::Foot> feet;
+  ranks_.together([&] {
+    ranks_.broadcast(bytes_of(Command{Command::Kind::project, domain_, {}, {}, 0, thread_count(), cells.number}));
+    feet = part_->project(ranks_, cells.number, {seeds.begin(), seeds.end()});
+  });
+  normals.resize(seeds.size());
+  parallel_each(feet.size(), [&](std::size_t k) {
+    const PartDiagram::Foot& foot = feet[k];
+    if (!places.empty() && places[foot.seed].kind == SeedPlace::Kind::interior) return;
+    seeds[foot.seed] = foot.at;
+    normals[foot.seed] = foot.normal;
+  });
 }
 
 void serve(Ranks& ranks) {

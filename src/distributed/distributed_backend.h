@@ -3,10 +3,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "backend/backend.h"
 #include "distributed/part_diagram.h"
+#include "distributed/parts.h"
 #include "distributed/ranks.h"
 
 namespace bisector {
@@ -18,10 +21,18 @@ class DistributedBackend : public Backend {
   // Facets are divided among the ranks so that each has about the same number of them and the same mass. The ranks must
   // outlive the backend.
   DistributedBackend(const Surface& surface, NeighbourSource source, Ranks& ranks);
+  // All ranks read the surface from a PLY file, and none has all of it: there is no surface(). See read_divided().
+  DistributedBackend(const std::string& path, std::size_t wanted, NeighbourSource source, Ranks& ranks);
   ~DistributedBackend() override;
 
   BackendDescription description() const override;
   double mass_tolerance() const override { return 1e-12; }
+  // Where the surface is in parts, the ranks have the triangles of cells.
+  Want projected() const override { return stays_ ? Want::moments : Want::triangles; }
+  void project(const CellMoments& cells, std::span<const SeedPlace> places, std::span<Vec3> seeds,
+               std::vector<Vec3>& normals) override;
+  // What is known of a surface that was read in parts; its `part` is not there.
+  DividedSurface& divided() { return divided_; }
   // Of the last diagram, by rank.
   std::vector<PartFigures> figures();
 
@@ -29,10 +40,21 @@ class DistributedBackend : public Backend {
   EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
 
  private:
+  struct ReadSurface {
+    DividedSurface divided;
+    std::uint64_t domain;
+  };
+  static ReadSurface read(const std::string& path, std::size_t wanted, Ranks& ranks);
+  DistributedBackend(ReadSurface surface, NeighbourSource source, Ranks& ranks);
+
   Ranks& ranks_;
   NeighbourSource source_;
   std::uint64_t domain_;
+  bool stays_ = false;  // the surface stays where it was read
+  double area_;
+  DividedSurface divided_;
   std::unique_ptr<PartDiagram> part_;
+  std::uint64_t diagrams_ = 0;
 };
 
 // On every other rank: takes part in all that rank 0 computes, until it calls end_serving().

@@ -7,15 +7,21 @@
 #include <ctime>
 #include <limits>
 #include <span>
+#include <stdexcept>
+#include <tuple>
 #include <utility>
 
+#include "backend/project.h"
 #include "checkpoint/bytes.h"
 #include "core/append_range.h"
 #include "core/parallel.h"
+#include "distributed/unordered_sum.h"
 #include "voronoi/clip.h"
+#include "voronoi/dual.h"
 #include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
+#include "voronoi/tiling.h"
 #include "voronoi/totals.h"
 
 namespace bisector {
@@ -90,6 +96,12 @@ std::string SeedShares::share(int rank, const Box& box, double halo, const std::
   return message.put_all(positions).take();
 }
 
+std::vector<std::vector<Index>> SeedShares::all() const {
+  std::vector<std::vector<Index>> all;
+  for (const Share& share : shares_) all.push_back(share.seeds);
+  return all;
+}
+
 PartDiagram::PartDiagram(SurfacePart part, Regions regions, int rank)
     : triangle_(std::move(part.triangle)), regions_(std::move(regions)), rank_(rank), box_(regions_.box(rank)) {
   if (!part.mesh.triangles.empty()) {
@@ -108,19 +120,30 @@ PartDiagram::PartDiagram(SurfacePart part, Regions regions, int rank)
   rounding_ = kDistanceError * largest;
 }
 
+double PartDiagram::total_mass(Ranks& ranks) const {
+  return sum_of_all(ranks, surface_ ? surface_->facets.size() : 0,
+                    [&](std::size_t k) { return surface_->summaries[k].moments.mass; });
+}
+
 PairCounts PartDiagram::evaluate(Ranks& ranks, const std::vector<Vec3>& seeds, NeighbourSource source, Want want,
-                                 double halo, Diagram& diagram) {
+                                 double halo, std::uint64_t number, Diagram& diagram) {
   const std::uint64_t sent = ranks.bytes_sent();
   const double started = cpu_seconds();
   if (halo_ == 0) halo_ = halo;
   const std::size_t count = ranks.gather(seeds.size()).front();
   SeedShares shares = std::exchange(shares_, {});  // forgotten if a rank fails
-  meet_seeds(ranks, shares, seeds, source, want);
+  const bool wants_dual = includes(want, Want::dual), wants_polygons = includes(want, Want::labels);
+  meet_seeds(ranks, shares, seeds, source, wants_dual ? want | Want::labels : want);
   shares_ = std::move(shares);
+  if (number != 0) keep_cells(number);
   sum_cells(fetch_terms(ranks), includes(want, Want::triangles));
   set_step_masses(ranks);
   collect_cells(ranks, count, includes(want, Want::triangles), diagram.moments);
-  if (includes(want, Want::labels)) collect_polygons(ranks, diagram.polygons);
+  diagram.moments.number = number;
+  figures_.untiled = wants_dual && surface_ ? count_untiled(*surface_, local_.polygons) : 0;
+  if (wants_dual || wants_polygons) rename_polygons();
+  if (wants_dual) collect_dual(ranks, diagram.dual);
+  if (wants_polygons) collect_polygons(ranks, diagram.polygons);
   PairCounts counts;
   for (const PairCounts& of_rank : ranks.gather(counts_)) counts += of_rank;
   figures_.facets = surface_ ? surface_->facets.size() : 0;
@@ -393,6 +416,59 @@ void PartDiagram::set_step_masses(Ranks& ranks) {
   }
 }
 
+// --- Feet ---
+
+void PartDiagram::keep_cells(std::uint64_t number) {
+  std::erase_if(kept_, [&](const KeptCells& kept) { return kept.number != projected_; });
+  kept_.push_back({number, ids_, std::move(local_.moments.triangles), shares_.all()});
+}
+
+std::vector<PartDiagram::Foot> PartDiagram::project(Ranks& ranks, std::uint64_t number,
+                                                    const std::vector<Vec3>& seeds) {
+  const auto kept = std::find_if(kept_.begin(), kept_.end(), [&](const KeptCells& k) { return k.number == number; });
+  if (kept == kept_.end()) throw std::logic_error("seeds are projected to cells that are no longer known");
+  projected_ = number;
+  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
+  for (std::size_t r = 0; r < kept->known_by.size(); ++r) {
+    std::vector<Vec3> some;
+    for (const Index id : kept->known_by[r]) some.push_back(seeds[id]);
+    to[r] = ByteWriter().put_all(some).take();
+  }
+  std::vector<Vec3> mine;
+  ByteReader(ranks.exchange(std::move(to)).front()).get_all(mine);
+
+  std::vector<Foot> feet(mine.size());
+  parallel_each(
+      feet.size(),
+      [&](std::size_t k) {
+        feet[k].seed = kNone;
+        const Csr<Index>& cells = kept->triangles;
+        if (k >= cells.rows() || cells.size(k) == 0) return;
+        const SurfacePoint foot = nearest_on_triangles(*surface_, {cells.begin(k), cells.end(k)}, mine[k]);
+        const auto facet = static_cast<std::size_t>(foot.facet - surface_->facets.data());
+        feet[k] = {kept->ids[k], triangle_[surface_->summaries[facet].triangle], norm2(foot.at - mine[k]), foot.at,
+                   foot.facet->normal};
+      },
+      kSlotsAtOnce);
+  std::erase_if(feet, [](const Foot& foot) { return foot.seed == kNone; });
+  to.assign(static_cast<std::size_t>(ranks.size()), {});
+  to.front() = ByteWriter().put_all(feet).take();
+  const std::vector<std::string> received = ranks.exchange(std::move(to));
+  std::vector<Foot> all, some;
+  if (!ranks.is_root()) return all;
+  for (const std::string& message : received) {
+    ByteReader(message).get_all(some);
+    append_range(all, some, 0, some.size());
+  }
+  // Of equally near ones that of the first triangle.
+  sort_in_parallel(all, [](const Foot& a, const Foot& b) {
+    return std::tie(a.seed, a.squared, a.triangle) < std::tie(b.seed, b.squared, b.triangle);
+  });
+  all.erase(std::unique(all.begin(), all.end(), [](const Foot& a, const Foot& b) { return a.seed == b.seed; }),
+            all.end());
+  return all;
+}
+
 // --- The whole, on rank 0 ---
 
 void PartDiagram::collect_cells(Ranks& ranks, std::size_t count, bool with_triangles, CellMoments& result) const {
@@ -446,11 +522,33 @@ void PartDiagram::collect_cells(Ranks& ranks, std::size_t count, bool with_trian
   set_totals(result);
 }
 
-void PartDiagram::collect_polygons(Ranks& ranks, RestrictedPolygons& result) {
+// By the indices of the whole mesh and of all seeds.
+void PartDiagram::rename_polygons() {
   RestrictedPolygons& mine = local_.polygons;
   for (RestrictedPolygons::Pair& pair : mine.pairs) pair = {triangle_[pair.triangle], ids_[pair.cell]};
   for (Index& label : mine.labels)
     if (!is_edge(label)) label = ids_[label];
+}
+
+void PartDiagram::collect_dual(Ranks& ranks, Dual& result) const {
+  const Dual mine = extract_dual(local_.polygons);
+  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
+  to.front() = ByteWriter().put_all(mine.triangles).put_all(mine.multiplicity).put_all(mine.mesh_triangle).take();
+  const std::vector<std::string> received = ranks.exchange(std::move(to));
+  if (!ranks.is_root()) return;
+  std::vector<Dual> parts(received.size());
+  for (std::size_t r = 0; r < parts.size(); ++r) {
+    ByteReader reader(received[r]);
+    reader.get_all(parts[r].triangles);
+    reader.get_all(parts[r].multiplicity);
+    reader.get_all(parts[r].mesh_triangle);
+    reader.end();
+  }
+  result = merge_duals(parts);
+}
+
+void PartDiagram::collect_polygons(Ranks& ranks, RestrictedPolygons& result) {
+  RestrictedPolygons& mine = local_.polygons;
   std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
   ByteWriter message;
   to.front() = message.put_all(mine.pairs).put_all(mine.offsets).put_all(mine.labels).put_all(mine.vertices).take();

@@ -38,6 +38,7 @@ struct SurfacePart {
 // What a rank has, and what its last diagram took.
 struct PartFigures {
   std::size_t facets = 0, home_seeds = 0, halo_seeds = 0;
+  std::size_t untiled = 0;       // facets that the polygons of the last dual do not tile; anything but 0 is a bug
   double halo = 0;               // width around the region, in which all seeds are known
   std::uint64_t bytes_sent = 0;  // to other ranks, for the last diagram
   int rounds = 0;                // of fetching seeds, for the last diagram
@@ -51,6 +52,8 @@ class SeedShares {
   // The message for a rank that needs all seeds in `box` enlarged by `halo`. Those of the last time are sent again, at
   // their new positions, as long as they serve.
   std::string share(int rank, const Box& box, double halo, const std::vector<Vec3>& seeds);
+  // The seeds that each rank has, ascending.
+  std::vector<std::vector<Index>> all() const;
 
  private:
   struct Share {
@@ -64,10 +67,24 @@ class PartDiagram {
  public:
   PartDiagram(SurfacePart part, Regions regions, int rank);
 
+  // The integral of the density over the whole surface: the same for any number of ranks.
+  double total_mass(Ranks& ranks) const;
+
   // Takes part in the diagram of `seeds`, which only rank 0 knows; `halo` is a first guess. There the moments are set,
-  // and the triangles and polygons that are wanted, in the indices of the whole mesh. The counts are of all ranks.
+  // and the triangles, polygons and dual that are wanted, in the indices of the whole mesh. The counts are of all
+  // ranks. With a `number` other than 0 each rank keeps what triangles its cells have, for project().
   PairCounts evaluate(Ranks& ranks, const std::vector<Vec3>& seeds, NeighbourSource source, Want want, double halo,
-                      Diagram& diagram);
+                      std::uint64_t number, Diagram& diagram);
+  // What project() has found of a seed: the nearest point of its cell's triangles, and the normal there.
+  struct Foot {
+    Index seed, triangle;
+    double squared;  // distance
+    Vec3 at, normal;
+  };
+  // Takes part in projecting `seeds`, which only rank 0 knows, to the triangles of their cells in the diagram of this
+  // number: the last that was kept, or the one that was projected to last. Returns there one foot for each seed whose
+  // cell has triangles, in ascending order.
+  std::vector<Foot> project(Ranks& ranks, std::uint64_t number, const std::vector<Vec3>& seeds);
   PartFigures figures() const { return figures_; }
 
  private:
@@ -75,6 +92,14 @@ class PartDiagram {
   struct Term {
     Index seed, triangle;
     Moments moments;
+  };
+
+  // What project() needs of a diagram.
+  struct KeptCells {
+    std::uint64_t number = 0;
+    std::vector<Index> ids;                    // of the seeds that are known here
+    Csr<Index> triangles;                      // of their cells, of the surface here
+    std::vector<std::vector<Index>> known_by;  // on rank 0: the ids of each rank
   };
 
   const SortedSeeds& seeds() const { return voronoi_ ? voronoi_->seeds() : sorted_; }
@@ -92,7 +117,10 @@ class PartDiagram {
   void sum_cells(const std::vector<Term>& fetched, bool list_triangles);
   void set_step_masses(Ranks& ranks);
   void collect_cells(Ranks& ranks, std::size_t count, bool with_triangles, CellMoments& result) const;
+  void keep_cells(std::uint64_t number);
+  void rename_polygons();
   void collect_polygons(Ranks& ranks, RestrictedPolygons& result);
+  void collect_dual(Ranks& ranks, Dual& result) const;
 
   std::optional<Surface> surface_;  // none where the rank has no facets
   std::vector<Index> triangle_;     // of each of the surface's, in the whole mesh
@@ -109,6 +137,8 @@ class PartDiagram {
   SortedSeeds sorted_;
   Neighbours lists_;
   Diagram local_;
+  std::vector<KeptCells> kept_;
+  std::uint64_t projected_ = 0;  // the number that was projected to last
   PairCounts counts_;
   PartFigures figures_;
 

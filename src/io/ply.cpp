@@ -17,132 +17,18 @@
 #include "io/bytes.h"
 #include "io/labels.h"
 #include "io/mesh_formats.h"
+#include "io/ply_header.h"
 #include "io/text.h"
 
 namespace bisector::io {
 
 namespace {
 
-enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
-
 Attribute::Type type_of(Scalar type) {
   using Type = Attribute::Type;
   constexpr std::array<Type, 8> kTypes{Type::int8,  Type::uint8,  Type::int16,   Type::uint16,
                                        Type::int32, Type::uint32, Type::float32, Type::float64};
   return kTypes[static_cast<std::size_t>(type)];
-}
-
-std::size_t size_of(Scalar type) {
-  constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
-  return kSizes[static_cast<std::size_t>(type)];
-}
-
-Scalar read_scalar_type(TextReader& in) {
-  static constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames{{{"char", Scalar::int8},
-                                                                               {"int8", Scalar::int8},
-                                                                               {"uchar", Scalar::uint8},
-                                                                               {"uint8", Scalar::uint8},
-                                                                               {"short", Scalar::int16},
-                                                                               {"int16", Scalar::int16},
-                                                                               {"ushort", Scalar::uint16},
-                                                                               {"uint16", Scalar::uint16},
-                                                                               {"int", Scalar::int32},
-                                                                               {"int32", Scalar::int32},
-                                                                               {"uint", Scalar::uint32},
-                                                                               {"uint32", Scalar::uint32},
-                                                                               {"float", Scalar::float32},
-                                                                               {"float32", Scalar::float32},
-                                                                               {"double", Scalar::float64},
-                                                                               {"float64", Scalar::float64}}};
-  const std::string_view word = in.word();
-  for (const auto& [name, type] : kNames)
-    if (word == name) return type;
-  in.fail("'" + printable(word) + "' is not a PLY type; " + kExportAgain);
-}
-
-struct PlyProperty {
-  std::string name;
-  Scalar type;
-  bool list = false;
-  Scalar count_type = Scalar::uint8;
-};
-
-struct PlyElement {
-  std::string name;
-  std::size_t count = 0;
-  std::vector<PlyProperty> properties;
-
-  // Bytes that one item takes at least.
-  std::size_t least_size() const {
-    std::size_t size = 0;
-    for (const PlyProperty& p : properties) size += size_of(p.list ? p.count_type : p.type);
-    return size;
-  }
-};
-
-struct PlyHeader {
-  bool text = false, big_endian = false;
-  std::vector<std::string> textures;  // of comments "TextureFile NAME"
-  std::vector<PlyElement> elements;
-
-  const PlyElement* find(std::string_view name) const {
-    for (const PlyElement& e : elements)
-      if (e.name == name) return &e;
-    return nullptr;
-  }
-};
-
-bool is_index_list(const PlyProperty& p) { return p.list && (p.name == "vertex_indices" || p.name == "vertex_index"); }
-
-PlyProperty read_ply_property(TextReader& in) {
-  PlyProperty property{};
-  TextReader ahead = in;
-  if (ahead.word() == "list") {
-    in.word();
-    property.list = true;
-    property.count_type = read_scalar_type(in);
-    if (property.count_type >= Scalar::float32) in.fail(std::string("a list is counted by floats; ") + kExportAgain);
-  }
-  property.type = read_scalar_type(in);
-  property.name = in.word();
-  if (property.name.empty()) in.fail(std::string("a property has no name; ") + kExportAgain);
-  return property;
-}
-
-PlyHeader read_ply_header(TextReader& in) {
-  PlyHeader header;
-  if (!in.next_line() || in.word() != "ply") in.fail("does not begin with 'ply'; check that this is a PLY file");
-  bool format = false;
-  for (;;) {
-    if (!in.next_line()) in.fail_truncated("a part of the header");
-    const std::string_view keyword = in.word();
-    if (keyword == "end_header") break;
-    if (keyword == "comment" && in.word() == "TextureFile" && in.at_word())
-      header.textures.emplace_back(in.rest_of_line());
-    if (keyword == "comment" || keyword == "obj_info") continue;
-    if (keyword == "format") {
-      const std::string_view name = in.word();
-      header.text = name == "ascii";
-      header.big_endian = name == "binary_big_endian";
-      if (!header.text && !header.big_endian && name != "binary_little_endian")
-        in.fail("unknown PLY format '" + printable(name) + "'; " + kExportAgain);
-      format = true;
-    } else if (keyword == "element") {
-      PlyElement element;
-      element.name = in.word();
-      if (header.find(element.name))
-        in.fail("element '" + printable(element.name) + "' appears twice; " + kExportAgain);
-      element.count = in.count("items");
-      header.elements.push_back(std::move(element));
-    } else if (keyword == "property") {
-      if (header.elements.empty()) in.fail(std::string("a property comes before all elements; ") + kExportAgain);
-      header.elements.back().properties.push_back(read_ply_property(in));
-    } else {
-      in.fail("unknown header line '" + printable(keyword) + "'; " + kExportAgain);
-    }
-  }
-  if (!format) in.fail(std::string("the header has no format line; ") + kExportAgain);
-  return header;
 }
 
 // The body's values as text: one item a line, further columns ignored.
@@ -251,8 +137,6 @@ AttributeColumns ply_columns(const PlyElement& element, Attribute::Site site, co
 void move_attributes(AttributeColumns& columns, Soup& soup) {
   for (Attribute& attribute : columns.take()) soup.attributes.push_back(std::move(attribute));
 }
-
-int axis_of(const PlyProperty& p) { return p.name == "x" ? 0 : p.name == "y" ? 1 : p.name == "z" ? 2 : -1; }
 
 template <class Source>
 void read_ply_vertices(Source& source, const PlyElement& element, Soup& soup, bool with_attributes) {

@@ -26,6 +26,9 @@ inline constexpr auto kDetailWords =
 inline constexpr auto kEnergyWords =
     word_table<Energy>({{Energy::automatic, "auto"}, {Energy::restricted, "rcvt"}, {Energy::constrained, "ccvt"}});
 
+inline constexpr auto kPlainEnergyWords =
+    word_table<Energy>({{Energy::constrained, "ccvt"}, {Energy::restricted, "rcvt"}});
+
 inline constexpr auto kSurfaceWords = word_table<SegmentSurfaces>(
     {{SegmentSurfaces::planes, "planes"}, {SegmentSurfaces::quadrics, "quadrics"}, {SegmentSurfaces::all, "all"}});
 

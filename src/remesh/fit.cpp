@@ -7,13 +7,13 @@
 #include <string>
 #include <utility>
 
+#include "backend/project.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/degenerate.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "cvt/constrain.h"
 #include "mesh/topology.h"
 #include "spatial/nearest.h"
 

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "backend/project.h"
 #include "core/parallel.h"
-#include "cvt/constrain.h"
 
 namespace bisector {
 namespace {

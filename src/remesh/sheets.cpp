@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "cvt/constrain.h"
+#include "backend/project.h"
 
 namespace bisector {
 namespace {

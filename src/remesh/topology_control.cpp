@@ -10,8 +10,8 @@
 #include <span>
 #include <utility>
 
+#include "backend/project.h"
 #include "core/parallel.h"
-#include "cvt/constrain.h"
 #include "remesh/sheets.h"
 #include "voronoi/dual.h"
 #include "voronoi/polygons.h"

@@ -7,10 +7,10 @@
 #include <span>
 #include <utility>
 
+#include "backend/project.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/stopwatch.h"
-#include "cvt/constrain.h"
 #include "remesh/remesh.h"
 #include "spatial/hilbert.h"
 

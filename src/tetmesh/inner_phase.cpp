@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "cvt/constrain.h"
+#include "backend/project.h"
 #include "tetmesh/tet_levels.h"
 
 namespace bisector {

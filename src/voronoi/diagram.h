@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "bisector/cells.h"
@@ -21,6 +22,7 @@ struct CellMoments {
   // Incident triangles of each cell, of the surface or the solid's boundary, ascending; where they were not wanted
   // there may be none.
   Csr<Index> triangles;
+  std::uint64_t number = 0;  // by which a backend knows the diagram, if it keeps the triangles to itself
 };
 
 // How many pairs of a cell and a triangle or tetrahedron there are, and how many took more than the first attempt.

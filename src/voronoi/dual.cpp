@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 #include "core/parallel.h"
 
@@ -14,6 +15,7 @@ struct Triple {
   Triangle ascending;
   Index mesh_triangle;
   bool flipped;  // the oriented triple is an odd permutation of `ascending`
+  Index multiplicity = 1;
 };
 
 // What list(k, found) appends for all k below n, in the order of k.
@@ -32,6 +34,22 @@ bool operator<(const Triple& a, const Triple& b) {
   return a.ascending != b.ascending ? a.ascending < b.ascending : a.mesh_triangle < b.mesh_triangle;
 }
 
+Dual dual_of(std::vector<Triple> triples) {
+  sort_in_parallel(triples, [](const Triple& a, const Triple& b) { return a < b; });
+  Dual dual;
+  for (std::size_t k = 0; k < triples.size(); ++k) {
+    const Triangle& t = triples[k].ascending;
+    if (k && triples[k - 1].ascending == t) {
+      dual.multiplicity.back() += triples[k].multiplicity;
+      continue;
+    }
+    dual.triangles.push_back(triples[k].flipped ? Triangle{t[0], t[2], t[1]} : t);
+    dual.multiplicity.push_back(triples[k].multiplicity);
+    dual.mesh_triangle.push_back(triples[k].mesh_triangle);
+  }
+  return dual;
+}
+
 }  // namespace
 
 Dual extract_dual(const RestrictedPolygons& polygons) {
@@ -48,19 +66,18 @@ Dual extract_dual(const RestrictedPolygons& polygons) {
       b = c;
     }
   });
-  sort_in_parallel(triples, [](const Triple& a, const Triple& b) { return a < b; });
-  Dual dual;
-  for (std::size_t k = 0; k < triples.size(); ++k) {
-    const Triangle& t = triples[k].ascending;
-    if (k && triples[k - 1].ascending == t) {
-      ++dual.multiplicity.back();
-      continue;
+  return dual_of(std::move(triples));
+}
+
+Dual merge_duals(const std::vector<Dual>& parts) {
+  std::vector<Triple> triples;
+  for (const Dual& part : parts)
+    for (std::size_t k = 0; k < part.triangles.size(); ++k) {
+      // Those of a dual begin with the lowest.
+      const auto [a, b, c] = part.triangles[k];
+      triples.push_back({{a, std::min(b, c), std::max(b, c)}, part.mesh_triangle[k], b > c, part.multiplicity[k]});
     }
-    dual.triangles.push_back(triples[k].flipped ? Triangle{t[0], t[2], t[1]} : t);
-    dual.multiplicity.push_back(1);
-    dual.mesh_triangle.push_back(triples[k].mesh_triangle);
-  }
-  return dual;
+  return dual_of(std::move(triples));
 }
 
 std::vector<Index> dual_vertices(const Dual& dual, std::size_t seeds) {

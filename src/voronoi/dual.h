@@ -10,6 +10,9 @@ namespace bisector {
 
 Dual extract_dual(const RestrictedPolygons& polygons);
 
+// The dual of a surface from those of its parts, each a set of its triangles, which are numbered as in the whole.
+Dual merge_duals(const std::vector<Dual>& parts);
+
 // The number of each seed among those that have a triangle, in the order of the seeds; kNone for the others.
 std::vector<Index> dual_vertices(const Dual& dual, std::size_t seeds);
 

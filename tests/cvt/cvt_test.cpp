@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "backend/cpu_backend.h"
+#include "backend/project.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/geometry.h"
-#include "cvt/constrain.h"
 #include "cvt/host_descent.h"
 #include "cvt/lbfgs.h"
 #include "cvt/multilevel.h"

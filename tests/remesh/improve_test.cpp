@@ -11,10 +11,10 @@
 #include <numbers>
 
 #include "backend/cpu_backend.h"
+#include "backend/project.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/geometry.h"
-#include "cvt/constrain.h"
 #include "cvt/multilevel.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/feature_seeds.h"

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "backend/project.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/geometry.h"
-#include "cvt/constrain.h"
 #include "remesh/topology_control.h"
 #include "support/diagram.h"
 #include "support/models.h"

@@ -387,6 +387,46 @@ SmallCase integer_case(std::uint64_t random_seed) {
   return problem;
 }
 
+std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, bool slender, SplitMix64& random) {
+  constexpr std::array kShares{0.0, 0.0, 1e-15, 1e-13, 1e-9, 1e-7};
+  std::vector<Vec3> seeds;
+  for (const Vec3& p : points) {
+    const double radius = random.range(0.1, 1), share = kShares[random.below(kShares.size())];
+    const bool parallel = slender && random.below(4) == 0;
+    Vec3 direction{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    const std::size_t count = 3 + random.below(3);
+    for (std::size_t k = 0; k < count; ++k) {
+      const Vec3 other{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+      const Vec3 d = k == 0 ? direction : parallel && k > 1 ? direction + 1e-5 * other : other;
+      if (k == 1) direction = d;
+      seeds.push_back(p + (radius * (1 + random.range(-share, share)) / norm(d)) * d);
+    }
+  }
+  return seeds;
+}
+
+SmallCase near_tie_case(std::uint64_t random_seed) {
+  SplitMix64 random(random_seed + 0x5eed);
+  SmallCase problem{"near ties " + std::to_string(random_seed), {}, {}};
+  std::vector<Vec3>& vertices = problem.mesh.vertices;
+  for (int k = 0; k < 4; ++k) vertices.push_back({random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)});
+  problem.mesh.triangles = {{0, 1, 2}};
+  if (random.below(2)) problem.mesh.triangles.push_back({2, 1, 3});
+  std::vector<Vec3> points;
+  const std::size_t count = 1 + random.below(3);
+  for (std::size_t k = 0; k < count; ++k) {
+    const double u = random.range(0, 1), v = random.below(2) ? random.range(0, 1 - u) : 0;
+    points.push_back(random.below(3) ? vertices[0] + u * (vertices[1] - vertices[0]) + v * (vertices[2] - vertices[0])
+                                     : vertices[random.below(3)]);
+  }
+  problem.seeds = near_tie_seeds(points, true, random);
+  constexpr std::array kScales{1.0, 1.0, 0x1p-100, 0x1p60};
+  const double scale = kScales[random.below(kScales.size())], away = random.below(2) ? 100 : 0;
+  for (std::vector<Vec3>* all : {&vertices, &problem.seeds})
+    for (Vec3& p : *all) p = scale * (p + Vec3{away, -away, away});
+  return problem;
+}
+
 TriangleMesh torn(const TriangleMesh& mesh, double size) {
   TriangleMesh soup;
   SplitMix64 random(11);

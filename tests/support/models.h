@@ -76,4 +76,11 @@ std::vector<SmallCase> small_cases();
 // nearly every decision is a tie. Any number gives another one.
 SmallCase integer_case(std::uint64_t random_seed);
 
+// Seeds that are as far as each other, but for a few units of rounding or a tiny share of the distance, from corners of
+// triangles, points on their sides and points inside: decisions that only exact arithmetic, or a bound of every error,
+// gets right. Any number gives another case, at another scale and place.
+SmallCase near_tie_case(std::uint64_t random_seed);
+// The seeds of such a case about given points. `slender`: some bisectors are all but parallel.
+std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, bool slender, SplitMix64& random);
+
 }  // namespace bisector::test

@@ -272,6 +272,30 @@ std::vector<SolidCase> solid_cases() {
   return cases;
 }
 
+SolidCase near_tie_solid_case(std::uint64_t random_seed) {
+  SplitMix64 random(random_seed + 0x50115);
+  SolidCase result{"near ties " + std::to_string(random_seed), single_tet(), {}};
+  for (Vec3& p : result.mesh.vertices)
+    p += Vec3{random.range(-0.3, 0.3), random.range(-0.3, 0.3), random.range(-0.3, 0.3)};
+  const std::vector<Vec3> corners = result.mesh.vertices;
+  std::vector<Vec3> points;
+  const std::size_t count = 1 + random.below(2);
+  for (std::size_t k = 0; k < count; ++k) {
+    // Of up to four corners.
+    const std::size_t among = 1 + random.below(4);
+    Vec3 sum;
+    double weights = 0;
+    for (std::size_t c = 0; c < among; ++c) {
+      const double weight = random.range(0.1, 1);
+      sum += weight * corners[c];
+      weights += weight;
+    }
+    points.push_back((1 / weights) * sum);
+  }
+  result.seeds = near_tie_seeds(points, false, random);
+  return result;
+}
+
 SolidCase integer_solid_case(std::uint64_t random_seed) {
   SplitMix64 random(random_seed * 7919 + 1);
   SolidCase result{"integers " + std::to_string(random_seed), tet_grid(2, 1, 1), {}};

@@ -44,5 +44,7 @@ std::vector<SolidCase> solid_cases();
 // Random tetrahedra of a grid with seeds at half-integer points, where nearly every decision is a tie. Any number gives
 // another.
 SolidCase integer_solid_case(std::uint64_t random_seed);
+// Two tetrahedra and seeds that all but tie, as in near_tie_case(), at corners, on edges and facets, and inside.
+SolidCase near_tie_solid_case(std::uint64_t random_seed);
 
 }  // namespace bisector::test

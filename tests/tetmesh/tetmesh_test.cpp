@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "backend/project.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
-#include "cvt/constrain.h"
 #include "features/size_field.h"
 #include "mesh/tet_quality.h"
 #include "mesh/tet_topology.h"

@@ -229,6 +229,11 @@ TEST_P(IntegerSolids, AgreeWithTheOracle) {
 
 INSTANTIATE_TEST_SUITE_P(Clipped, IntegerSolids, testing::Range(std::uint64_t{0}, kIntegerSolids, kIntegerSolidBlock));
 
+TEST(Clipped, NearTiesAgreeWithTheOracle) {
+  constexpr std::uint64_t kCases = 150;
+  for (std::uint64_t k = 0; k < kCases && !HasFailure(); ++k) expect_oracle(near_tie_solid_case(k), false);
+}
+
 // --- Against itself ---
 
 void expect_same_diagram(const Diagram& a, const Diagram& b) {

@@ -115,6 +115,11 @@ TEST_P(Integers, AgreeWithTheOracle) {
 
 INSTANTIATE_TEST_SUITE_P(Restricted, Integers, testing::Range(std::uint64_t{0}, kIntegerCases, kIntegerBlock));
 
+TEST(Restricted, NearTiesAgreeWithTheOracle) {
+  constexpr std::uint64_t kCases = 600;
+  for (std::uint64_t k = 0; k < kCases && !HasFailure(); ++k) expect_oracle(near_tie_case(k));
+}
+
 // A large grid problem, where the neighbour lists do not hold every seed.
 TEST(Restricted, LargerGridAgreesWithTheOracle) {
   const TriangleMesh mesh = box(1);

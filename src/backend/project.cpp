@@ -1,4 +1,4 @@
-#include "cvt/constrain.h"
+#include "backend/project.h"
 
 #include <algorithm>
 #include <limits>
