@@ -206,14 +206,14 @@ EvaluationReport DistributedBackend::compute(const std::vector<Vec3>& seeds, Wan
 void DistributedBackend::project(const CellMoments& cells, std::span<const SeedPlace> places, std::span<Vec3> seeds,
                                  std::vector<Vec3>& normals) {
   if (!stays_) return Backend::project(cells, places, seeds, normals);
-  std::vector<PartDiagram::Foot> feet;
+  std::vector<Foot> feet;
   ranks_.together([&] {
     ranks_.broadcast(bytes_of(Command{Command::Kind::project, domain_, {}, {}, 0, thread_count(), cells.number}));
     feet = part_->project(ranks_, cells.number, {seeds.begin(), seeds.end()});
   });
   normals.resize(seeds.size());
   parallel_each(feet.size(), [&](std::size_t k) {
-    const PartDiagram::Foot& foot = feet[k];
+    const Foot& foot = feet[k];
     if (!places.empty() && places[foot.seed].kind == SeedPlace::Kind::interior) return;
     seeds[foot.seed] = foot.at;
     normals[foot.seed] = foot.normal;

@@ -7,11 +7,8 @@
 #include <ctime>
 #include <limits>
 #include <span>
-#include <stdexcept>
-#include <tuple>
 #include <utility>
 
-#include "backend/project.h"
 #include "checkpoint/bytes.h"
 #include "core/append_range.h"
 #include "core/parallel.h"
@@ -19,27 +16,18 @@
 #include "voronoi/clip.h"
 #include "voronoi/dual.h"
 #include "voronoi/fixed_tree_sum.h"
-#include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
 #include "voronoi/tiling.h"
-#include "voronoi/totals.h"
 
 namespace bisector {
 namespace {
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
-constexpr std::size_t kSlotsAtOnce = 256, kSeedsAtOnce = 4096;
-// Seeds move from one diagram to the next: a halo is somewhat wider than it has to be, and what is sent reaches still
-// farther.
-constexpr double kSpare = 1.25, kSentSpare = 1.3;
+constexpr std::size_t kSlotsAtOnce = 256;
+// Seeds move from one diagram to the next: a halo is somewhat wider than it has to be.
+constexpr double kSpare = 1.25;
 // Relative error of a distance, with room to spare.
 constexpr double kDistanceError = 1e-12;
-
-bool is_within(const Vec3& p, const Box& box, double halo) {
-  for (int k = 0; k < 3; ++k)
-    if (p[k] < box.lo[k] - halo || p[k] > box.hi[k] + halo) return false;
-  return true;
-}
 
 double largest_of(std::span<const double> values) {
   double largest = -kFar;
@@ -64,43 +52,6 @@ double greatest(std::size_t n, std::size_t run, const Value& value) {
 }
 
 }  // namespace
-
-std::string SeedShares::share(int rank, const Box& box, double halo, const std::vector<Vec3>& seeds) {
-  shares_.resize(std::max(shares_.size(), static_cast<std::size_t>(rank) + 1));
-  Share& share = shares_[static_cast<std::size_t>(rank)];
-  const auto mark = [&](double reach) {
-    std::vector<char> within(seeds.size());
-    parallel_each(
-        seeds.size(), [&](std::size_t i) { within[i] = is_within(seeds[i], box, reach); }, kSeedsAtOnce);
-    return within;
-  };
-  std::vector<char> needed = mark(halo);
-  std::size_t count = 0;
-  bool serves = share.has.size() == seeds.size();
-  for (std::size_t i = 0; i < seeds.size(); ++i) {
-    count += needed[i];
-    serves = serves && needed[i] <= share.has[i];
-  }
-  serves = serves && share.seeds.size() <= 2 * count + kSeedsAtOnce;
-  if (!serves) {
-    share.has = mark(kSentSpare * halo);
-    share.seeds.clear();
-    for (Index i = 0; i < seeds.size(); ++i)
-      if (share.has[i]) share.seeds.push_back(i);
-  }
-  std::vector<Vec3> positions(share.seeds.size());
-  parallel_each(positions.size(), [&](std::size_t k) { positions[k] = seeds[share.seeds[k]]; });
-  ByteWriter message;
-  message.put(!serves);
-  if (!serves) message.put_all(share.seeds);
-  return message.put_all(positions).take();
-}
-
-std::vector<std::vector<Index>> SeedShares::all() const {
-  std::vector<std::vector<Index>> all;
-  for (const Share& share : shares_) all.push_back(share.seeds);
-  return all;
-}
 
 PartDiagram::PartDiagram(SurfacePart part, Regions regions, int rank)
     : triangle_(std::move(part.triangle)), regions_(std::move(regions)), rank_(rank), box_(regions_.box(rank)) {
@@ -135,15 +86,15 @@ PairCounts PartDiagram::evaluate(Ranks& ranks, const std::vector<Vec3>& seeds, N
   const bool wants_dual = includes(want, Want::dual), wants_polygons = includes(want, Want::labels);
   meet_seeds(ranks, shares, seeds, source, wants_dual ? want | Want::labels : want);
   shares_ = std::move(shares);
-  if (number != 0) keep_cells(number);
+  if (number != 0) kept_.keep(number, ids_, std::move(local_.moments.triangles), shares_.all());
   sum_cells(fetch_terms(ranks), includes(want, Want::triangles));
   set_step_masses(ranks);
-  collect_cells(ranks, count, includes(want, Want::triangles), diagram.moments);
+  collect_cells(ranks, at_home_, count, includes(want, Want::triangles), diagram.moments);
   diagram.moments.number = number;
   figures_.untiled = wants_dual && surface_ ? count_untiled(*surface_, local_.polygons) : 0;
   if (wants_dual || wants_polygons) rename_polygons();
-  if (wants_dual) collect_dual(ranks, diagram.dual);
-  if (wants_polygons) collect_polygons(ranks, diagram.polygons);
+  if (wants_dual) collect_dual(ranks, extract_dual(local_.polygons), diagram.dual);
+  if (wants_polygons) collect_polygons(ranks, std::exchange(local_.polygons, {}), diagram.polygons);
   PairCounts counts;
   for (const PairCounts& of_rank : ranks.gather(counts_)) counts += of_rank;
   figures_.facets = surface_ ? surface_->facets.size() : 0;
@@ -321,15 +272,16 @@ std::vector<PartDiagram::Term> PartDiagram::fetch_terms(Ranks& ranks) const {
 }
 
 void PartDiagram::sum_cells(const std::vector<Term>& fetched, bool list_triangles) {
-  cells_.resize(home_.size());
+  at_home_.ids.resize(home_.size());
+  at_home_.cells.resize(home_.size());
   std::vector<std::vector<Index>> lists((home_.size() + kSlotsAtOnce - 1) / kSlotsAtOnce);
-  triangles_.offsets.assign(home_.size() + 1, 0);
+  at_home_.triangles.offsets.assign(home_.size() + 1, 0);
   parallel_chunks(home_.size(), kSlotsAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
     FixedTreeSum sum;
     std::vector<CellPolygon> polygons;
     std::vector<Term> terms;
     for (std::size_t h = begin; h < end; ++h) {
-      const Index id = id_of(home_[h]);
+      const Index id = at_home_.ids[h] = id_of(home_[h]);
       terms.clear();
       if (voronoi_) {
         voronoi_->polygons_of(home_[h], polygons);
@@ -344,21 +296,21 @@ void PartDiagram::sum_cells(const std::vector<Term>& fetched, bool list_triangle
       std::inplace_merge(terms.begin(), terms.begin() + own, terms.end(),
                          [](const Term& a, const Term& b) { return a.triangle < b.triangle; });
       for (const Term& term : terms) sum.add(term.moments);
-      cells_[h] = sum.finish();
-      triangles_.offsets[h + 1] = terms.size();
+      at_home_.cells[h] = sum.finish();
+      at_home_.triangles.offsets[h + 1] = terms.size();
       if (list_triangles)
         for (const Term& term : terms) lists[c].push_back(term.triangle);
     }
   });
-  for (std::size_t h = 0; h < home_.size(); ++h) triangles_.offsets[h + 1] += triangles_.offsets[h];
-  triangles_.values.clear();
-  for (const std::vector<Index>& list : lists) append_range(triangles_.values, list, 0, list.size());
+  for (std::size_t h = 0; h < home_.size(); ++h) at_home_.triangles.offsets[h + 1] += at_home_.triangles.offsets[h];
+  at_home_.triangles.values.clear();
+  for (const std::vector<Index>& list : lists) append_range(at_home_.triangles.values, list, 0, list.size());
 }
 
 // As voronoi/step_mass does, with the masses of cells that are at home elsewhere.
 void PartDiagram::set_step_masses(Ranks& ranks) {
   double largest = 0;
-  for (const Moments& cell : cells_) largest = std::max(largest, cell.mass);
+  for (const Moments& cell : at_home_.cells) largest = std::max(largest, cell.mass);
   largest = std::max(0.0, largest_of(ranks.gather(largest)));
 
   const SortedSeeds& s = seeds();
@@ -371,7 +323,7 @@ void PartDiagram::set_step_masses(Ranks& ranks) {
   };
   std::vector<Nearby> small;
   for (Index h = 0; h < home_.size(); ++h)
-    if (cells_[h].mass < kStepShare * largest) small.push_back({h, 0, {}});
+    if (at_home_.cells[h].mass < kStepShare * largest) small.push_back({h, 0, {}});
   parallel_each(small.size(), [&](std::size_t k) {
     small[k].count = neighbours().nearest_to(home_[small[k].cell], kStepNeighbours, small[k].slots);
   });
@@ -393,7 +345,7 @@ void PartDiagram::set_step_masses(Ranks& ranks) {
     std::vector<Index> ids;
     ByteReader(question).get_all(ids);
     std::vector<double> masses;
-    for (const Index id : ids) masses.push_back(cells_[cell_of[slot_of(id)]].mass);
+    for (const Index id : ids) masses.push_back(at_home_.cells[cell_of[slot_of(id)]].mass);
     answers.push_back(ByteWriter().put_all(masses).take());
   }
   std::vector<double> mass_elsewhere(cell_of.size());  // of slots that were asked for
@@ -404,122 +356,16 @@ void PartDiagram::set_step_masses(Ranks& ranks) {
     for (std::size_t k = 0; k < masses.size(); ++k) mass_elsewhere[slot_of(asked[r][k])] = masses[k];
   }
 
-  step_mass_.resize(home_.size());
-  for (std::size_t h = 0; h < home_.size(); ++h) step_mass_[h] = cells_[h].mass;
+  at_home_.step_mass.resize(home_.size());
+  for (std::size_t h = 0; h < home_.size(); ++h) at_home_.step_mass[h] = at_home_.cells[h].mass;
   for (const Nearby& nearby : small) {
     double masses[kStepNeighbours];
     for (std::size_t k = 0; k < nearby.count; ++k) {
       const Index slot = nearby.slots[k], cell = cell_of[slot];
-      masses[k] = cell == kNone ? mass_elsewhere[slot] : cells_[cell].mass;
+      masses[k] = cell == kNone ? mass_elsewhere[slot] : at_home_.cells[cell].mass;
     }
-    step_mass_[nearby.cell] = step_mass(cells_[nearby.cell].mass, masses, nearby.count);
+    at_home_.step_mass[nearby.cell] = step_mass(at_home_.cells[nearby.cell].mass, masses, nearby.count);
   }
-}
-
-// --- Feet ---
-
-void PartDiagram::keep_cells(std::uint64_t number) {
-  std::erase_if(kept_, [&](const KeptCells& kept) { return kept.number != projected_; });
-  kept_.push_back({number, ids_, std::move(local_.moments.triangles), shares_.all()});
-}
-
-std::vector<PartDiagram::Foot> PartDiagram::project(Ranks& ranks, std::uint64_t number,
-                                                    const std::vector<Vec3>& seeds) {
-  const auto kept = std::find_if(kept_.begin(), kept_.end(), [&](const KeptCells& k) { return k.number == number; });
-  if (kept == kept_.end()) throw std::logic_error("seeds are projected to cells that are no longer known");
-  projected_ = number;
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
-  for (std::size_t r = 0; r < kept->known_by.size(); ++r) {
-    std::vector<Vec3> some;
-    for (const Index id : kept->known_by[r]) some.push_back(seeds[id]);
-    to[r] = ByteWriter().put_all(some).take();
-  }
-  std::vector<Vec3> mine;
-  ByteReader(ranks.exchange(std::move(to)).front()).get_all(mine);
-
-  std::vector<Foot> feet(mine.size());
-  parallel_each(
-      feet.size(),
-      [&](std::size_t k) {
-        feet[k].seed = kNone;
-        const Csr<Index>& cells = kept->triangles;
-        if (k >= cells.rows() || cells.size(k) == 0) return;
-        const SurfacePoint foot = nearest_on_triangles(*surface_, {cells.begin(k), cells.end(k)}, mine[k]);
-        const auto facet = static_cast<std::size_t>(foot.facet - surface_->facets.data());
-        feet[k] = {kept->ids[k], triangle_[surface_->summaries[facet].triangle], norm2(foot.at - mine[k]), foot.at,
-                   foot.facet->normal};
-      },
-      kSlotsAtOnce);
-  std::erase_if(feet, [](const Foot& foot) { return foot.seed == kNone; });
-  to.assign(static_cast<std::size_t>(ranks.size()), {});
-  to.front() = ByteWriter().put_all(feet).take();
-  const std::vector<std::string> received = ranks.exchange(std::move(to));
-  std::vector<Foot> all, some;
-  if (!ranks.is_root()) return all;
-  for (const std::string& message : received) {
-    ByteReader(message).get_all(some);
-    append_range(all, some, 0, some.size());
-  }
-  // Of equally near ones that of the first triangle.
-  sort_in_parallel(all, [](const Foot& a, const Foot& b) {
-    return std::tie(a.seed, a.squared, a.triangle) < std::tie(b.seed, b.squared, b.triangle);
-  });
-  all.erase(std::unique(all.begin(), all.end(), [](const Foot& a, const Foot& b) { return a.seed == b.seed; }),
-            all.end());
-  return all;
-}
-
-// --- The whole, on rank 0 ---
-
-void PartDiagram::collect_cells(Ranks& ranks, std::size_t count, bool with_triangles, CellMoments& result) const {
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
-  std::vector<Index> ids(home_.size());
-  for (std::size_t h = 0; h < home_.size(); ++h) ids[h] = id_of(home_[h]);
-  ByteWriter message;
-  message.put_all(ids).put_all(cells_).put_all(step_mass_);
-  if (with_triangles) message.put_all(triangles_.offsets).put_all(triangles_.values);
-  to.front() = message.take();
-  const std::vector<std::string> received = ranks.exchange(std::move(to));
-  if (!ranks.is_root()) return;
-
-  struct Part {
-    std::vector<Index> ids;
-    std::vector<Moments> cells;
-    std::vector<double> step_mass;
-    Csr<Index> triangles;
-  };
-  result.cells.assign(count, Moments{});
-  result.step_mass.assign(count, 0);
-  result.triangles.offsets.assign(with_triangles ? count + 1 : 1, 0);
-  result.triangles.values.clear();
-  std::vector<Part> parts(received.size());
-  for (std::size_t r = 0; r < received.size(); ++r) {
-    Part& part = parts[r];
-    ByteReader reader(received[r]);
-    reader.get_all(part.ids);
-    reader.get_all(part.cells);
-    reader.get_all(part.step_mass);
-    if (with_triangles) {
-      reader.get_all(part.triangles.offsets);
-      reader.get_all(part.triangles.values);
-    }
-    reader.end();
-    for (std::size_t k = 0; k < part.ids.size(); ++k) {
-      result.cells[part.ids[k]] = part.cells[k];
-      result.step_mass[part.ids[k]] = part.step_mass[k];
-      if (with_triangles) result.triangles.offsets[part.ids[k] + 1] = part.triangles.size(k);
-    }
-  }
-  if (with_triangles) {
-    for (std::size_t i = 0; i < count; ++i) result.triangles.offsets[i + 1] += result.triangles.offsets[i];
-    result.triangles.values.resize(result.triangles.offsets[count]);
-    for (const Part& part : parts)
-      parallel_each(part.ids.size(), [&](std::size_t k) {
-        std::copy(part.triangles.begin(k), part.triangles.end(k),
-                  result.triangles.values.data() + result.triangles.offsets[part.ids[k]]);
-      });
-  }
-  set_totals(result);
 }
 
 // By the indices of the whole mesh and of all seeds.
@@ -528,64 +374,6 @@ void PartDiagram::rename_polygons() {
   for (RestrictedPolygons::Pair& pair : mine.pairs) pair = {triangle_[pair.triangle], ids_[pair.cell]};
   for (Index& label : mine.labels)
     if (!is_edge(label)) label = ids_[label];
-}
-
-void PartDiagram::collect_dual(Ranks& ranks, Dual& result) const {
-  const Dual mine = extract_dual(local_.polygons);
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
-  to.front() = ByteWriter().put_all(mine.triangles).put_all(mine.multiplicity).put_all(mine.mesh_triangle).take();
-  const std::vector<std::string> received = ranks.exchange(std::move(to));
-  if (!ranks.is_root()) return;
-  std::vector<Dual> parts(received.size());
-  for (std::size_t r = 0; r < parts.size(); ++r) {
-    ByteReader reader(received[r]);
-    reader.get_all(parts[r].triangles);
-    reader.get_all(parts[r].multiplicity);
-    reader.get_all(parts[r].mesh_triangle);
-    reader.end();
-  }
-  result = merge_duals(parts);
-}
-
-void PartDiagram::collect_polygons(Ranks& ranks, RestrictedPolygons& result) {
-  RestrictedPolygons& mine = local_.polygons;
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
-  ByteWriter message;
-  to.front() = message.put_all(mine.pairs).put_all(mine.offsets).put_all(mine.labels).put_all(mine.vertices).take();
-  mine = {};
-  std::vector<std::string> received = ranks.exchange(std::move(to));
-  if (!ranks.is_root()) return;
-
-  // The polygons of a triangle come from one rank.
-  struct Run {
-    Index triangle;
-    std::size_t part, begin, end;
-  };
-  std::vector<RestrictedPolygons> parts(received.size());
-  std::vector<Run> runs;
-  std::size_t corners = 0, places = 0;
-  for (std::size_t r = 0; r < parts.size(); ++r) {
-    RestrictedPolygons& part = parts[r];
-    ByteReader reader(received[r]);
-    reader.get_all(part.pairs);
-    reader.get_all(part.offsets);
-    reader.get_all(part.labels);
-    reader.get_all(part.vertices);
-    reader.end();
-    received[r] = {};
-    corners += part.labels.size();
-    places += part.vertices.size();
-    for (std::size_t k = 0; k < part.pairs.size(); ++k) {
-      const Index triangle = part.pairs[k].triangle;
-      if (k == 0 || triangle != runs.back().triangle) runs.push_back({triangle, r, k, k});
-      ++runs.back().end;
-    }
-  }
-  sort_in_parallel(runs, [](const Run& a, const Run& b) { return a.triangle < b.triangle; });
-  result = {};
-  result.labels.reserve(corners);
-  result.vertices.reserve(places);
-  for (const Run& run : runs) append_polygons(parts[run.part], run.begin, run.end, result);
 }
 
 }  // namespace bisector

@@ -15,13 +15,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "bisector/cells.h"
 #include "core/geometry.h"
+#include "distributed/collect.h"
+#include "distributed/kept_cells.h"
 #include "distributed/ranks.h"
 #include "distributed/regions.h"
+#include "distributed/seed_shares.h"
 #include "voronoi/diagram.h"
 #include "voronoi/restricted.h"
 #include "voronoi/surface.h"
@@ -46,23 +48,6 @@ struct PartFigures {
   std::uint64_t memory = 0;      // bytes that the process has held at most
 };
 
-// Who knows which seeds: kept by the rank that has all of them.
-class SeedShares {
- public:
-  // The message for a rank that needs all seeds in `box` enlarged by `halo`. Those of the last time are sent again, at
-  // their new positions, as long as they serve.
-  std::string share(int rank, const Box& box, double halo, const std::vector<Vec3>& seeds);
-  // The seeds that each rank has, ascending.
-  std::vector<std::vector<Index>> all() const;
-
- private:
-  struct Share {
-    std::vector<Index> seeds;
-    std::vector<char> has;  // of each seed
-  };
-  std::vector<Share> shares_;
-};
-
 class PartDiagram {
  public:
   PartDiagram(SurfacePart part, Regions regions, int rank);
@@ -75,16 +60,11 @@ class PartDiagram {
   // ranks. With a `number` other than 0 each rank keeps what triangles its cells have, for project().
   PairCounts evaluate(Ranks& ranks, const std::vector<Vec3>& seeds, NeighbourSource source, Want want, double halo,
                       std::uint64_t number, Diagram& diagram);
-  // What project() has found of a seed: the nearest point of its cell's triangles, and the normal there.
-  struct Foot {
-    Index seed, triangle;
-    double squared;  // distance
-    Vec3 at, normal;
-  };
   // Takes part in projecting `seeds`, which only rank 0 knows, to the triangles of their cells in the diagram of this
-  // number: the last that was kept, or the one that was projected to last. Returns there one foot for each seed whose
-  // cell has triangles, in ascending order.
-  std::vector<Foot> project(Ranks& ranks, std::uint64_t number, const std::vector<Vec3>& seeds);
+  // number: the last that was kept, or the one that was projected to last (distributed/kept_cells.h).
+  std::vector<Foot> project(Ranks& ranks, std::uint64_t number, const std::vector<Vec3>& seeds) {
+    return kept_.project(ranks, number, seeds, surface_ ? &*surface_ : nullptr, triangle_);
+  }
   PartFigures figures() const { return figures_; }
 
  private:
@@ -92,14 +72,6 @@ class PartDiagram {
   struct Term {
     Index seed, triangle;
     Moments moments;
-  };
-
-  // What project() needs of a diagram.
-  struct KeptCells {
-    std::uint64_t number = 0;
-    std::vector<Index> ids;                    // of the seeds that are known here
-    Csr<Index> triangles;                      // of their cells, of the surface here
-    std::vector<std::vector<Index>> known_by;  // on rank 0: the ids of each rank
   };
 
   const SortedSeeds& seeds() const { return voronoi_ ? voronoi_->seeds() : sorted_; }
@@ -116,11 +88,7 @@ class PartDiagram {
   std::vector<Term> fetch_terms(Ranks& ranks) const;
   void sum_cells(const std::vector<Term>& fetched, bool list_triangles);
   void set_step_masses(Ranks& ranks);
-  void collect_cells(Ranks& ranks, std::size_t count, bool with_triangles, CellMoments& result) const;
-  void keep_cells(std::uint64_t number);
   void rename_polygons();
-  void collect_polygons(Ranks& ranks, RestrictedPolygons& result);
-  void collect_dual(Ranks& ranks, Dual& result) const;
 
   std::optional<Surface> surface_;  // none where the rank has no facets
   std::vector<Index> triangle_;     // of each of the surface's, in the whole mesh
@@ -137,15 +105,12 @@ class PartDiagram {
   SortedSeeds sorted_;
   Neighbours lists_;
   Diagram local_;
-  std::vector<KeptCells> kept_;
-  std::uint64_t projected_ = 0;  // the number that was projected to last
+  KeptCells kept_;
   PairCounts counts_;
   PartFigures figures_;
 
-  std::vector<Index> home_;        // slots of the seeds that are at home here
-  std::vector<Moments> cells_;     // of these
-  std::vector<double> step_mass_;  // likewise
-  Csr<Index> triangles_;           // of their cells, if wanted, in the whole mesh
+  std::vector<Index> home_;  // slots of the seeds that are at home here
+  CellsOfRank at_home_;      // the cells of these
 };
 
 }  // namespace bisector

@@ -234,7 +234,7 @@ bool Clipper::meet(const Line& before, const Line& after, Corner& corner) const 
   }
   corner.at = foot_ + w;
   corner.slack = 2000 * kUnit * largest_ * std::sqrt(squares / square);
-  return (determinant > 0) == (points_out(before) == points_out(after));
+  return true;
 }
 
 void Clipper::add_corner(const Line& before, const Line& after, Corner& corner) const {

@@ -99,11 +99,6 @@ class Clipper {
   bool visit(Index other);
   void bound_polygon();
   void cut(Index other, const Vec3& towards, double squared);
-  // Whether m points out of the polygon: for a bisector it does, for a facet edge it depends on which way that was
-  // taken.
-  bool points_out(const Line& line) const {
-    return !is_edge(line.slot) || facet_->origin[line.slot & ~kEdgeLabel] != (line.slot & ~kEdgeLabel);
-  }
   // Sets the corner where the lines meet. False if they do so too steeply to be sure of it.
   bool meet(const Line& before, const Line& after, Corner& corner) const;
   // The same, by exact arithmetic where need be.

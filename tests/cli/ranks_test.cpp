@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <string>
 
+#include "bisector/io.h"
 #include "support/command_line.h"
+#include "support/models.h"
 
 namespace bisector {
 namespace {
@@ -38,11 +40,23 @@ TEST_F(CliRanks, WriteTheBytesOfOneProcess) {
   EXPECT_NE(read_text(in("three.json")).find(", 3 ranks\""), std::string::npos);
 }
 
+// A surface in parts takes no MPI, either.
+TEST_F(CliRanks, ReadASurfaceInParts) {
+  write_mesh(in("torus.ply"), test::torus(120, 80));
+  ASSERT_EQ(run({"remesh-parts", in("torus.ply"), "-o", in("one.off"), "-n", "500"}).code, 0);
+  ASSERT_EQ(run_ranks(2, "remesh-parts " + in("torus.ply") + " -o " + in("two.off") + " -n 500"), 0)
+      << read_text(in("err"));
+  EXPECT_EQ(read_text(in("two.off")), read_text(in("one.off")));
+}
+
 TEST_F(CliRanks, ErrorsAreOneLineAndEndAll) {
-  EXPECT_EQ(run_ranks(2, "remesh " + in("missing.off") + " -o " + in("out.off") + " -n 400"), 1);
-  const std::string error = read_text(in("err"));
-  EXPECT_EQ(error.find("bisector: "), error.rfind("bisector: ")) << error;
-  EXPECT_FALSE(std::filesystem::exists(in("out.off")));
+  for (const std::string command : {"remesh", "remesh-parts"}) {
+    EXPECT_EQ(run_ranks(2, command + " " + in("missing.ply") + " -o " + in("out.off") + " -n 400"), 1);
+    const std::string error = read_text(in("err"));
+    EXPECT_NE(error.find("missing.ply"), std::string::npos) << error;
+    EXPECT_EQ(error.find("bisector: "), error.rfind("bisector: ")) << error;
+    EXPECT_FALSE(std::filesystem::exists(in("out.off")));
+  }
 }
 
 // Ranks that would all do the same, and write the same file.

@@ -13,6 +13,7 @@
 #include "cli/program.h"
 #include "fuzz/target.h"
 #include "host/device/cache_file.h"
+#include "io/ply_parts.h"
 #include "tetmesh/tetgen_reply.h"
 
 namespace bisector::fuzz {
@@ -82,6 +83,12 @@ constexpr char kOff[] = "a.off", kObj[] = "a.obj", kStl[] = "a.stl", k3mf[] = "a
 void ply(std::string_view bytes) {
   const std::string path = file_of(bytes, "a.ply");
   guarded([&] { check(read_mesh(path)); });
+  guarded([&] {
+    const io::PlyParts parts(path);
+    for (std::size_t v = 0; v < parts.vertices(); ++v) parts.vertex(v);
+    for (std::size_t t = 0; t < parts.triangles(); ++t)
+      for (const Index v : parts.triangle(t)) require(v < parts.vertices(), "a triangle's corner is a vertex");
+  });
   guarded([&] { read_point_cloud(path); });
   guarded([&] { read_vertex_attribute(path, "quality"); });
 }

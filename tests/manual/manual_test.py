@@ -78,7 +78,7 @@ class Completion:
 
     def test_commands(self):
         self.assertLessEqual(set(commands()), set(self.offered("bisector ")))
-        self.assertEqual(self.offered("bisector rem"), ["remesh"])
+        self.assertEqual(self.offered("bisector rem"), ["remesh", "remesh-parts"])
 
     def test_options(self):
         for command in commands():

@@ -321,6 +321,36 @@ TEST(Restricted, FollowsSeedsThatMoveByAFractionOfTheirSpacing) {
   }
 }
 
+// The first of two seeds that have met has the cell of both.
+TEST(Restricted, SeedsThatMeetOnTheirWay) {
+  const TriangleMesh mesh = grid_patch(20, 20);
+  const Surface surface(mesh);
+  RestrictedVoronoi used(surface);
+  std::vector<Vec3> seeds = random_seeds(mesh, 400, 3);
+  diagram_of(used, seeds, NeighbourSource::nearest);
+  std::array<std::size_t, 2> nearest{0, 1};
+  for (std::size_t j = 1; j < seeds.size(); ++j)
+    for (std::size_t i = 0; i < j; ++i)
+      if (norm2(seeds[j] - seeds[i]) < norm2(seeds[nearest[1]] - seeds[nearest[0]])) nearest = {i, j};
+  const Vec3 middle = 0.5 * (seeds[nearest[0]] + seeds[nearest[1]]);
+  for (const std::size_t i : nearest) seeds[i] = middle;
+  const Diagram d = diagram_of(used, seeds, NeighbourSource::nearest);
+  EXPECT_EQ(d.moments.cells[nearest[1]].mass, 0);
+  expect_same_diagram(d, diagram_of(surface, seeds, NeighbourSource::nearest));
+}
+
+// A density that falls by more than rounding can follow: no cell is lighter than if the least were everywhere.
+TEST(Restricted, CellsAreNoLighterThanTheLeastDensity) {
+  TriangleMesh mesh = single_triangle();
+  const Surface steep(mesh, {1, 1e30, 1}), even(mesh);
+  std::vector<Vec3> seeds = random_seeds(mesh, 60, 9);
+  for (const double s : {1e-9, 3e-9, 1e-8}) seeds.push_back({s, 2 * s, 0});
+  const Diagram heavy = diagram_of(steep, seeds, NeighbourSource::nearest),
+                light = diagram_of(even, seeds, NeighbourSource::nearest);
+  for (std::size_t i = 0; i < seeds.size(); ++i)
+    EXPECT_GE(heavy.moments.cells[i].mass, (1 - 1e-9) * light.moments.cells[i].mass) << "seed " << i;
+}
+
 // Facets that stay divided as they were are certified vertex by vertex and computed several polygons at a time.
 // Whatever happens to the seeds, and whatever instructions are used, no bit may differ from a diagram that knows
 // nothing.
