@@ -1,6 +1,8 @@
 #include "distributed/seed_shares.h"
 
 #include <algorithm>
+#include <atomic>
+#include <cstddef>
 
 #include "checkpoint/bytes.h"
 #include "core/parallel.h"
@@ -28,14 +30,19 @@ std::string SeedShares::share(int rank, const Box& box, double halo, const std::
         seeds.size(), [&](std::size_t i) { within[i] = is_within(seeds[i], box, reach); }, kSeedsAtOnce);
     return within;
   };
-  std::vector<char> needed = mark(halo);
-  std::size_t count = 0;
-  bool serves = share.has.size() == seeds.size();
-  for (std::size_t i = 0; i < seeds.size(); ++i) {
-    count += needed[i];
-    serves = serves && needed[i] <= share.has[i];
-  }
-  serves = serves && share.seeds.size() <= 2 * count + kSeedsAtOnce;
+  const std::vector<char> needed = mark(halo);
+  const bool as_many = share.has.size() == seeds.size();
+  std::atomic<std::size_t> count = 0, missing = 0;
+  parallel_chunks(seeds.size(), kSeedsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::size_t found = 0, without = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      found += needed[i];
+      without += as_many && needed[i] > share.has[i];
+    }
+    count += found;
+    missing += without;
+  });
+  const bool serves = as_many && missing == 0 && share.seeds.size() <= 2 * count + kSeedsAtOnce;
   if (!serves) {
     share.has = mark(kSpare * halo);
     share.seeds.clear();

@@ -123,7 +123,7 @@ TEST_F(CliBatch, WhatFailsCostsNothingButItself) {
   jobs += fmt::format("{{\"command\": \"remesh\", \"input\": \"{}\", \"output\": \"{}\", \"n\": 100}}\n",
                       in("missing.off"), in("e.off"));
   write_text("jobs.jsonl", jobs);
-  const Result result = run(batch({"--jobs", "3", "--timeout", "4", "--memory", "300MB", "--program", misbehaving()}));
+  const Result result = run(batch({"--jobs", "3", "--timeout", "8", "--memory", "300MB", "--program", misbehaving()}));
   EXPECT_EQ(result.code, 5) << result.err;
   EXPECT_NE(result.err.find("5 of 9 jobs failed: crash, hang, eat, leave, e;"), std::string::npos) << result.err;
   for (const char* name : {"a", "b", "c", "d"}) {
