@@ -19,7 +19,7 @@ constexpr std::size_t kPiece = std::size_t{1} << 29;  // MPI counts in int
 void wait_for(std::vector<MPI_Request>& requests) {
   using std::chrono::microseconds;
   constexpr int kAttempts = 1000;
-  constexpr microseconds kLongest(1000);
+  constexpr microseconds kLongest(200);
   microseconds nap(10);
   for (int attempt = 0;; ++attempt) {
     int done = 0;

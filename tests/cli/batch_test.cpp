@@ -139,7 +139,7 @@ TEST_F(CliBatch, WhatFailsCostsNothingButItself) {
   EXPECT_NE(record("e")["message"].get<std::string>().find("missing.off"), std::string::npos);
   ASSERT_EQ(summary()["failed"].size(), 5u);
   EXPECT_EQ(summary()["failed"][1]["name"], "hang");
-  EXPECT_EQ(summary()["failed"][1]["message"], "took longer than 4 s");
+  EXPECT_EQ(summary()["failed"][1]["message"], "took longer than 8 s");
   // What a job left behind is gone.
   std::size_t sleeping = 0;
   for (const auto& process : fs::directory_iterator("/proc"))
