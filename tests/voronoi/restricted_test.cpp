@@ -341,10 +341,15 @@ TEST(Restricted, SeedsThatMeetOnTheirWay) {
 
 // A density that falls by more than rounding can follow: no cell is lighter than if the least were everywhere.
 TEST(Restricted, CellsAreNoLighterThanTheLeastDensity) {
-  TriangleMesh mesh = single_triangle();
+  TriangleMesh mesh;
+  mesh.vertices = {{0.1, 0.2, 0.3}, {1.7, 0.4, -0.2}, {0.3, 1.9, 0.77}};
+  mesh.triangles = {{0, 1, 2}};
   const Surface steep(mesh, {1, 1e30, 1}), even(mesh);
   std::vector<Vec3> seeds = random_seeds(mesh, 60, 9);
-  for (const double s : {1e-9, 3e-9, 1e-8}) seeds.push_back({s, 2 * s, 0});
+  // At the light corner that positions are not relative to, and along the light side.
+  const Vec3 tip = mesh.vertices[2], along = mesh.vertices[0] - tip, across = mesh.vertices[1] - tip;
+  for (const double s : {1e-18, 1e-17, 3e-16, 1e-9})
+    for (const double t : {0.0, 0.2, 0.4, 0.7}) seeds.push_back(tip + t * along + s * across);
   const Diagram heavy = diagram_of(steep, seeds, NeighbourSource::nearest),
                 light = diagram_of(even, seeds, NeighbourSource::nearest);
   for (std::size_t i = 0; i < seeds.size(); ++i)
