@@ -21,6 +21,7 @@
 #include "support/diagram.h"
 #include "support/models.h"
 #include "support/oracle.h"
+#include "voronoi/fixed_tree_sum.h"
 
 namespace bisector::test {
 namespace {
@@ -318,6 +319,20 @@ TEST(Restricted, FollowsSeedsThatMoveByAFractionOfTheirSpacing) {
       if (HasFailure()) return;
       for (Vec3& x : seeds) x += 0.05 * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
     }
+  }
+}
+
+// Blocks of 32, the blocks' sums likewise: what devices and ranks do as well.
+TEST(Restricted, CellsAreSummedByTheRuleOfAllSums) {
+  SplitMix64 random(12);
+  for (const std::size_t count : {1, 32, 33, 100, 1024, 1025, 5000}) {
+    std::vector<Moments> terms(count);
+    FixedTreeSum sum;
+    for (Moments& term : terms) {
+      term = {random.range(0, 1), {random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)}, random.range(0, 1)};
+      sum.add(term);
+    }
+    EXPECT_TRUE(same_bits(sum.finish(), fixed_sum<Moments>(count, [&](std::size_t k) { return terms[k]; }))) << count;
   }
 }
 
