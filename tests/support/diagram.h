@@ -74,6 +74,7 @@ inline std::vector<Triangle> triples_of(const RestrictedPolygons& polygons) {
 
 inline void expect_same_moments(const CellMoments& a, const CellMoments& b) {
   EXPECT_TRUE(same_bits(a.cells, b.cells));
+  EXPECT_TRUE(same_bits(a.step_mass, b.step_mass));
   EXPECT_TRUE(same_bits(a.mass, b.mass));
   EXPECT_TRUE(same_bits(a.energy, b.energy));
   EXPECT_EQ(a.triangles.offsets, b.triangles.offsets);
