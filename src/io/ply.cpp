@@ -64,20 +64,7 @@ class PlyBinary {
     element_ = &element;
     item_ = item;
   }
-  double value(Scalar type) {
-    const char* at = take(size_of(type));
-    switch (type) {
-      case Scalar::int8: return load<std::int8_t>(at, big_endian_);
-      case Scalar::uint8: return load<std::uint8_t>(at, big_endian_);
-      case Scalar::int16: return load<std::int16_t>(at, big_endian_);
-      case Scalar::uint16: return load<std::uint16_t>(at, big_endian_);
-      case Scalar::int32: return load<std::int32_t>(at, big_endian_);
-      case Scalar::uint32: return load<std::uint32_t>(at, big_endian_);
-      case Scalar::float32: return load<float>(at, big_endian_);
-      case Scalar::float64: return load<double>(at, big_endian_);
-    }
-    return 0;
-  }
+  double value(Scalar type) { return load_scalar(type, take(size_of(type)), big_endian_); }
   void skip(Scalar type, std::size_t n) { take(n * size_of(type)); }
   std::size_t most_items(const PlyElement& element) const {
     return bytes_.size() / std::max<std::size_t>(1, element.least_size());

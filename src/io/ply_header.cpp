@@ -1,13 +1,30 @@
 #include "io/ply_header.h"
 
 #include <array>
+#include <cstdint>
 #include <utility>
+
+#include "io/bytes.h"
 
 namespace bisector::io {
 
 std::size_t size_of(Scalar type) {
   constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
   return kSizes[static_cast<std::size_t>(type)];
+}
+
+double load_scalar(Scalar type, const char* bytes, bool big_endian) {
+  switch (type) {
+    case Scalar::int8: return load<std::int8_t>(bytes, big_endian);
+    case Scalar::uint8: return load<std::uint8_t>(bytes, big_endian);
+    case Scalar::int16: return load<std::int16_t>(bytes, big_endian);
+    case Scalar::uint16: return load<std::uint16_t>(bytes, big_endian);
+    case Scalar::int32: return load<std::int32_t>(bytes, big_endian);
+    case Scalar::uint32: return load<std::uint32_t>(bytes, big_endian);
+    case Scalar::float32: return load<float>(bytes, big_endian);
+    case Scalar::float64: return load<double>(bytes, big_endian);
+  }
+  return 0;
 }
 
 namespace {

@@ -13,6 +13,8 @@ namespace bisector::io {
 enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
 std::size_t size_of(Scalar type);
+// The number whose bytes begin there.
+double load_scalar(Scalar type, const char* bytes, bool big_endian);
 
 struct PlyProperty {
   std::string name;

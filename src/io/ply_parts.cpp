@@ -13,7 +13,6 @@
 #include <utility>
 
 #include "core/magnitude.h"
-#include "io/bytes.h"
 
 namespace bisector::io {
 namespace {
@@ -76,20 +75,7 @@ PlyParts::PlyParts(const std::string& path) : path_(path) {
 
 void PlyParts::Unmap::operator()(const char* bytes) const { munmap(const_cast<char*>(bytes), size); }
 
-double PlyParts::number(Scalar type, std::size_t at) const {
-  const char* bytes = bytes_.get() + at;
-  switch (type) {
-    case Scalar::int8: return load<std::int8_t>(bytes, big_endian_);
-    case Scalar::uint8: return load<std::uint8_t>(bytes, big_endian_);
-    case Scalar::int16: return load<std::int16_t>(bytes, big_endian_);
-    case Scalar::uint16: return load<std::uint16_t>(bytes, big_endian_);
-    case Scalar::int32: return load<std::int32_t>(bytes, big_endian_);
-    case Scalar::uint32: return load<std::uint32_t>(bytes, big_endian_);
-    case Scalar::float32: return load<float>(bytes, big_endian_);
-    case Scalar::float64: return load<double>(bytes, big_endian_);
-  }
-  return 0;
-}
+double PlyParts::number(Scalar type, std::size_t at) const { return load_scalar(type, bytes_.get() + at, big_endian_); }
 
 void PlyParts::fail_at(const char* element, std::size_t item, const std::string& what) const {
   fail(path_, fmt::format("{} {}: {}", element, item, what));
