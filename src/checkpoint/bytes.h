@@ -1,4 +1,4 @@
-// Values as the bytes of a checkpoint, in the order of the machine.
+// Values as the bytes of a checkpoint, or of a message between ranks, in the order of the machine.
 #pragma once
 
 #include <cstddef>

@@ -14,13 +14,9 @@ using namespace job;
 
 void print_summary(Console& console, const RemeshJob& job, const JobFiles& files) {
   const RemeshResult& result = job.result;
-  const QualityReport& quality = job.quality;
   console.print(fmt::format("input      {}: {}", job.input, size_of(input_json(*job.surface))));
   console.print(fmt::format("output     {}: {}", files.outputs.at("output"), size_of(output_json(result.mesh))));
-  console.print(fmt::format("quality    q_min {:.4f}, theta_min {:.2f} degrees; theta_below_30 {:.3g} %", quality.q_min,
-                            quality.theta_min, quality.theta_below_30));
-  console.print(fmt::format("           q_ave {:.4f}, theta_min_ave {:.2f} degrees; valence6 {:.1f} %", quality.q_ave,
-                            quality.theta_min_ave, 100 * quality.valence6));
+  print_quality(console, job.quality);
   console.print(fmt::format("topology   {}{}", describe(result.topology),
                             result.topology_matches ? "; as the input" : "; NOT as the input"));
   if (result.features.curves > 0)

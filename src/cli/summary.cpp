@@ -35,6 +35,13 @@ void print_device(Console& console, const BackendDescription& device) {
   else if (!device.fallback.empty()) console.print(fmt::format("device     {}; {}", device.name, device.fallback));
 }
 
+void print_quality(Console& console, const QualityReport& quality) {
+  console.print(fmt::format("quality    q_min {:.4f}, theta_min {:.2f} degrees; theta_below_30 {:.3g} %", quality.q_min,
+                            quality.theta_min, quality.theta_below_30));
+  console.print(fmt::format("           q_ave {:.4f}, theta_min_ave {:.2f} degrees; valence6 {:.1f} %", quality.q_ave,
+                            quality.theta_min_ave, 100 * quality.valence6));
+}
+
 void print_detail(Console& console, const DetailResult& detail) {
   if (detail.merged + detail.let_go == 0) return;
   console.print(

@@ -17,6 +17,7 @@ void print_seconds(Console& console, const job::Json& seconds, const job::Json& 
 // What computed, where that was not the CPU all along.
 void print_device(Console& console, const BackendDescription& device);
 
+void print_quality(Console& console, const QualityReport& quality);
 // A line if any detail was merged or let go.
 void print_detail(Console& console, const DetailResult& detail);
 

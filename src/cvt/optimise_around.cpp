@@ -58,24 +58,11 @@ struct Piece {
 };
 
 Surface marked_surface(const Surface& whole, const std::vector<char>& marked) {
-  TriangleMesh mesh;
-  std::vector<double> density;
-  std::vector<Index> vertex(whole.mesh.vertices.size(), kNone);
-  for (std::size_t t = 0; t < marked.size(); ++t)
-    if (marked[t])
-      for (const Index v : whole.mesh.triangles[t]) vertex[v] = 0;
-  // Vertices and triangles keep their order, by which ties are broken.
-  for (std::size_t v = 0; v < vertex.size(); ++v) {
-    if (vertex[v] == kNone) continue;
-    vertex[v] = static_cast<Index>(mesh.vertices.size());
-    mesh.vertices.push_back(whole.mesh.vertices[v]);
-    if (!whole.density.empty()) density.push_back(whole.density[v]);
-  }
-  for (std::size_t t = 0; t < marked.size(); ++t) {
-    const auto& [a, b, c] = whole.mesh.triangles[t];
-    if (marked[t]) mesh.triangles.push_back({vertex[a], vertex[b], vertex[c]});
-  }
-  return Surface(std::move(mesh), std::move(density));
+  std::vector<Index> triangles;
+  for (Index t = 0; t < marked.size(); ++t)
+    if (marked[t]) triangles.push_back(t);
+  SurfacePart part = part_of(whole, std::move(triangles));
+  return Surface(std::move(part.mesh), std::move(part.density));
 }
 
 std::vector<Index> seeds_on(const RestrictedPolygons& polygons, const std::vector<char>& triangles, std::size_t count) {

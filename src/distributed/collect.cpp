@@ -13,12 +13,10 @@
 namespace bisector {
 
 void collect_cells(Ranks& ranks, const CellsOfRank& mine, std::size_t count, bool with_triangles, CellMoments& result) {
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
   ByteWriter message;
   message.put_all(mine.ids).put_all(mine.cells).put_all(mine.step_mass);
   if (with_triangles) message.put_all(mine.triangles.offsets).put_all(mine.triangles.values);
-  to.front() = message.take();
-  const std::vector<std::string> received = ranks.exchange(std::move(to));
+  const std::vector<std::string> received = ranks.collect(message.take());
   if (!ranks.is_root()) return;
 
   result.cells.assign(count, Moments{});
@@ -56,9 +54,8 @@ void collect_cells(Ranks& ranks, const CellsOfRank& mine, std::size_t count, boo
 }
 
 void collect_dual(Ranks& ranks, const Dual& mine, Dual& result) {
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
-  to.front() = ByteWriter().put_all(mine.triangles).put_all(mine.multiplicity).put_all(mine.mesh_triangle).take();
-  const std::vector<std::string> received = ranks.exchange(std::move(to));
+  const std::vector<std::string> received =
+      ranks.collect(ByteWriter().put_all(mine.triangles).put_all(mine.multiplicity).put_all(mine.mesh_triangle).take());
   if (!ranks.is_root()) return;
   std::vector<Dual> parts(received.size());
   for (std::size_t r = 0; r < parts.size(); ++r) {
@@ -72,11 +69,10 @@ void collect_dual(Ranks& ranks, const Dual& mine, Dual& result) {
 }
 
 void collect_polygons(Ranks& ranks, RestrictedPolygons mine, RestrictedPolygons& result) {
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
   ByteWriter message;
-  to.front() = message.put_all(mine.pairs).put_all(mine.offsets).put_all(mine.labels).put_all(mine.vertices).take();
+  message.put_all(mine.pairs).put_all(mine.offsets).put_all(mine.labels).put_all(mine.vertices);
   mine = {};
-  std::vector<std::string> received = ranks.exchange(std::move(to));
+  std::vector<std::string> received = ranks.collect(message.take());
   if (!ranks.is_root()) return;
 
   // The polygons of a triangle come from one rank.

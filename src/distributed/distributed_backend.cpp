@@ -26,8 +26,9 @@ struct Command {
   NeighbourSource source = NeighbourSource::nearest;
   Want want = Want::moments;
   double halo = 0;
-  unsigned threads = 0;
-  std::uint64_t number = 0;  // of a diagram; of vertices that are wanted
+  std::uint64_t number = 0;  // of a diagram
+  std::size_t wanted = 0;    // vertices
+  unsigned threads = thread_count();
 };
 
 std::string bytes_of(const Command& command) { return ByteWriter().put(command).take(); }
@@ -61,8 +62,8 @@ std::unique_ptr<PartDiagram> part_of(const std::string& bytes, int rank) {
   return std::make_unique<PartDiagram>(std::move(part), Regions(std::move(nodes)), rank);
 }
 
-// Facets weigh by their number and by their mass, for each brings a pair and each cell some more.
-Regions divide(const Surface& surface, int ranks) {
+// What each rank gets. Facets weigh by their number and by their mass, for each brings a pair and each cell some more.
+std::vector<std::string> divide(const Surface& surface, int ranks) {
   const std::size_t n = surface.facets.size();
   std::vector<Vec3> centres(n);
   std::vector<double> weights(n);
@@ -71,30 +72,15 @@ Regions divide(const Surface& surface, int ranks) {
     centres[k] = kThird * (corners[0] + corners[1] + corners[2]);
     weights[k] = 1 / static_cast<double>(n) + surface.summaries[k].moments.mass / surface.mass;
   });
-  return Regions(centres, weights, ranks);
-}
-
-SurfacePart part_of(const Surface& surface, const Regions& regions, int rank) {
-  SurfacePart part;
-  std::vector<Index> place(surface.mesh.vertices.size(), kNone);
+  const Regions regions(centres, weights, ranks);
+  std::vector<std::vector<Index>> triangles(static_cast<std::size_t>(ranks));
   for (Index t = 0; t < surface.facet_of.size(); ++t) {
-    if (surface.facet_of[t] == kNone) continue;
-    const Vec3* corners = surface.facets[surface.facet_of[t]].corners;
-    if (regions.at(kThird * (corners[0] + corners[1] + corners[2])) != rank) continue;
-    part.triangle.push_back(t);
-    for (const Index v : surface.mesh.triangles[t]) place[v] = 0;
+    const Index facet = surface.facet_of[t];
+    if (facet != kNone) triangles[static_cast<std::size_t>(regions.at(centres[facet]))].push_back(t);
   }
-  for (Index v = 0; v < place.size(); ++v) {
-    if (place[v] == kNone) continue;
-    place[v] = static_cast<Index>(part.mesh.vertices.size());
-    part.mesh.vertices.push_back(surface.mesh.vertices[v]);
-    if (!surface.density.empty()) part.density.push_back(surface.density[v]);
-  }
-  for (const Index t : part.triangle) {
-    const Triangle& v = surface.mesh.triangles[t];
-    part.mesh.triangles.push_back({place[v[0]], place[v[1]], place[v[2]]});
-  }
-  return part;
+  std::vector<std::string> parts;
+  for (std::vector<Index>& some : triangles) parts.push_back(bytes_of(part_of(surface, std::move(some)), regions));
+  return parts;
 }
 
 // The parts that a rank other than 0 has.
@@ -106,11 +92,9 @@ class Server {
   bool follow(const Command& command) {
     const ThreadLimit limit(std::min(command.threads, thread_count()));
     switch (command.kind) {
-      case Command::Kind::divide:
-        parts_[command.domain] = part_of(ranks_.exchange(nothing()).front(), ranks_.rank());
-        break;
+      case Command::Kind::divide: parts_[command.domain] = part_of(ranks_.scatter({}), ranks_.rank()); break;
       case Command::Kind::read:
-        parts_[command.domain] = read_divided(ranks_, ranks_.broadcast({}), command.number).part;
+        parts_[command.domain] = read_divided(ranks_, ranks_.broadcast({}), command.wanted).part;
         break;
       case Command::Kind::evaluate:
         part(command).evaluate(ranks_, {}, command.source, command.want, command.halo, command.number, diagram_);
@@ -124,7 +108,6 @@ class Server {
   }
 
  private:
-  std::vector<std::string> nothing() const { return std::vector<std::string>(static_cast<std::size_t>(ranks_.size())); }
   PartDiagram& part(const Command& command) {
     const auto found = parts_.find(command.domain);
     if (found == parts_.end()) throw Error("this part of the surface could not be set up");
@@ -138,39 +121,32 @@ class Server {
 
 }  // namespace
 
+FileOfRanks read_on_all(const std::string& path, std::size_t wanted, Ranks& ranks) {
+  FileOfRanks file;
+  file.domain = next_domain();
+  ranks.together([&] {
+    ranks.broadcast(bytes_of({.kind = Command::Kind::read, .domain = file.domain, .wanted = wanted}));
+    static_cast<DividedSurface&>(file) = read_divided(ranks, ranks.broadcast(path), wanted);
+  });
+  return file;
+}
+
 DistributedBackend::DistributedBackend(const Surface& surface, NeighbourSource source, Ranks& ranks)
     : Backend(surface, surface.mass, Want::polygons | Want::dual), ranks_(ranks), source_(source),
       domain_(next_domain()), area_(surface.area) {
   ranks.together([&] {
-    ranks.broadcast(bytes_of(Command{Command::Kind::divide, domain_, source, {}, 0, thread_count()}));
-    const Regions regions = divide(surface, ranks.size());
-    std::vector<std::string> parts;
-    for (int rank = 0; rank < ranks.size(); ++rank) parts.push_back(bytes_of(part_of(surface, regions, rank), regions));
-    part_ = part_of(ranks.exchange(std::move(parts)).front(), 0);
+    ranks.broadcast(bytes_of({.kind = Command::Kind::divide, .domain = domain_}));
+    part_ = part_of(ranks.scatter(divide(surface, ranks.size())), ranks.rank());
   });
 }
 
-DistributedBackend::DistributedBackend(const std::string& path, std::size_t wanted, NeighbourSource source,
-                                       Ranks& ranks)
-    : DistributedBackend(read(path, wanted, ranks), source, ranks) {}
-
-DistributedBackend::DistributedBackend(ReadSurface surface, NeighbourSource source, Ranks& ranks)
-    : Backend(surface.divided.area, Want::polygons | Want::dual), ranks_(ranks), source_(source),
-      domain_(surface.domain), stays_(true), area_(surface.divided.area), divided_(std::move(surface.divided)),
-      part_(std::move(divided_.part)) {}
-
-DistributedBackend::ReadSurface DistributedBackend::read(const std::string& path, std::size_t wanted, Ranks& ranks) {
-  ReadSurface result{{}, next_domain()};
-  ranks.together([&] {
-    ranks.broadcast(bytes_of(Command{Command::Kind::read, result.domain, {}, {}, 0, thread_count(), wanted}));
-    result.divided = read_divided(ranks, ranks.broadcast(path), wanted);
-  });
-  return result;
-}
+DistributedBackend::DistributedBackend(FileOfRanks& file, NeighbourSource source, Ranks& ranks)
+    : Backend(file.area, Want::polygons | Want::dual), ranks_(ranks), source_(source), domain_(file.domain),
+      stays_(true), area_(file.area), part_(std::move(file.part)) {}
 
 DistributedBackend::~DistributedBackend() {
   try {
-    ranks_.together([&] { ranks_.broadcast(bytes_of(Command{Command::Kind::drop, domain_, {}, {}, 0, 1})); });
+    ranks_.together([&] { ranks_.broadcast(bytes_of({.kind = Command::Kind::drop, .domain = domain_})); });
   } catch (...) {
     // Ranks keep a part that nobody asks for again.
   }
@@ -183,7 +159,7 @@ BackendDescription DistributedBackend::description() const {
 std::vector<PartFigures> DistributedBackend::figures() {
   std::vector<PartFigures> figures;
   ranks_.together([&] {
-    ranks_.broadcast(bytes_of(Command{Command::Kind::figures, domain_, {}, {}, 0, 1}));
+    ranks_.broadcast(bytes_of({.kind = Command::Kind::figures, .domain = domain_}));
     figures = ranks_.gather(part_->figures());
   });
   return figures;
@@ -194,7 +170,12 @@ EvaluationReport DistributedBackend::compute(const std::vector<Vec3>& seeds, Wan
   const double halo = kFirstHalo * std::sqrt(area_ / static_cast<double>(seeds.size()));
   const std::uint64_t number = stays_ ? ++diagrams_ : 0;
   ranks_.together([&] {
-    ranks_.broadcast(bytes_of(Command{Command::Kind::evaluate, domain_, source_, want, halo, thread_count(), number}));
+    ranks_.broadcast(bytes_of({.kind = Command::Kind::evaluate,
+                               .domain = domain_,
+                               .source = source_,
+                               .want = want,
+                               .halo = halo,
+                               .number = number}));
     const PairCounts counts = part_->evaluate(ranks_, seeds, source_, want, halo, number, diagram);
     report.certification.pairs = counts.pairs;
     report.certification.uncertain = report.certification.cpu = counts.uncertain;
@@ -208,8 +189,8 @@ void DistributedBackend::project(const CellMoments& cells, std::span<const SeedP
   if (!stays_) return Backend::project(cells, places, seeds, normals);
   std::vector<Foot> feet;
   ranks_.together([&] {
-    ranks_.broadcast(bytes_of(Command{Command::Kind::project, domain_, {}, {}, 0, thread_count(), cells.number}));
-    feet = part_->project(ranks_, cells.number, {seeds.begin(), seeds.end()});
+    ranks_.broadcast(bytes_of({.kind = Command::Kind::project, .domain = domain_, .number = cells.number}));
+    feet = part_->project(ranks_, cells.number, seeds);
   });
   normals.resize(seeds.size());
   parallel_each(feet.size(), [&](std::size_t k) {

@@ -14,6 +14,13 @@
 
 namespace bisector {
 
+// What rank 0 knows of a surface that all have read in parts.
+struct FileOfRanks : DividedSurface {
+  std::uint64_t domain = 0;
+};
+// On rank 0: lets all ranks read the file, as read_divided() does. Throws RankFailed, too.
+FileOfRanks read_on_all(const std::string& path, std::size_t wanted, Ranks& ranks);
+
 // On rank 0: gives the bits of CpuBackend while all ranks compute. The others have to be in serve(). Throws RankFailed
 // where another rank has failed; the backend goes on to work if the rank does.
 class DistributedBackend : public Backend {
@@ -21,8 +28,8 @@ class DistributedBackend : public Backend {
   // Facets are divided among the ranks so that each has about the same number of them and the same mass. The ranks must
   // outlive the backend.
   DistributedBackend(const Surface& surface, NeighbourSource source, Ranks& ranks);
-  // All ranks read the surface from a PLY file, and none has all of it: there is no surface(). See read_divided().
-  DistributedBackend(const std::string& path, std::size_t wanted, NeighbourSource source, Ranks& ranks);
+  // Of a surface that the ranks have read in parts. There is no surface(). The part is taken.
+  DistributedBackend(FileOfRanks& file, NeighbourSource source, Ranks& ranks);
   ~DistributedBackend() override;
 
   BackendDescription description() const override;
@@ -31,8 +38,6 @@ class DistributedBackend : public Backend {
   Want projected() const override { return stays_ ? Want::moments : Want::triangles; }
   void project(const CellMoments& cells, std::span<const SeedPlace> places, std::span<Vec3> seeds,
                std::vector<Vec3>& normals) override;
-  // What is known of a surface that was read in parts; its `part` is not there.
-  DividedSurface& divided() { return divided_; }
   // Of the last diagram, by rank.
   std::vector<PartFigures> figures();
 
@@ -40,19 +45,11 @@ class DistributedBackend : public Backend {
   EvaluationReport compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) override;
 
  private:
-  struct ReadSurface {
-    DividedSurface divided;
-    std::uint64_t domain;
-  };
-  static ReadSurface read(const std::string& path, std::size_t wanted, Ranks& ranks);
-  DistributedBackend(ReadSurface surface, NeighbourSource source, Ranks& ranks);
-
   Ranks& ranks_;
   NeighbourSource source_;
   std::uint64_t domain_;
   bool stays_ = false;  // the surface stays where it was read
   double area_;
-  DividedSurface divided_;
   std::unique_ptr<PartDiagram> part_;
   std::uint64_t diagrams_ = 0;
 };

@@ -24,19 +24,19 @@ void KeptCells::keep(std::uint64_t number, std::vector<Index> ids, Csr<Index> tr
   kept_.push_back({number, std::move(ids), std::move(triangles), std::move(known_by)});
 }
 
-std::vector<Foot> KeptCells::project(Ranks& ranks, std::uint64_t number, const std::vector<Vec3>& seeds,
+std::vector<Foot> KeptCells::project(Ranks& ranks, std::uint64_t number, std::span<const Vec3> seeds,
                                      const Surface* surface, const std::vector<Index>& triangle) {
   const auto kept = std::find_if(kept_.begin(), kept_.end(), [&](const Cells& k) { return k.number == number; });
   if (kept == kept_.end()) throw std::logic_error("seeds are projected to cells that are no longer known");
   projected_ = number;
-  std::vector<std::string> to(static_cast<std::size_t>(ranks.size()));
-  for (std::size_t r = 0; r < kept->known_by.size(); ++r) {
+  std::vector<std::string> positions;
+  for (const std::vector<Index>& known : kept->known_by) {
     std::vector<Vec3> some;
-    for (const Index id : kept->known_by[r]) some.push_back(seeds[id]);
-    to[r] = ByteWriter().put_all(some).take();
+    for (const Index id : known) some.push_back(seeds[id]);
+    positions.push_back(ByteWriter().put_all(some).take());
   }
   std::vector<Vec3> mine;
-  ByteReader(ranks.exchange(std::move(to)).front()).get_all(mine);
+  ByteReader(ranks.scatter(std::move(positions))).get_all(mine);
 
   std::vector<Foot> feet(mine.size());
   parallel_each(
@@ -52,12 +52,8 @@ std::vector<Foot> KeptCells::project(Ranks& ranks, std::uint64_t number, const s
       },
       kSeedsAtOnce);
   std::erase_if(feet, [](const Foot& foot) { return foot.seed == kNone; });
-  to.assign(static_cast<std::size_t>(ranks.size()), {});
-  to.front() = ByteWriter().put_all(feet).take();
-  const std::vector<std::string> received = ranks.exchange(std::move(to));
   std::vector<Foot> all, some;
-  if (!ranks.is_root()) return all;
-  for (const std::string& message : received) {
+  for (const std::string& message : ranks.collect(ByteWriter().put_all(feet).take())) {
     ByteReader(message).get_all(some);
     append_range(all, some, 0, some.size());
   }

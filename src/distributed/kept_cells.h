@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bisector/mesh.h"
@@ -28,7 +29,7 @@ class KeptCells {
   // Takes part in projecting `seeds`, which only rank 0 knows. Returns there one foot for each seed whose cell has
   // triangles, in ascending order. `surface`: this rank's, or null, with the index of each of its triangles in the
   // whole mesh.
-  std::vector<Foot> project(Ranks& ranks, std::uint64_t number, const std::vector<Vec3>& seeds, const Surface* surface,
+  std::vector<Foot> project(Ranks& ranks, std::uint64_t number, std::span<const Vec3> seeds, const Surface* surface,
                             const std::vector<Index>& triangle);
 
  private:

@@ -94,7 +94,8 @@ PairCounts PartDiagram::evaluate(Ranks& ranks, const std::vector<Vec3>& seeds, N
   figures_.untiled = wants_dual && surface_ ? count_untiled(*surface_, local_.polygons) : 0;
   if (wants_dual || wants_polygons) rename_polygons();
   if (wants_dual) collect_dual(ranks, extract_dual(local_.polygons), diagram.dual);
-  if (wants_polygons) collect_polygons(ranks, std::exchange(local_.polygons, {}), diagram.polygons);
+  if (wants_polygons) collect_polygons(ranks, std::move(local_.polygons), diagram.polygons);
+  local_.polygons = {};
   PairCounts counts;
   for (const PairCounts& of_rank : ranks.gather(counts_)) counts += of_rank;
   figures_.facets = surface_ ? surface_->facets.size() : 0;
@@ -122,13 +123,15 @@ void PartDiagram::meet_seeds(Ranks& ranks, SeedShares& to_share, const std::vect
   for (bool waits = true;;) {
     const std::vector<Request> requests = ranks.gather(Request{box_, halo_, all.size(), waits});
     if (std::none_of(requests.begin(), requests.end(), [](const Request& r) { return r.waits; })) return;
-    std::vector<std::string> shares(requests.size());
+    std::vector<std::string> shares;
     if (ranks.is_root())
-      for (std::size_t r = 0; r < requests.size(); ++r)
-        if (requests[r].waits) shares[r] = to_share.share(static_cast<int>(r), requests[r].box, requests[r].halo, all);
-    const std::vector<std::string> received = ranks.exchange(std::move(shares));
+      for (std::size_t r = 0; r < requests.size(); ++r) {
+        const Request& request = requests[r];
+        shares.push_back(request.waits ? to_share.share(static_cast<int>(r), request.box, request.halo, all) : "");
+      }
+    const std::string received = ranks.scatter(std::move(shares));
     if (!waits) continue;
-    receive(received.front());
+    receive(received);
     ++figures_.rounds;
     trace(source, want);
     const double needed = needed_halo(requests.front().seeds);
@@ -146,9 +149,9 @@ void PartDiagram::receive(const std::string& message) {
 
 void PartDiagram::trace(NeighbourSource source, Want want) {
   counts_ = {};
-  local_ = {};
+  home_.clear();
   if (x_.empty()) {
-    home_.clear();
+    local_ = {};
     return;
   }
   if (voronoi_) {
@@ -157,7 +160,6 @@ void PartDiagram::trace(NeighbourSource source, Want want) {
     sorted_ = sort_seeds(x_);
     lists_.build(sorted_, NeighbourSource::nearest);
   }
-  home_.clear();
   for (Index slot = 0; slot < seeds().x.size(); ++slot)
     if (regions_.at(seeds().x[slot]) == rank_) home_.push_back(slot);
 }
@@ -258,13 +260,8 @@ std::vector<PartDiagram::Term> PartDiagram::fetch_terms(Ranks& ranks) const {
             {id_of(slot), triangle_[surface_->summaries[polygon.facet].triangle], polygon.moments});
     }
   }
-  std::vector<std::string> messages;
-  for (std::vector<Term>& some : terms) messages.push_back(ByteWriter().put_all(std::exchange(some, {})).take());
-  std::vector<Term> fetched, some;
-  for (const std::string& message : ranks.exchange(std::move(messages))) {
-    ByteReader(message).get_all(some);
-    append_range(fetched, some, 0, some.size());
-  }
+  std::vector<Term> fetched;
+  for (const std::vector<Term>& some : ranks.exchange(std::move(terms))) append_range(fetched, some, 0, some.size());
   sort_in_parallel(fetched, [](const Term& a, const Term& b) {
     return a.seed != b.seed ? a.seed < b.seed : a.triangle < b.triangle;
   });
@@ -332,29 +329,22 @@ void PartDiagram::set_step_masses(Ranks& ranks) {
   for (const Nearby& nearby : small)
     for (const Index slot : std::span(nearby.slots, nearby.count))
       if (cell_of[slot] == kNone) asked[static_cast<std::size_t>(regions_.at(s.x[slot]))].push_back(id_of(slot));
-  std::vector<std::string> questions, answers;
   for (std::vector<Index>& ids : asked) {
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-    questions.push_back(ByteWriter().put_all(ids).take());
   }
   const auto slot_of = [&](Index id) {
     return s.slot[static_cast<std::size_t>(std::lower_bound(ids_.begin(), ids_.end(), id) - ids_.begin())];
   };
-  for (const std::string& question : ranks.exchange(std::move(questions))) {
-    std::vector<Index> ids;
-    ByteReader(question).get_all(ids);
-    std::vector<double> masses;
+  std::vector<std::vector<double>> masses_here;
+  for (const std::vector<Index>& ids : ranks.exchange(asked)) {
+    std::vector<double>& masses = masses_here.emplace_back();
     for (const Index id : ids) masses.push_back(at_home_.cells[cell_of[slot_of(id)]].mass);
-    answers.push_back(ByteWriter().put_all(masses).take());
   }
   std::vector<double> mass_elsewhere(cell_of.size());  // of slots that were asked for
-  const std::vector<std::string> received = ranks.exchange(std::move(answers));
-  for (std::size_t r = 0; r < received.size(); ++r) {
-    std::vector<double> masses;
-    ByteReader(received[r]).get_all(masses);
-    for (std::size_t k = 0; k < masses.size(); ++k) mass_elsewhere[slot_of(asked[r][k])] = masses[k];
-  }
+  const std::vector<std::vector<double>> answers = ranks.exchange(std::move(masses_here));
+  for (std::size_t r = 0; r < answers.size(); ++r)
+    for (std::size_t k = 0; k < answers[r].size(); ++k) mass_elsewhere[slot_of(asked[r][k])] = answers[r][k];
 
   at_home_.step_mass.resize(home_.size());
   for (std::size_t h = 0; h < home_.size(); ++h) at_home_.step_mass[h] = at_home_.cells[h].mass;

@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "bisector/cells.h"
@@ -29,13 +30,6 @@
 #include "voronoi/surface.h"
 
 namespace bisector {
-
-// What a rank holds of a surface.
-struct SurfacePart {
-  TriangleMesh mesh;            // vertices in the order of the whole mesh
-  std::vector<double> density;  // of the vertices; empty means 1
-  std::vector<Index> triangle;  // of each of mesh.triangles, its index in the whole mesh; ascending
-};
 
 // What a rank has, and what its last diagram took.
 struct PartFigures {
@@ -62,7 +56,7 @@ class PartDiagram {
                       std::uint64_t number, Diagram& diagram);
   // Takes part in projecting `seeds`, which only rank 0 knows, to the triangles of their cells in the diagram of this
   // number: the last that was kept, or the one that was projected to last (distributed/kept_cells.h).
-  std::vector<Foot> project(Ranks& ranks, std::uint64_t number, const std::vector<Vec3>& seeds) {
+  std::vector<Foot> project(Ranks& ranks, std::uint64_t number, std::span<const Vec3> seeds) {
     return kept_.project(ranks, number, seeds, surface_ ? &*surface_ : nullptr, triangle_);
   }
   PartFigures figures() const { return figures_; }

@@ -67,10 +67,17 @@ class PartReader {
     end_ = begin_ + n / size + (rank < n % size);
   }
 
-  void measure(DividedSurface& result);
-  void join(double cube, const Box& box, TriangleMesh& result) const;
-  SurfacePart fetch_part(const Regions& regions) const;
+  const io::PlyParts& file() const { return file_; }
+  struct Extent {
+    Box box;
+    double area;
+  };
+  // Of the whole surface, the same for any number of ranks.
+  Extent measure() const;
+  // The stand-in, on rank 0.
+  TriangleMesh join(double cube, const Box& box) const;
   Regions divide() const;
+  SurfacePart fetch_part(const Regions& regions) const;
 
  private:
   using Corners = std::array<Vec3, 3>;
@@ -87,9 +94,7 @@ class PartReader {
   std::size_t begin_, end_;  // triangles that this rank reads
 };
 
-void PartReader::measure(DividedSurface& result) {
-  result.vertices = file_.vertices();
-  result.triangles = file_.triangles();
+PartReader::Extent PartReader::measure() const {
   std::vector<double> areas(end_ - begin_);
   std::vector<Box> boxes((areas.size() + kTrianglesAtOnce - 1) / kTrianglesAtOnce + 1);
   const Vec3 first = corners(0)[0];
@@ -107,9 +112,9 @@ void PartReader::measure(DividedSurface& result) {
   for (const Box& box : boxes) ends.insert(ends.end(), {box.lo, box.hi});
   const Box mine = bounding_box(ends);
   for (const Box& box : ranks_.gather(mine)) ends.insert(ends.end(), {box.lo, box.hi});
-  result.box = bounding_box(ends);
-  result.area = sum_of_all(ranks_, areas.size(), [&](std::size_t k) { return areas[k]; });
-  if (!(result.area > 0)) throw Error("the mesh has no triangle with area; there is nothing to mesh");
+  const double sum = sum_of_all(ranks_, areas.size(), [&](std::size_t k) { return areas[k]; });
+  if (!(sum > 0)) throw Error("the mesh has no triangle with area; there is nothing to mesh");
+  return {bounding_box(ends), sum};
 }
 
 // Every so many triangles stand for those about them.
@@ -124,9 +129,7 @@ Regions PartReader::divide() const {
     const Corners c = corners(t);
     samples.push_back({centre(c), area(c)});
   }
-  std::vector<std::string> to(static_cast<std::size_t>(ranks_.size()));
-  to.front() = ByteWriter().put_all(samples).take();
-  const std::vector<std::string> received = ranks_.exchange(std::move(to));
+  const std::vector<std::string> received = ranks_.collect(ByteWriter().put_all(samples).take());
   std::string nodes;
   if (ranks_.is_root()) {
     std::vector<Vec3> points;
@@ -150,21 +153,13 @@ Regions PartReader::divide() const {
 SurfacePart PartReader::fetch_part(const Regions& regions) const {
   std::vector<std::vector<NamedTriangle>> leaving(static_cast<std::size_t>(ranks_.size()));
   for (std::size_t t = begin_; t < end_; ++t) {
-    const Triangle v = file_.triangle(t);
-    const Corners c{file_.vertex(v[0]), file_.vertex(v[1]), file_.vertex(v[2])};
-    leaving[static_cast<std::size_t>(regions.at(centre(c)))].push_back({static_cast<Index>(t), v});
+    const int rank = regions.at(centre(corners(t)));
+    leaving[static_cast<std::size_t>(rank)].push_back({static_cast<Index>(t), file_.triangle(t)});
   }
-  std::vector<std::string> messages;
-  for (auto& some : leaving) messages.push_back(ByteWriter().put_all(std::exchange(some, {})).take());
-  std::vector<std::string> received = ranks_.exchange(std::move(messages));
   // Ranks read ascending ranges, so triangles come in their order.
-  std::vector<NamedTriangle> mine, some;
-  for (std::string& message : received) {
-    ByteReader(message).get_all(some);
-    message = {};
+  std::vector<NamedTriangle> mine;
+  for (const std::vector<NamedTriangle>& some : ranks_.exchange(std::move(leaving)))
     append_range(mine, some, 0, some.size());
-  }
-  some = {};
 
   SurfacePart part;
   std::vector<Index> used;
@@ -185,7 +180,7 @@ SurfacePart PartReader::fetch_part(const Regions& regions) const {
   return part;
 }
 
-void PartReader::join(double cube, const Box& box, TriangleMesh& result) const {
+TriangleMesh PartReader::join(double cube, const Box& box) const {
   constexpr double kMost = (std::uint64_t{1} << kCubeBits) - 1;
   const auto cube_of = [&](const Vec3& p) {
     Cube key = 0;
@@ -210,10 +205,7 @@ void PartReader::join(double cube, const Box& box, TriangleMesh& result) const {
   known = {};
   std::vector<Corner> corners;
   for (const auto& [key, vertex] : first) corners.push_back({key, vertex, file_.vertex(vertex)});
-  std::vector<std::string> to(static_cast<std::size_t>(ranks_.size()));
-  to.front() = ByteWriter().put_all(corners).put_all(triangles).take();
-  const std::vector<std::string> received = ranks_.exchange(std::move(to));
-  if (ranks_.is_root()) result = merge(received);
+  return merge(ranks_.collect(ByteWriter().put_all(corners).put_all(triangles).take()));
 }
 
 TriangleMesh PartReader::merge(const std::vector<std::string>& messages) const {
@@ -258,15 +250,17 @@ TriangleMesh PartReader::merge(const std::vector<std::string>& messages) const {
 }  // namespace
 
 DividedSurface read_divided(Ranks& ranks, const std::string& path, std::size_t wanted) {
+  const PartReader reader(ranks, path);
   DividedSurface result;
-  PartReader reader(ranks, path);
-  reader.measure(result);
-  const double edge = std::sqrt(2 / std::numbers::sqrt3 * result.area / static_cast<double>(wanted));
-  const double least = result.box.diagonal() / (std::uint64_t{1} << (kCubeBits - 1));
-  reader.join(std::max(kCube * edge, least), result.box, result.stand_in);
+  result.vertices = reader.file().vertices();
+  result.triangles = reader.file().triangles();
+  const auto [box, area] = reader.measure();
+  const double edge = std::sqrt(2 / std::numbers::sqrt3 * area / static_cast<double>(wanted));
+  const double least = box.diagonal() / (std::uint64_t{1} << (kCubeBits - 1));
+  result.stand_in = reader.join(std::max(kCube * edge, least), box);
   const Regions regions = reader.divide();
   result.part = std::make_unique<PartDiagram>(reader.fetch_part(regions), regions, ranks.rank());
-  // As the diagram's cells have it.
+  // As the diagram's cells sum it.
   result.area = result.part->total_mass(ranks);
   return result;
 }

@@ -6,17 +6,15 @@
 #include <string>
 
 #include "bisector/mesh.h"
-#include "core/geometry.h"
 #include "distributed/part_diagram.h"
 #include "distributed/ranks.h"
 
 namespace bisector {
 
 struct DividedSurface {
-  std::unique_ptr<PartDiagram> part;  // this rank's
-  std::size_t vertices = 0, triangles = 0;
-  double area = 0;  // the same for any number of ranks
-  Box box;
+  std::unique_ptr<PartDiagram> part;        // this rank's
+  std::size_t vertices = 0, triangles = 0;  // of the file
+  double area = 0;                          // the same for any number of ranks
   // On rank 0: a surface of far fewer triangles near this one, for seeds to find their places on. All vertices in a
   // cube of a grid are joined in the first of them (Rossignac and Borrel 1993), so that it has holes, fins and folds.
   TriangleMesh stand_in;

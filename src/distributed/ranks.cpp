@@ -39,9 +39,20 @@ std::vector<std::string> Ranks::exchange(std::vector<std::string> to) {
 }
 
 std::string Ranks::broadcast(std::string message) {
+  if (!is_root()) return scatter({});
+  return scatter(std::vector<std::string>(static_cast<std::size_t>(size()), message));
+}
+
+std::string Ranks::scatter(std::vector<std::string> messages) {
+  messages.resize(static_cast<std::size_t>(size()));
+  return std::move(exchange(std::move(messages)).front());
+}
+
+std::vector<std::string> Ranks::collect(std::string message) {
   std::vector<std::string> to(static_cast<std::size_t>(size()));
-  if (is_root()) to.assign(to.size(), message);
-  return std::move(exchange(std::move(to)).front());
+  to.front() = std::move(message);
+  std::vector<std::string> received = exchange(std::move(to));
+  return is_root() ? std::move(received) : std::vector<std::string>();
 }
 
 void Ranks::tell_failure() noexcept {

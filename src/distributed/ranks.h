@@ -5,9 +5,11 @@
 #include <cstring>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "bisector/error.h"
+#include "checkpoint/bytes.h"
 #include "distributed/communicator.h"
 
 namespace bisector {
@@ -34,10 +36,17 @@ class Ranks {
   template <class Body>
   void together(const Body& body);
 
-  // One message to each rank, given by rank. Returns those from each. Throws RankFailed.
+  // One message to each rank, given by rank. Returns those from each. Throws RankFailed, as do those below.
   std::vector<std::string> exchange(std::vector<std::string> to);
+  // The same with lists.
+  template <class T>
+  std::vector<std::vector<T>> exchange(std::vector<std::vector<T>> to);
   // Rank 0's message.
   std::string broadcast(std::string message);
+  // Rank 0's messages, one for each rank; the others give none.
+  std::string scatter(std::vector<std::string> messages);
+  // On rank 0 the messages of all, by rank; on the others nothing.
+  std::vector<std::string> collect(std::string message);
   // One value of each rank, by rank.
   template <class T>
   std::vector<T> gather(const T& value);
@@ -59,6 +68,19 @@ void Ranks::together(const Body& body) {
     tell_failure();
     throw;
   }
+}
+
+template <class T>
+std::vector<std::vector<T>> Ranks::exchange(std::vector<std::vector<T>> to) {
+  std::vector<std::string> messages;
+  for (std::vector<T>& some : to) messages.push_back(ByteWriter().put_all(std::exchange(some, {})).take());
+  messages = exchange(std::move(messages));
+  std::vector<std::vector<T>> received(messages.size());
+  for (std::size_t r = 0; r < messages.size(); ++r) {
+    ByteReader(messages[r]).get_all(received[r]);
+    messages[r] = {};
+  }
+  return received;
 }
 
 template <class T>

@@ -40,7 +40,7 @@ void RemeshPartsJob::add_options(CLI::App* app) {
       ->required()
       ->group("Seeds");
   add_random_seed(app, options_.random_seed, "another number, another start; default 1")->group("Seeds");
-  add_words(app, "--energy", energy_, kPlainEnergyWords, "ccvt (seeds on the surface; default) or rcvt (free)")
+  add_words(app, "--energy", options_.energy, kPlainEnergyWords, "ccvt (seeds on the surface; default) or rcvt (free)")
       ->group("Optimisation");
   add_iterations(app, options_.iterations,
                  "at most so many per level, and no more than 30 on the\n"
@@ -48,7 +48,7 @@ void RemeshPartsJob::add_options(CLI::App* app) {
   add_tolerance(app, options_.tolerance,
                 "end a level when the energy falls by less than this\n"
                 "share per iteration; default 1e-6");
-  add_words(app, "--neighbors", options_.neighbours, kNeighbourWords,
+  add_words(app, "--neighbors", options_.compute.neighbours, kNeighbourWords,
             "where neighbours of seeds come from: auto, nearest or\n"
             "delaunay; the result is the same")
       ->group("Computation");
@@ -57,7 +57,6 @@ void RemeshPartsJob::add_options(CLI::App* app) {
 
 void RemeshPartsJob::compute(Journal& journal) {
   journal.phase("reading " + input + " in parts");
-  options_.constrained = energy_ != Energy::restricted;
   result = remesh_parts(input, options_, journal.context());
   if (result.untiled > 0)
     throw Error(fmt::format("the final diagram does not tile {} of the input; please report this as a bug",

@@ -13,6 +13,7 @@ namespace bisector::job {
 
 class RemeshPartsJob final : public Job {
  public:
+  RemeshPartsJob() { options_.energy = Energy::constrained; }
   const char* command() const override { return "remesh-parts"; }
   InputKind input_kind() const override { return {"IN", "surface, binary, of triangles only", {".ply"}}; }
   std::vector<OutputKind> outputs() const override;
@@ -27,8 +28,7 @@ class RemeshPartsJob final : public Job {
   QualityReport quality;
 
  private:
-  PartsOptions options_;
-  Energy energy_ = Energy::constrained;
+  RemeshOptions options_;
 };
 
 }  // namespace bisector::job

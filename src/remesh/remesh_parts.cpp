@@ -35,48 +35,45 @@ class RanksOfRun {
 };
 
 // Seeds that are well placed on what stands in.
-std::vector<Vec3> first_seeds(TriangleMesh stand_in, const PartsOptions& options, Ranks& ranks, const Context& context,
+std::vector<Vec3> first_seeds(TriangleMesh stand_in, const RemeshOptions& options, Ranks& ranks, const Context& context,
                               PartsResult& result) {
   const Surface surface(std::move(stand_in));
-  DistributedBackend backend(surface, options.neighbours, ranks);
-  RemeshPlan plan;
-  plan.vertices = options.vertices;
-  plan.random_seed = options.random_seed;
-  plan.iterations = options.iterations;
-  plan.tolerance = options.tolerance;
-  plan.constrained = options.constrained;
+  const MakeBackend make_backend = [&](const Surface& domain) -> std::unique_ptr<Backend> {
+    return std::make_unique<DistributedBackend>(domain, options.compute.neighbours, ranks);
+  };
+  RemeshPlan plan = plan_of(options);
   plan.topology = TopologyControl::off;
   plan.min_angle = 0;
-  Context quieter = context;
+  plan.fit = false;
+  Context on_stand_in = context;
   if (context.progress)
-    quieter.progress = [tell = context.progress](Progress p) {
+    on_stand_in.progress = [tell = context.progress](Progress p) {
       p.phase = "stand-in, " + p.phase;
       p.fraction *= kShareOfStandIn;
       tell(p);
     };
-  RemeshResult placed = remesh(backend, {}, plan, quieter, [&](const Surface& coarser) -> std::unique_ptr<Backend> {
-    return std::make_unique<DistributedBackend>(coarser, options.neighbours, ranks);
-  });
+  const std::unique_ptr<Backend> backend = make_backend(surface);
+  RemeshResult placed = remesh(*backend, {}, plan, on_stand_in, make_backend);
   result.iterations += placed.iterations;
   return std::move(placed.mesh.vertices);
 }
 
 }  // namespace
 
-PartsResult remesh_parts(const std::string& path, const PartsOptions& options, const Context& context) {
+PartsResult remesh_parts(const std::string& path, const RemeshOptions& options, const Context& context) {
   if (options.vertices < 4) throw Error("a surface takes at least 4 vertices; ask for more");
   PartsResult result;
   RanksOfRun ranks;
   Stopwatch watch;
-  DistributedBackend backend(path, options.vertices, options.neighbours, ranks.get());
-  DividedSurface& surface = backend.divided();
-  result.input_vertices = surface.vertices;
-  result.input_triangles = surface.triangles;
-  result.area = surface.area;
-  result.stand_in_triangles = surface.stand_in.triangles.size();
+  FileOfRanks file = read_on_all(path, options.vertices, ranks.get());
+  DistributedBackend backend(file, options.compute.neighbours, ranks.get());
+  result.input_vertices = file.vertices;
+  result.input_triangles = file.triangles;
+  result.area = file.area;
+  result.stand_in_triangles = file.stand_in.triangles.size();
   result.seconds_reading = watch.lap();
   context.check();
-  std::vector<Vec3> seeds = first_seeds(std::exchange(surface.stand_in, {}), options, ranks.get(), context, result);
+  std::vector<Vec3> seeds = first_seeds(std::move(file.stand_in), options, ranks.get(), context, result);
   result.seconds_stand_in = watch.lap();
 
   const FeatureGraph no_features;
@@ -84,9 +81,9 @@ PartsResult remesh_parts(const std::string& path, const PartsOptions& options, c
   CvtRun run(backend, no_curves, context);
   run.seeds = PlacedSeeds(std::move(seeds));
   OptimiseOptions step;
-  step.iterations = std::min(options.iterations, PartsOptions::kIterationsOnAll);
+  step.iterations = std::min(options.iterations, kIterationsOnAll);
   step.tolerance = options.tolerance;
-  step.constrained = options.constrained;
+  step.constrained = plan_of(options).constrained;
   step.phase = "whole surface";
   step.done = kShareOfStandIn;
   step.share = 1 - kShareOfStandIn;

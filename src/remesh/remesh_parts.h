@@ -1,7 +1,7 @@
 // Remeshing a surface that is too large for one process.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <string>
 
 #include "bisector/context.h"
@@ -10,16 +10,8 @@
 
 namespace bisector {
 
-struct PartsOptions {
-  std::size_t vertices = 0;  // of the result, at least 4
-  std::uint64_t random_seed = 1;
-  bool constrained = true;  // seeds end on the surface (CCVT)
-  // Of the seeds on what stands in for the surface, per level; then at most kIterationsOnAll on the surface itself.
-  int iterations = 100;
-  double tolerance = 1e-6;
-  NeighbourSource neighbours = NeighbourSource::nearest;
-  static constexpr int kIterationsOnAll = 30;
-};
+// Steps on the surface itself, at most; those before are as many as the options allow.
+inline constexpr int kIterationsOnAll = 30;
 
 struct PartsResult {
   TriangleMesh mesh;
@@ -40,7 +32,8 @@ struct PartsResult {
 // Seeds find their places on a surface of fewer triangles (see DividedSurface::stand_in), then on the PLY file's own,
 // of which each rank of the run has a part; the result is the dual of their diagram on that. Edges are of one length,
 // features other than borders are not looked for, and topology is not compared. The bytes do not tell how many ranks
-// there are. Throws Error and Cancelled.
-PartsResult remesh_parts(const std::string& path, const PartsOptions& options, const Context& context = {});
+// there are. Of the options the number of vertices, the random seed, iterations, tolerance, levels, energy and the
+// source of neighbours count. Throws Error and Cancelled.
+PartsResult remesh_parts(const std::string& path, const RemeshOptions& options, const Context& context = {});
 
 }  // namespace bisector

@@ -109,4 +109,23 @@ Surface::Surface(TriangleMesh given, std::vector<double> given_density)
   mass = fixed_sum(facets.size(), [&](std::size_t k) { return summaries[k].moments.mass; });
 }
 
+SurfacePart part_of(const Surface& whole, std::vector<Index> triangles) {
+  SurfacePart part;
+  std::vector<Index> vertex(whole.mesh.vertices.size(), kNone);
+  for (const Index t : triangles)
+    for (const Index v : whole.mesh.triangles[t]) vertex[v] = 0;
+  for (std::size_t v = 0; v < vertex.size(); ++v) {
+    if (vertex[v] == kNone) continue;
+    vertex[v] = static_cast<Index>(part.mesh.vertices.size());
+    part.mesh.vertices.push_back(whole.mesh.vertices[v]);
+    if (!whole.density.empty()) part.density.push_back(whole.density[v]);
+  }
+  for (const Index t : triangles) {
+    const auto& [a, b, c] = whole.mesh.triangles[t];
+    part.mesh.triangles.push_back({vertex[a], vertex[b], vertex[c]});
+  }
+  part.triangle = std::move(triangles);
+  return part;
+}
+
 }  // namespace bisector

@@ -56,4 +56,14 @@ struct Surface {
   const FacetDensity* density_of(std::size_t facet) const { return densities.empty() ? nullptr : &densities[facet]; }
 };
 
+// Some triangles of a surface. Vertices and triangles keep their order, by which ties are broken.
+struct SurfacePart {
+  TriangleMesh mesh;
+  std::vector<double> density;  // of the vertices; empty means 1
+  std::vector<Index> triangle;  // of each of mesh.triangles, its index in the whole mesh; ascending
+};
+
+// `triangles`: those of the whole surface, ascending.
+SurfacePart part_of(const Surface& whole, std::vector<Index> triangles);
+
 }  // namespace bisector

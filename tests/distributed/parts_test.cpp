@@ -109,8 +109,8 @@ TEST_F(Parts, MakeUpTheWhole) {
   for (const std::size_t size : {1, 2, 5}) {
     SCOPED_TRACE(size);
     ThreadRanks ranks(size);
-    DistributedBackend backend(path, 400, NeighbourSource::nearest, ranks.root());
-    const DividedSurface& divided = backend.divided();
+    FileOfRanks divided = read_on_all(path, 400, ranks.root());
+    DistributedBackend backend(divided, NeighbourSource::nearest, ranks.root());
     EXPECT_EQ(divided.vertices, mesh.vertices.size());
     EXPECT_EQ(divided.triangles, mesh.triangles.size());
     EXPECT_NEAR(divided.area, Surface(mesh).area, 1e-13 * divided.area);
@@ -140,7 +140,8 @@ TEST_F(Parts, GiveTheCpusDiagramAndDual) {
   CpuBackend cpu(surface, NeighbourSource::nearest);
   for (const std::size_t size : {1, 3}) {
     ThreadRanks ranks(size);
-    DistributedBackend backend(path, 500, NeighbourSource::nearest, ranks.root());
+    FileOfRanks file = read_on_all(path, 500, ranks.root());
+    DistributedBackend backend(file, NeighbourSource::nearest, ranks.root());
     for (const std::uint64_t random : {1, 2}) {
       const std::vector<Vec3> seeds = random_seeds(mesh, 500, random);
       const Want want = Want::polygons | Want::dual;
@@ -169,7 +170,8 @@ TEST_F(Parts, DescendAsTheCpuDoes) {
   optimise(reference.run, options);
   for (const std::size_t size : {1, 3}) {
     ThreadRanks ranks(size);
-    DistributedBackend backend(path, 400, NeighbourSource::nearest, ranks.root());
+    FileOfRanks file = read_on_all(path, 400, ranks.root());
+    DistributedBackend backend(file, NeighbourSource::nearest, ranks.root());
     FreeRun found(backend, seeds);
     optimise(found.run, options);
     EXPECT_EQ(found.run.totals.iterations, reference.run.totals.iterations);
@@ -180,7 +182,7 @@ TEST_F(Parts, DescendAsTheCpuDoes) {
 
 TEST_F(Parts, AreRemeshedAlikeByAnyNumberOfRanks) {
   const std::string path = write(torus(200, 120));
-  PartsOptions options;
+  RemeshOptions options;
   options.vertices = 1000;
   const PartsResult reference = remesh_parts(path, options);
   EXPECT_EQ(reference.untiled, 0u);
