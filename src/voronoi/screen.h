@@ -15,6 +15,9 @@ namespace bisector {
 typedef float FourFloats __attribute__((vector_size(4 * sizeof(float)), may_alias));
 typedef std::int32_t FourMasks __attribute__((vector_size(4 * sizeof(float))));
 
+// More than all that underflow takes from a product in single precision, or from half a square.
+inline constexpr float kScreenUnderflow = 1e-36f;
+
 // The power of two that scales the seeds' extent to about 1.
 inline double screen_scale(double extent) { return extent > 0 ? std::ldexp(1.0, -std::ilogb(extent)) : 1; }
 
@@ -22,12 +25,11 @@ inline double screen_scale(double extent) { return extent > 0 ? std::ldexp(1.0, 
 struct alignas(16) ScreenBlock {
   float x[4], y[4], z[4], half[4];
 
-  // `half_square` is rounded down by more than float's error, so a bisector that is held to pass does.
   void set(std::size_t m, const Vec3& d, double half_square) {
     x[m] = static_cast<float>(d.x);
     y[m] = static_cast<float>(d.y);
     z[m] = static_cast<float>(d.z);
-    half[m] = static_cast<float>(half_square * (1 - 1e-5));
+    half[m] = static_cast<float>(half_square);
   }
   // For a place without a neighbour.
   void set_none(std::size_t m) {
@@ -48,8 +50,9 @@ struct Reach {
   Reach(double vertices, double slack, double domain, double scale)
       : squared(std::min(domain, vertices * (1 + 1e-6) + 4e6 * (slack * slack))) {
     const double scaling = scale * scale;
-    scaled = static_cast<float>(squared * scaling * (1 + 1e-6));
-    margin = static_cast<float>((4e-6 * squared + 8 * std::sqrt(squared) * slack) * scaling * (1 + 1e-6));
+    scaled = static_cast<float>(squared * scaling * (1 + 1e-6)) + kScreenUnderflow;
+    margin =
+        static_cast<float>((4e-6 * squared + 8 * std::sqrt(squared) * slack) * scaling * (1 + 1e-6)) + kScreenUnderflow;
   }
 
   // The security radius: whether every point is nearer to the seed than to any other at this distance or more.
@@ -60,9 +63,9 @@ struct Reach {
 
 // Bit m is set if bisector m of the block may cut. `each_vertex(test)` calls test(x, y, z) for all vertices.
 //
-// With |d| < 2 r, r the reach, a product as coded is off by less than 2e-6 |d| r < 4e-6 r^2, and by less than 4 r slack
-// for the vertex's own error. Bisectors with |d| >= 2 r do not cut at all. Whatever overflows or is not a number counts
-// as cutting.
+// With |d| < 2 r, r the reach, a product as coded and the limit are off by less than 2e-6 |d| r < 4e-6 r^2 together,
+// and by less than 4 r slack for the vertex's own error. Bisectors with |d| >= 2 r do not cut at all. Whatever
+// overflows or is not a number counts as cutting.
 template <class EachVertex>
 inline unsigned may_cut(const ScreenBlock& block, float margin, const EachVertex& each_vertex) {
   const auto load = [](const float* p) { return *reinterpret_cast<const FourFloats*>(p); };

@@ -306,9 +306,10 @@ INSTANTIATE_TEST_SUITE_P(Parity, Parities, testing::ValuesIn(setups()),
 // Where nearly every decision is a tie.
 TEST_P(Parities, DegenerateDiagramsAreTheCpus) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
-  constexpr std::uint64_t kIntegerCases = 20;
+  constexpr std::uint64_t kIntegerCases = 20, kNearTieCases = 40;
   std::vector<SmallCase> cases = small_cases();
   for (std::uint64_t k = 0; k < kIntegerCases; ++k) cases.push_back(integer_case(k));
+  for (std::uint64_t k = 0; k < kNearTieCases; ++k) cases.push_back(near_tie_case(k));
   for (const auto& [name, mesh, seeds] : cases) {
     SCOPED_TRACE(name);
     std::optional<Surface> surface;

@@ -300,9 +300,10 @@ INSTANTIATE_TEST_SUITE_P(Parity, SolidParities, testing::ValuesIn(solid_setups()
 // Where nearly every decision is a tie.
 TEST_P(SolidParities, DegenerateDiagramsAreTheCpus) {
   SKIP_WITHOUT_DEVICE(GetParam().processor);
-  constexpr std::uint64_t kIntegerCases = 4;
+  constexpr std::uint64_t kIntegerCases = 4, kNearTieCases = 8;
   std::vector<SolidCase> cases = solid_cases();
   for (std::uint64_t k = 0; k < kIntegerCases; ++k) cases.push_back(integer_solid_case(k));
+  for (std::uint64_t k = 0; k < kNearTieCases; ++k) cases.push_back(near_tie_solid_case(k));
   for (const auto& [name, mesh, seeds] : cases) {
     SCOPED_TRACE(name);
     const Solid solid(mesh);

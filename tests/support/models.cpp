@@ -391,7 +391,10 @@ std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, bool slender, 
   constexpr std::array kShares{0.0, 0.0, 1e-15, 1e-13, 1e-9, 1e-7};
   std::vector<Vec3> seeds;
   for (const Vec3& p : points) {
-    const double radius = random.range(0.1, 1), share = kShares[random.below(kShares.size())];
+    // Cells far smaller than what they lie on have vertices of large relative errors.
+    const double decades = random.below(2) ? random.range(0, 6) : 0;
+    const double radius = random.range(0.1, 1) * std::pow(10.0, -decades);
+    const double share = kShares[random.below(kShares.size())];
     const bool parallel = slender && random.below(4) == 0;
     Vec3 direction{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
     const std::size_t count = 3 + random.below(3);
@@ -420,10 +423,17 @@ SmallCase near_tie_case(std::uint64_t random_seed) {
                                      : vertices[random.below(3)]);
   }
   problem.seeds = near_tie_seeds(points, true, random);
-  constexpr std::array kScales{1.0, 1.0, 0x1p-100, 0x1p60};
-  const double scale = kScales[random.below(kScales.size())], away = random.below(2) ? 100 : 0;
+  constexpr std::array kExponents{0, 0, -66, -70, -74, -100, 60};
+  const double scale = std::ldexp(1.0, kExponents[random.below(kExponents.size())]), away = random.below(2) ? 100 : 0;
   for (std::vector<Vec3>* all : {&vertices, &problem.seeds})
     for (Vec3& p : *all) p = scale * (p + Vec3{away, -away, away});
+  // Beside something large single precision no longer has the range for what is small.
+  if (random.below(2)) {
+    const Index first = index_of(vertices.size());
+    vertices.insert(vertices.end(), {{1, 0, 0}, {2, 0, 0}, {1, 1, 0}});
+    problem.mesh.triangles.push_back({first, first + 1, first + 2});
+    problem.seeds.push_back({2, 1, 1});
+  }
   return problem;
 }
 

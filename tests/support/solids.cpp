@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "mesh/tet_topology.h"
 #include "support/models.h"
@@ -292,7 +293,18 @@ SolidCase near_tie_solid_case(std::uint64_t random_seed) {
     }
     points.push_back((1 / weights) * sum);
   }
-  result.seeds = near_tie_seeds(points, false, random);
+  result.seeds = near_tie_seeds(points, true, random);
+  // Beside something large single precision no longer has the range for what is small.
+  constexpr std::array kExponents{0, 0, -66, -70, -74};
+  const double scale = std::ldexp(1.0, kExponents[random.below(kExponents.size())]);
+  for (std::vector<Vec3>* all : {&result.mesh.vertices, &result.seeds})
+    for (Vec3& p : *all) p = scale * p;
+  if (random.below(2)) {
+    const Index first = static_cast<Index>(result.mesh.vertices.size());
+    for (const Vec3& p : single_tet().vertices) result.mesh.vertices.push_back(p + Vec3{10, 0, 0});
+    result.mesh.tets.push_back({first, first + 1, first + 2, first + 3});
+    result.seeds.push_back({11, 1, 1});
+  }
   return result;
 }
 

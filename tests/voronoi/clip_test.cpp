@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "support/models.h"
+#include "voronoi/error_bounds.h"
 #include "voronoi/exact.h"
 
 namespace bisector::test {
@@ -176,8 +177,9 @@ Tally check(const Problem& problem, bool all) {
     const std::size_t n = clipper.size();
     for (std::size_t k = 0; k < n; ++k) {
       const ExactLine before = exact.line(clipper.label((k + n - 1) % n)), after = exact.line(clipper.label(k));
-      const Vec3 error = clipper.vertex(k) - exact_vertex(exact.frame(), before, after);
-      const double largest = std::max({std::abs(error.x), std::abs(error.y), std::abs(error.z)});
+      const Vec3 rounded = exact_vertex(exact.frame(), before, after);
+      // The exact vertex is rounded itself: its quotient, and numerator and denominator before.
+      const double largest = max_coordinate(clipper.vertex(k) - rounded) + 3 * kUnit * max_coordinate(rounded);
       ++tally.vertices;
       if (!(largest <= clipper.slack(k))) ++tally.beyond;
       tally.worst = std::max(tally.worst, largest / clipper.slack(k));
@@ -239,6 +241,21 @@ INSTANTIATE_TEST_SUITE_P(Clip, ClipBounds,
                                          Setting{"tiny_remote", 1e-6, 1e6}, Setting{"huge", 1e6, 0},
                                          Setting{"huge_remote", 1e6, 1e6}),
                          [](const auto& instance) { return instance.param.name; });
+
+// Of seeds near and far from the origin, beside each other, and so near that their products underflow.
+TEST(Clip, LimitsAreOnBothSidesOfTheExactBisector) {
+  SplitMix64 random(5);
+  for (int k = 0; k < 20000; ++k) {
+    const double scale = std::pow(10.0, random.range(-170, 40)), apart = std::pow(10.0, random.range(-12, 1));
+    const Vec3 x = scale * random_point(random), y = x + (scale * apart) * random_point(random);
+    mpq_class squared = 0;
+    for (int c = 0; c < 3; ++c) squared += (mpq_class(y[c]) - mpq_class(x[c])) * (mpq_class(y[c]) - mpq_class(x[c]));
+    if (squared == 0) continue;
+    const BisectorLimits limits(0.5 * norm2(y - x));
+    ASSERT_LT(mpq_class(limits.before), squared / 2) << "scale " << scale << ", apart " << apart;
+    ASSERT_GT(mpq_class(limits.behind), squared / 2) << "scale " << scale << ", apart " << apart;
+  }
+}
 
 // Coordinates that are small integers: nearly every decision is a tie.
 TEST(Clip, IntegerProblemsAreClippedAsInExactArithmetic) {

@@ -421,6 +421,31 @@ TEST(Restricted, WhatIsKnownOfFacetsChangesNoBit) {
     }
 }
 
+// What was divided one way is divided another where seeds that all but tie move by units of rounding.
+TEST(Restricted, WhatIsKnownOfTiesChangesNoBit) {
+  const TriangleMesh mesh = grid_patch(5, 4);
+  const Surface surface(mesh);
+  SplitMix64 random(81);
+  // A grid that is turned, so that its fours of seeds tie but for rounding.
+  std::vector<Vec3> grid;
+  for (int i = -6; i < 12; ++i)
+    for (int j = -6; j < 12; ++j) {
+      const Vec3 p{0.31 + 0.48 * i - 0.21 * j, 0.17 + 0.21 * i + 0.48 * j, 0.1};
+      if (p.x > -0.5 && p.x < 5.5 && p.y > -0.5 && p.y < 4.5) grid.push_back(p);
+    }
+  RestrictedVoronoi used(surface);
+  for (int step = 0; step < 60; ++step) {
+    SCOPED_TRACE(step);
+    const double reach = std::pow(10.0, -random.range(13, 17));
+    std::vector<Vec3> seeds = grid;
+    for (Vec3& x : seeds) x += reach * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+    const Diagram d = diagram_of(used, seeds, NeighbourSource::nearest);
+    expect_sound(surface, d);
+    expect_same_diagram(d, diagram_of(surface, seeds, NeighbourSource::nearest));
+    if (HasFailure()) return;
+  }
+}
+
 // Seeds that stay are recognised where others among them go, come or move, and what bounded their cells is tried first.
 TEST(Restricted, FollowsSeedsOfWhichSomeGoAndOthersCome) {
   const TriangleMesh mesh = torus(96, 48);
