@@ -12,7 +12,7 @@ namespace bisector {
 class StepStore;
 
 struct CheckpointOptions {
-  double every = 60;    // seconds, at the least, after which the optimiser's state within a step is written
+  double every = 60;    // seconds, at the least, between states of the optimiser within a step; 0: each is written
   bool resume = false;  // go on from the file, if it is there
 };
 

@@ -22,7 +22,7 @@ namespace bisector {
 namespace {
 
 constexpr std::uint64_t kPiece = 1 << 20;  // bytes that are read or copied at once
-// Of the time, what writing states may take, and of a step's, what writing its result may.
+// Of the time, what writing states may take, and of a step's, what writing its result may, unless all are wanted.
 constexpr double kStateShare = 1.0 / 30, kResultShare = 1.0 / 20;
 // Bytes of dead records, beside as many as there are others, from which on the file is written anew.
 constexpr std::uint64_t kManyDead = 16 << 20;
@@ -182,7 +182,9 @@ std::optional<std::string> StepStore::read(const StepKey& step, Kind kind) const
 }
 
 bool StepStore::state_is_due() const {
-  return !failed_ && watch_.seconds() - last_state_ >= std::max(options_.every, state_seconds_ / kStateShare);
+  if (failed_) return false;
+  return options_.every <= 0 ||
+         watch_.seconds() - last_state_ >= std::max(options_.every, state_seconds_ / kStateShare);
 }
 
 void StepStore::keep_state(const StepKey& step, std::string_view bytes, const Context& context) {

@@ -60,6 +60,21 @@ TEST_F(StepStoreFile, GivesBackWhatWasKept) {
   EXPECT_FALSE(fs::exists(file()));
 }
 
+// However long it takes to write it.
+TEST_F(StepStoreFile, EachStateIsDueWhereAllAreWanted) {
+  StepStore all = open(false);
+  const StepKey step = all.begin(1);
+  for (int k = 0; k < 5; ++k) {
+    EXPECT_TRUE(all.state_is_due());
+    all.keep_state(step, std::string(1 << 20, 'x'), {});
+  }
+  CheckpointOptions some;
+  some.every = 1000;
+  StepStore rare(path("rare.ckpt"), "a run", some);
+  rare.begin(1);
+  EXPECT_FALSE(rare.state_is_due());
+}
+
 TEST_F(StepStoreFile, CutOffAnywhereKeepsWhatIsWhole) {
   std::vector<std::uintmax_t> ends;
   {

@@ -521,8 +521,11 @@ class Running(unittest.TestCase):
             heard = []
             made = bs.remesh(mesh, checkpoint=checkpoint, resume=True, progress=heard.append, **options)
             self.assertTrue(checkpoint.exists())
-        self.assertGreater(next(p.iteration for p in heard if p.phase == "optimising"), 5, heard)
-        self.assertTrue(np.array_equal(made.vertices, bs.remesh(mesh, **{**options, "checkpoint_every": None}).vertices))
+        whole = []
+        undisturbed = bs.remesh(mesh, progress=whole.append, **{**options, "checkpoint_every": None})
+        self.assertTrue(np.array_equal(made.vertices, undisturbed.vertices))
+        # What is heard lags behind the run, which may thus be far beyond the twelfth step when it ends.
+        self.assertLess(len(heard), len(whole) - 10)
 
     def test_threads_at_once(self):
         expected = {n: bs.remesh(cube(), n=n).vertices for n in (60, 90)}
