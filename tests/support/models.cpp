@@ -395,12 +395,12 @@ std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, bool slender, 
     const double decades = random.below(2) ? random.range(0, 6) : 0;
     const double radius = random.range(0.1, 1) * std::pow(10.0, -decades);
     const double share = kShares[random.below(kShares.size())];
-    const bool parallel = slender && random.below(4) == 0;
+    const double apart = slender && random.below(3) == 0 ? std::pow(10.0, -random.range(4, 8)) : 1;
     Vec3 direction{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
     const std::size_t count = 3 + random.below(3);
     for (std::size_t k = 0; k < count; ++k) {
       const Vec3 other{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
-      const Vec3 d = k == 0 ? direction : parallel && k > 1 ? direction + 1e-5 * other : other;
+      const Vec3 d = k == 0 ? direction : apart < 1 && k > 1 ? direction + apart * other : other;
       if (k == 1) direction = d;
       seeds.push_back(p + (radius * (1 + random.range(-share, share)) / norm(d)) * d);
     }

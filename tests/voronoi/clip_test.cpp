@@ -35,11 +35,12 @@ struct Problem {
 };
 
 enum class Shape { random, needle, cap };
-enum class Seeding { random, cospherical, cocircular, grid, on_the_plane, over_the_plane, clustered, aligned };
+enum class Seeding { random, cospherical, cocircular, grid, on_the_plane, over_the_plane, clustered, aligned, facing };
 
 constexpr Shape kShapes[] = {Shape::random, Shape::needle, Shape::cap};
-constexpr Seeding kSeedings[] = {Seeding::random,       Seeding::cospherical,    Seeding::cocircular, Seeding::grid,
-                                 Seeding::on_the_plane, Seeding::over_the_plane, Seeding::clustered,  Seeding::aligned};
+constexpr Seeding kSeedings[] = {Seeding::random,    Seeding::cospherical,  Seeding::cocircular,
+                                 Seeding::grid,      Seeding::on_the_plane, Seeding::over_the_plane,
+                                 Seeding::clustered, Seeding::aligned,      Seeding::facing};
 
 Problem make_problem(SplitMix64& random, Shape shape, Seeding seeding, double thin, double jitter) {
   Problem p;
@@ -85,6 +86,8 @@ Problem make_problem(SplitMix64& random, Shape shape, Seeding seeding, double th
       case Seeding::over_the_plane: p.seeds.push_back(a + r * ab + s * ac + 20 * random.unit() * normal); break;
       case Seeding::clustered: p.seeds.push_back(centre + std::max(jitter, 1e-12) * random_point(random)); break;
       case Seeding::aligned: p.seeds.push_back(centre + (r - 0.5) * ab + noise); break;
+      // Bisectors of the first that are all but parallel.
+      case Seeding::facing: p.seeds.push_back(centre + (i ? 0.5 : -0.5) * u + noise); break;
     }
   }
   return p;
