@@ -354,21 +354,17 @@ TEST(Restricted, SeedsThatMeetOnTheirWay) {
   expect_same_diagram(d, diagram_of(surface, seeds, NeighbourSource::nearest));
 }
 
-// A density that falls by more than rounding can follow: no cell is lighter than if the least were everywhere.
-TEST(Restricted, CellsAreNoLighterThanTheLeastDensity) {
+// Across a needle the density rises so steeply that beyond the needle, where rounding puts positions, it would be
+// anything.
+TEST(Restricted, DensitiesOnNeedlesAreThoseOfTheirCorners) {
   TriangleMesh mesh;
-  mesh.vertices = {{0.1, 0.2, 0.3}, {1.7, 0.4, -0.2}, {0.3, 1.9, 0.77}};
-  mesh.triangles = {{0, 1, 2}};
-  const Surface steep(mesh, {1, 1e30, 1}), even(mesh);
-  std::vector<Vec3> seeds = random_seeds(mesh, 60, 9);
-  // At the light corner that positions are not relative to, and along the light side.
-  const Vec3 tip = mesh.vertices[2], along = mesh.vertices[0] - tip, across = mesh.vertices[1] - tip;
-  for (const double s : {1e-18, 1e-17, 3e-16, 1e-9})
-    for (const double t : {0.0, 0.2, 0.4, 0.7}) seeds.push_back(tip + t * along + s * across);
-  const Diagram heavy = diagram_of(steep, seeds, NeighbourSource::nearest),
-                light = diagram_of(even, seeds, NeighbourSource::nearest);
-  for (std::size_t i = 0; i < seeds.size(); ++i)
-    EXPECT_GE(heavy.moments.cells[i].mass, (1 - 1e-9) * light.moments.cells[i].mass) << "seed " << i;
+  mesh.vertices = {{-0.6, 0, 0}, {0.7, 0, 0}, {0.1, 1e-30, 0}, {0, -1, 0.3}};
+  mesh.triangles = {{0, 1, 2}, {1, 0, 3}};
+  const Surface surface(mesh, {1, 1, 2, 1});
+  for (std::uint64_t trial = 0; trial < 20; ++trial) {
+    SCOPED_TRACE(trial);
+    expect_sound(surface, diagram_of(surface, random_seeds(mesh, 40, trial), NeighbourSource::nearest));
+  }
 }
 
 // Facets that stay divided as they were are certified vertex by vertex and computed several polygons at a time.
