@@ -16,19 +16,16 @@ FallbackOf<Base>::FallbackOf(const Domain& domain, std::unique_ptr<Base>&& devic
 
 template <class Base>
 EvaluationReport FallbackOf<Base>::compute(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
-  if (on_device_) {
-    try {
-      return backend_->evaluate(seeds, want, diagram);
-    } catch (const DeviceError& error) {
-      give_up(error);
-    }
+  try {
+    return backend_->evaluate(seeds, want, diagram);
+  } catch (const DeviceError& error) {
+    give_up(error);
   }
   return backend_->evaluate(seeds, want, diagram);
 }
 
 template <class Base>
 std::unique_ptr<ResidentDescent> FallbackOf<Base>::descend(const DescentStart& start) {
-  if (!on_device_) return nullptr;
   try {
     return backend_->descend(start);
   } catch (const DeviceError& error) {
@@ -40,7 +37,6 @@ std::unique_ptr<ResidentDescent> FallbackOf<Base>::descend(const DescentStart& s
 template <class Base>
 void FallbackOf<Base>::give_up(const DeviceError& error) {
   const std::string reason = error.what();
-  on_device_ = false;
   backend_ = on_cpu_(reason);
   context_.warn("going on with the CPU because of this: " + reason);
 }

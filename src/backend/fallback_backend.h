@@ -37,7 +37,6 @@ class FallbackOf : public Base {
   Context context_;
   double energy_noise_;
   std::unique_ptr<Base> backend_;
-  bool on_device_ = true;
 };
 
 class FallbackBackend : public FallbackOf<Backend> {

@@ -463,6 +463,20 @@ TEST(CvtRunTest, EvaluatesTheSameSeedsOnce) {
 
 // --- Constraint ---
 
+// They may lie off the surface, as corners do where a coarser one stands in.
+TEST(Constrain, FixedSeedsStayToTheBit) {
+  const TriangleMesh mesh = icosphere(2);
+  const Surface surface(mesh);
+  CpuBackend backend(surface, NeighbourSource::nearest);
+  FreeRun free(backend, random_seeds(mesh, 60, 4));
+  PlacedSeeds& seeds = free.run.seeds;
+  const auto corner = [&](Index i) { return 1.01 * mesh.vertices[7 * i]; };
+  for (Index i = 0; i < 20; ++i) seeds.put(i, corner(i), {SeedPlace::Kind::fixed, kNone, i, 0});
+  optimise_both(free.run, 5, 5);
+  EXPECT_GT(free.run.totals.iterations, 8);
+  for (Index i = 0; i < 20; ++i) EXPECT_EQ(seeds.position(i), corner(i)) << i;
+}
+
 TEST(Constrain, NearestOnTriangleIsTheNearest) {
   SplitMix64 random(14);
   const auto point = [&] { return Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)}; };
