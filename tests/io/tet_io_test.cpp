@@ -381,6 +381,7 @@ TEST_F(TetIo, RefusesBadFilesInOneLine) {
   const std::string gmsh = gmsh_22(false, false);
   expect_error("a.msh", replaced(gmsh, "4 4 2 5 9 10 20 30 40", "4 5 2 5 9 10 20 30 40"), "type 5");
   expect_error("a.msh", replaced(gmsh, "4 4 2 5 9 10 20 30 40", "4 4 2 5 9 10 20 30 50"), "no node 50");
+  expect_error("a.msh", replaced(gmsh, "4 4 2 5 9 10 20 30 40", "4 4 2 5 9 10 20 25 40"), "no node 25");
   expect_error("a.msh", replaced(gmsh, "2.2 0 8", "4 0 8"), "version 4");
   expect_error("a.msh", replaced(gmsh, "$Nodes\n4", "$Nodes\n400000000"), "more than the file can hold");
   expect_error("a.msh", replaced(gmsh, "40 0 0 1", "30 0 0 1"), "two nodes have the tag 30");
