@@ -9,6 +9,7 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backend/cpu_backend.h"
@@ -152,6 +153,32 @@ TEST_F(Parts, GiveTheCpusDiagramAndDual) {
       EXPECT_EQ(found.dual.mesh_triangle, reference.dual.mesh_triangle);
       for (const PartFigures& part : backend.figures()) EXPECT_EQ(part.untiled, 0u);
     }
+  }
+}
+
+// What is nearest to seeds beyond vertices are these, on as many triangles of as many ranks.
+TEST_F(Parts, ProjectToTheFirstOfEquallyNearTriangles) {
+  const TriangleMesh mesh = icosphere(3);
+  const std::string path = write(mesh);
+  const Surface surface(mesh);
+  CpuBackend cpu(surface, NeighbourSource::nearest);
+  const auto projected = [](Backend& backend, std::vector<Vec3> seeds) {
+    Diagram diagram;
+    backend.evaluate(seeds, backend.projected(), diagram);
+    for (Vec3& x : seeds) x *= 1.05;
+    std::vector<Vec3> normals;
+    backend.project(diagram.moments, {}, seeds, normals);
+    return std::pair(seeds, normals);
+  };
+  const auto [at, normals] = projected(cpu, mesh.vertices);
+  EXPECT_TRUE(same_bits(at, mesh.vertices));
+  for (const std::size_t size : {2, 3, 5}) {
+    ThreadRanks ranks(size);
+    FileOfRanks file = read_on_all(path, mesh.vertices.size(), ranks.root());
+    DistributedBackend backend(file, NeighbourSource::nearest, ranks.root());
+    const auto [found_at, found_normals] = projected(backend, mesh.vertices);
+    EXPECT_TRUE(same_bits(found_at, at));
+    EXPECT_TRUE(same_bits(found_normals, normals));
   }
 }
 
