@@ -387,7 +387,7 @@ SmallCase integer_case(std::uint64_t random_seed) {
   return problem;
 }
 
-std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, bool slender, SplitMix64& random) {
+std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, SplitMix64& random) {
   constexpr std::array kShares{0.0, 0.0, 1e-15, 1e-13, 1e-9, 1e-7};
   std::vector<Vec3> seeds;
   for (const Vec3& p : points) {
@@ -395,7 +395,7 @@ std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, bool slender, 
     const double decades = random.below(2) ? random.range(0, 6) : 0;
     const double radius = random.range(0.1, 1) * std::pow(10.0, -decades);
     const double share = kShares[random.below(kShares.size())];
-    const double apart = slender && random.below(3) == 0 ? std::pow(10.0, -random.range(4, 8)) : 1;
+    const double apart = random.below(3) == 0 ? std::pow(10.0, -random.range(4, 8)) : 1;
     Vec3 direction{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
     const std::size_t count = 3 + random.below(3);
     for (std::size_t k = 0; k < count; ++k) {
@@ -422,7 +422,7 @@ SmallCase near_tie_case(std::uint64_t random_seed) {
     points.push_back(random.below(3) ? vertices[0] + u * (vertices[1] - vertices[0]) + v * (vertices[2] - vertices[0])
                                      : vertices[random.below(3)]);
   }
-  problem.seeds = near_tie_seeds(points, true, random);
+  problem.seeds = near_tie_seeds(points, random);
   constexpr std::array kExponents{0, 0, -66, -70, -74, -100, 60};
   const double scale = std::ldexp(1.0, kExponents[random.below(kExponents.size())]), away = random.below(2) ? 100 : 0;
   for (std::vector<Vec3>* all : {&vertices, &problem.seeds})

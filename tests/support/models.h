@@ -80,7 +80,7 @@ SmallCase integer_case(std::uint64_t random_seed);
 // triangles, points on their sides and points inside: decisions that only exact arithmetic, or a bound of every error,
 // gets right. Any number gives another case, at another scale and place.
 SmallCase near_tie_case(std::uint64_t random_seed);
-// The seeds of such a case about given points. `slender`: some bisectors are all but parallel.
-std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, bool slender, SplitMix64& random);
+// The seeds of such a case about given points. Some bisectors are all but parallel.
+std::vector<Vec3> near_tie_seeds(const std::vector<Vec3>& points, SplitMix64& random);
 
 }  // namespace bisector::test

@@ -293,12 +293,12 @@ SolidCase near_tie_solid_case(std::uint64_t random_seed) {
     }
     points.push_back((1 / weights) * sum);
   }
-  result.seeds = near_tie_seeds(points, true, random);
-  // Beside something large single precision no longer has the range for what is small.
+  result.seeds = near_tie_seeds(points, random);
   constexpr std::array kExponents{0, 0, -66, -70, -74};
   const double scale = std::ldexp(1.0, kExponents[random.below(kExponents.size())]);
   for (std::vector<Vec3>* all : {&result.mesh.vertices, &result.seeds})
     for (Vec3& p : *all) p = scale * p;
+  // Beside something large single precision no longer has the range for what is small.
   if (random.below(2)) {
     const Index first = static_cast<Index>(result.mesh.vertices.size());
     for (const Vec3& p : single_tet().vertices) result.mesh.vertices.push_back(p + Vec3{10, 0, 0});

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "support/models.h"
+#include "support/rational.h"
 #include "voronoi/error_bounds.h"
 #include "voronoi/exact.h"
 
@@ -192,9 +193,9 @@ Tally check(const Problem& problem, bool all) {
       ++tally.decisions;
       const Vec3 d = seeds.x[other] - seeds.x[slot];
       const double along = dot(clipper.vertex(k), d);
-      const double doubt = clipper.slack(k) * (std::abs(d.x) + std::abs(d.y) + std::abs(d.z));
-      const double half = 0.5 * norm2(d);
-      const int side = along + doubt < half * (1 - 1e-12) ? 1 : along - doubt > half * (1 + 1e-12) ? -1 : 0;
+      const double doubt = clipper.slack(k) * taxicab(d);
+      const BisectorLimits limits(0.5 * norm2(d));
+      const int side = along + doubt < limits.before ? 1 : along - doubt > limits.behind ? -1 : 0;
       if (side == 0) continue;
       ++tally.certain;
       bool on_bisector = clipper.label(k) == other || clipper.label((k + n - 1) % n) == other;
@@ -251,8 +252,7 @@ TEST(Clip, LimitsAreOnBothSidesOfTheExactBisector) {
   for (int k = 0; k < 20000; ++k) {
     const double scale = std::pow(10.0, random.range(-170, 40)), apart = std::pow(10.0, random.range(-12, 1));
     const Vec3 x = scale * random_point(random), y = x + (scale * apart) * random_point(random);
-    mpq_class squared = 0;
-    for (int c = 0; c < 3; ++c) squared += (mpq_class(y[c]) - mpq_class(x[c])) * (mpq_class(y[c]) - mpq_class(x[c]));
+    const mpq_class squared = exact_squared_distance(x, y);
     if (squared == 0) continue;
     const BisectorLimits limits(0.5 * norm2(y - x));
     ASSERT_LT(mpq_class(limits.before), squared / 2) << "scale " << scale << ", apart " << apart;

@@ -17,6 +17,7 @@
 #include "support/diagram.h"
 #include "support/oracle_tet.h"
 #include "support/solids.h"
+#include "voronoi/error_bounds.h"
 
 namespace bisector::test {
 namespace {
@@ -230,10 +231,12 @@ TEST_P(IntegerSolids, AgreeWithTheOracle) {
 
 INSTANTIATE_TEST_SUITE_P(Clipped, IntegerSolids, testing::Range(std::uint64_t{0}, kIntegerSolids, kIntegerSolidBlock));
 
-// Some of their planes meet at so small angles that vertices are less exact than others; how cells are bounded is not.
+// Vertices are computed in double precision down to the angle kSteep, where they are off by a unit of rounding over its
+// sine; how cells are bounded is exact.
 TEST(Clipped, NearTiesAgreeWithTheOracle) {
+  const double share = kUnit / std::sqrt(kSteep);
   constexpr std::uint64_t kCases = 120;
-  for (std::uint64_t k = 0; k < kCases && !HasFailure(); ++k) expect_oracle(near_tie_solid_case(k), false, 1e-8);
+  for (std::uint64_t k = 0; k < kCases && !HasFailure(); ++k) expect_oracle(near_tie_solid_case(k), false, share);
 }
 
 // --- Against itself ---

@@ -1,7 +1,6 @@
 // Neighbour lists against brute force: order, certificates, growth; and the spatial order they rest on.
 #include "voronoi/neighbours.h"
 
-#include <gmpxx.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,6 +16,7 @@
 #include "core/parallel.h"
 #include "spatial/hilbert.h"
 #include "support/models.h"
+#include "support/rational.h"
 #include "voronoi/delaunay.h"
 #include "voronoi/exact.h"
 #include "voronoi/owner.h"
@@ -447,12 +447,6 @@ TEST(DelaunayNeighbours, AreRefusedForSeedsInAPlane) {
   EXPECT_TRUE(delaunay_neighbours({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}));
 }
 
-mpq_class exact_squared(const Vec3& p, const Vec3& q) {
-  mpq_class sum = 0;
-  for (int k = 0; k < 3; ++k) sum += (mpq_class(p[k]) - mpq_class(q[k])) * (mpq_class(p[k]) - mpq_class(q[k]));
-  return sum;
-}
-
 // Of points that are all but as near to several seeds, near them or far away, from whatever seed the search starts.
 TEST(Neighbours, OwnersAreTheNearestSeedsInExactArithmetic) {
   SplitMix64 random(61);
@@ -462,14 +456,14 @@ TEST(Neighbours, OwnersAreTheNearestSeedsInExactArithmetic) {
     const Vec3 away = random.below(2) ? Vec3{100, -100, 100} : Vec3{};
     for (int k = 0; k < 4; ++k)
       points.push_back(away + Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)});
-    const std::vector<Vec3> given = near_tie_seeds(points, false, random);
+    const std::vector<Vec3> given = near_tie_seeds(points, random);
     const SortedSeeds seeds = sort_seeds(given);
     Neighbours neighbours;
     neighbours.build(seeds, NeighbourSource::nearest);
     for (const Vec3& q : points) {
       std::size_t nearest = 0;
       for (std::size_t i = 1; i < given.size(); ++i)
-        if (exact_squared(q, given[i]) < exact_squared(q, given[nearest])) nearest = i;
+        if (exact_squared_distance(q, given[i]) < exact_squared_distance(q, given[nearest])) nearest = i;
       for (Index guess = 0; guess < seeds.x.size(); ++guess)
         ASSERT_EQ(seeds.id[find_owner(seeds, neighbours, q, guess)], nearest) << "from " << guess;
     }
