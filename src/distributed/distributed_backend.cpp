@@ -49,7 +49,7 @@ std::string bytes_of(const SurfacePart& part, const Regions& regions) {
       .take();
 }
 
-std::unique_ptr<PartDiagram> part_of(const std::string& bytes, int rank) {
+std::unique_ptr<PartDiagram> part_diagram_of(const std::string& bytes, int rank) {
   ByteReader reader(bytes);
   std::vector<Regions::Node> nodes;
   SurfacePart part;
@@ -92,7 +92,7 @@ class Server {
   bool follow(const Command& command) {
     const ThreadLimit limit(std::min(command.threads, thread_count()));
     switch (command.kind) {
-      case Command::Kind::divide: parts_[command.domain] = part_of(ranks_.scatter({}), ranks_.rank()); break;
+      case Command::Kind::divide: parts_[command.domain] = part_diagram_of(ranks_.scatter({}), ranks_.rank()); break;
       case Command::Kind::read:
         parts_[command.domain] = read_divided(ranks_, ranks_.broadcast({}), command.wanted).part;
         break;
@@ -136,7 +136,7 @@ DistributedBackend::DistributedBackend(const Surface& surface, NeighbourSource s
       domain_(next_domain()), area_(surface.area) {
   ranks.together([&] {
     ranks.broadcast(bytes_of({.kind = Command::Kind::divide, .domain = domain_}));
-    part_ = part_of(ranks.scatter(divide(surface, ranks.size())), ranks.rank());
+    part_ = part_diagram_of(ranks.scatter(divide(surface, ranks.size())), ranks.rank());
   });
 }
 

@@ -8,7 +8,6 @@
 
 #include "backend/project.h"
 #include "checkpoint/bytes.h"
-#include "core/append_range.h"
 #include "core/parallel.h"
 
 namespace bisector {
@@ -52,11 +51,7 @@ std::vector<Foot> KeptCells::project(Ranks& ranks, std::uint64_t number, std::sp
       },
       kSeedsAtOnce);
   std::erase_if(feet, [](const Foot& foot) { return foot.seed == kNone; });
-  std::vector<Foot> all, some;
-  for (const std::string& message : ranks.collect(ByteWriter().put_all(feet).take())) {
-    ByteReader(message).get_all(some);
-    append_range(all, some, 0, some.size());
-  }
+  std::vector<Foot> all = ranks.collect(feet);
   // Of equally near ones that of the first triangle.
   sort_in_parallel(all, [](const Foot& a, const Foot& b) {
     return std::tie(a.seed, a.squared, a.triangle) < std::tie(b.seed, b.squared, b.triangle);

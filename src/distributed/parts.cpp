@@ -129,17 +129,14 @@ Regions PartReader::divide() const {
     const Corners c = corners(t);
     samples.push_back({centre(c), area(c)});
   }
-  const std::vector<std::string> received = ranks_.collect(ByteWriter().put_all(samples).take());
+  samples = ranks_.collect(samples);
   std::string nodes;
   if (ranks_.is_root()) {
     std::vector<Vec3> points;
     std::vector<double> weights;
-    for (const std::string& message : received) {
-      ByteReader(message).get_all(samples);
-      for (const Sample& sample : samples) {
-        points.push_back(sample.at);
-        weights.push_back(sample.area);
-      }
+    for (const Sample& sample : samples) {
+      points.push_back(sample.at);
+      weights.push_back(sample.area);
     }
     const double sum = fixed_sum(weights.size(), [&](std::size_t k) { return weights[k]; });
     for (double& weight : weights) weight = (sum > 0 ? weight / sum : 0) + 1 / static_cast<double>(points.size());

@@ -47,6 +47,9 @@ class Ranks {
   std::string scatter(std::vector<std::string> messages);
   // On rank 0 the messages of all, by rank; on the others nothing.
   std::vector<std::string> collect(std::string message);
+  // The same with lists: those of all, one after another.
+  template <class T>
+  std::vector<T> collect(const std::vector<T>& list);
   // One value of each rank, by rank.
   template <class T>
   std::vector<T> gather(const T& value);
@@ -81,6 +84,17 @@ std::vector<std::vector<T>> Ranks::exchange(std::vector<std::vector<T>> to) {
     messages[r] = {};
   }
   return received;
+}
+
+template <class T>
+std::vector<T> Ranks::collect(const std::vector<T>& list) {
+  std::vector<T> all, some;
+  for (std::string& message : collect(ByteWriter().put_all(list).take())) {
+    ByteReader(message).get_all(some);
+    message = {};
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
 }
 
 template <class T>
