@@ -67,9 +67,9 @@ struct SolidDiagram {
 
 // The diagram of the seeds restricted to a surface (thesis 4.3). `density`: one positive value per vertex, linear on
 // each triangle; empty means 1. Exactly collinear triangles are left out. Throws Error if there are no seeds, a
-// coordinate is not finite or beyond 1e40, the mesh names a vertex that it lacks or has no area, a density is not
-// positive and finite, or the CPU is asked for single precision; DeviceError if an exact request for a device cannot be
-// met.
+// coordinate is not finite or beyond 1e40, the mesh has none of 1e-40 or more, names a vertex that it lacks or has no
+// area, a density is not positive and finite, or the CPU is asked for single precision; DeviceError if an exact request
+// for a device cannot be met.
 BISECTOR_API SurfaceDiagram compute_diagram(const TriangleMesh& surface, const std::vector<double>& density,
                                             const std::vector<Vec3>& seeds, const DiagramOptions& options = {},
                                             const Context& context = {});

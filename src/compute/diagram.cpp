@@ -51,7 +51,7 @@ Result result_of(const Backend& backend, const EvaluationReport& report, const D
 
 SurfaceDiagram compute_diagram(const TriangleMesh& mesh, const std::vector<double>& density,
                                const std::vector<Vec3>& seeds, const DiagramOptions& options, const Context& context) {
-  require_moderate(mesh.vertices, "vertex");
+  require_moderate_model(mesh.vertices, "vertex");
   require_moderate(seeds, "seed");
   check_indices(mesh);
   const Surface surface(mesh, density);
@@ -69,7 +69,7 @@ SurfaceDiagram compute_diagram(const TriangleMesh& mesh, const std::vector<doubl
 
 SolidDiagram compute_diagram(const TetMesh& mesh, const std::vector<double>& density, const std::vector<Vec3>& seeds,
                              const DiagramOptions& options, const Context& context) {
-  require_moderate(mesh.vertices, "vertex");
+  require_moderate_model(mesh.vertices, "vertex");
   require_moderate(seeds, "seed");
   const Solid solid(mesh, density);
   const std::unique_ptr<SolidBackend> backend = make_backend(solid, options.compute, context);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -14,6 +15,8 @@ namespace bisector {
 
 // Products of six lengths, as in bounds of determinants and in energies of weighted volumes, stay finite.
 inline constexpr double kLargestCoordinate = 1e40;
+// Such products of a whole model do not underflow.
+inline constexpr double kSmallestModel = 1e-40;
 
 // Throws Error. `kind`: what the points are, such as "vertex".
 inline void require_moderate(const std::vector<Vec3>& points, const char* kind) {
@@ -24,6 +27,17 @@ inline void require_moderate(const std::vector<Vec3>& points, const char* kind) 
       if (std::abs(x) > kLargestCoordinate)
         throw Error(fmt::format("{} {}: a coordinate is beyond {:g}; scale the model", kind, i, kLargestCoordinate));
     }
+}
+
+// The same for the vertices of a model, which may not all be close to the origin: products would vanish. Points that
+// all are the origin pass, for what has no area or volume is told elsewhere.
+inline void require_moderate_model(const std::vector<Vec3>& points, const char* kind) {
+  require_moderate(points, kind);
+  double largest = 0;
+  for (const Vec3& p : points)
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::abs(p[k]));
+  if (0 < largest && largest < kSmallestModel)
+    throw Error(fmt::format("no {} has a coordinate of {:g} or more; scale the model", kind, kSmallestModel));
 }
 
 }  // namespace bisector

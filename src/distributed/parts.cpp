@@ -15,6 +15,7 @@
 #include "bisector/error.h"
 #include "checkpoint/bytes.h"
 #include "core/append_range.h"
+#include "core/magnitude.h"
 #include "core/parallel.h"
 #include "distributed/unordered_sum.h"
 #include "io/ply_parts.h"
@@ -114,7 +115,9 @@ PartReader::Extent PartReader::measure() const {
   for (const Box& box : ranks_.gather(mine)) ends.insert(ends.end(), {box.lo, box.hi});
   const double sum = sum_of_all(ranks_, areas.size(), [&](std::size_t k) { return areas[k]; });
   if (!(sum > 0)) throw Error("the mesh has no triangle with area; there is nothing to mesh");
-  return {bounding_box(ends), sum};
+  const Box box = bounding_box(ends);
+  require_moderate_model({box.lo, box.hi}, "vertex");
+  return {box, sum};
 }
 
 // Every so many triangles stand for those about them.

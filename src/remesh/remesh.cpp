@@ -802,7 +802,7 @@ RemeshResult remesh_walls(const TriangleMesh& walls, const RemeshOptions& option
 
 RemeshResult remesh(const TriangleMesh& input, const RemeshOptions& options, const Context& context) {
   check_options(options);
-  require_moderate(input.vertices, "vertex");
+  require_moderate_model(input.vertices, "vertex");
   require_moderate(options.seeds, "seed");
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);

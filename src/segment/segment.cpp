@@ -393,7 +393,7 @@ Classified classify(Lloyd& lloyd, const SegmentOptions& options, const Partition
 SegmentResult segment(const TriangleMesh& mesh, const SegmentOptions& options, const Context& context) {
   Stopwatch total;
   check_options(options);
-  require_moderate(mesh.vertices, "vertex");
+  require_moderate_model(mesh.vertices, "vertex");
   const SegmentDomain domain = make_segment_domain(mesh);
   SegmentOptions aimed = options;
   aimed.proxies = possible_count(domain, options.proxies, context);

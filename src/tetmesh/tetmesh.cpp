@@ -309,7 +309,7 @@ TetOptions follow_vertices(const TetOptions& options, const WeldResult& welded) 
 TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, const Context& context) {
   const Stopwatch watch;
   check_options(options);
-  require_moderate(input.vertices, "vertex");
+  require_moderate_model(input.vertices, "vertex");
   require_moderate(options.seeds, "seed");
   check_attribute(options, input.vertices.size());
   std::optional<ThreadLimit> limit;
@@ -329,7 +329,7 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
 
 TetResult tetrahedralise(const TetMesh& solid, const TetOptions& options, const Context& context) {
   check_options(options);
-  require_moderate(solid.vertices, "vertex");
+  require_moderate_model(solid.vertices, "vertex");
   require_moderate(options.seeds, "seed");
   check_attribute(options, solid.vertices.size());
   std::optional<ThreadLimit> limit;

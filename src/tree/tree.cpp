@@ -59,7 +59,7 @@ void check_options(const std::vector<Vec3>& points, const TreeOptions& options) 
     throw Error(fmt::format("{} classes for {} points; give one for each", options.classes.size(), points.size()));
   if (options.scene && options.components == TreeComponents::separate)
     throw Error("the trees of a scene are told from each other; leave their components bridged");
-  require_moderate(points, "point");
+  require_moderate_model(points, "point");
 }
 
 bool on_one_line(const std::vector<Vec3>& points) {

@@ -101,6 +101,16 @@ TEST_F(Parts, WhatCannotBeReadIsAnError) {
   expect_error(write(listed), "no fixed length");
 }
 
+TEST_F(Parts, OfATinyModelAreAnErrorOfAllRanks) {
+  TriangleMesh mesh = torus(12, 8);
+  for (Vec3& p : mesh.vertices) p = 1e-41 * p;
+  const std::string path = write(mesh);
+  for (const std::size_t size : {1, 3}) {
+    ThreadRanks ranks(size);
+    EXPECT_THROW(read_on_all(path, 50, ranks.root()), Error);
+  }
+}
+
 // Every triangle is somewhere once; area and stand-in are the same however many ranks there are.
 TEST_F(Parts, MakeUpTheWhole) {
   const TriangleMesh mesh = torus(120, 80);

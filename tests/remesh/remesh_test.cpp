@@ -428,6 +428,9 @@ TEST(RemeshErrors, AreOneLineThatSaysWhatToDo) {
   EXPECT_NE(message(far, options_for(100)).find("vertex 3: a coordinate is beyond 1e+40"), std::string::npos);
   far.vertices[3].y = std::nan("");
   EXPECT_NE(message(far, options_for(100)).find("vertex 3: a coordinate is not finite"), std::string::npos);
+  TriangleMesh tiny = icosphere(1);
+  for (Vec3& p : tiny.vertices) p = 1e-41 * p;
+  EXPECT_NE(message(tiny, options_for(100)).find("no vertex has a coordinate of 1e-40 or more"), std::string::npos);
   for (std::size_t vertices : {1u, 3u})
     EXPECT_NE(message(icosphere(1), options_for(vertices)).find("4"), std::string::npos);
   RemeshOptions seeded;
