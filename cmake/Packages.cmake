@@ -54,7 +54,7 @@ set(CPACK_DEBIAN_STEP_PACKAGE_RECOMMENDS bisector)
 bisector_package(mpi bisector-mpi science "remeshing by many machines together"
   "This package has the program bisector-mpi, which mpirun bisector starts to"
   "divide the work on a surface among ranks of Open MPI.")
-set(CPACK_DEBIAN_MPI_PACKAGE_DEPENDS "bisector (= ${bisector_debian_version})")
+set(CPACK_DEBIAN_MPI_PACKAGE_DEPENDS "bisector (= ${bisector_debian_version}), openmpi-bin")
 
 # CPack would have the library's scripts call ldconfig, where a trigger is asked for; so shlibs and Depends are not its
 # business either.

@@ -72,8 +72,8 @@ BISECTOR_API DeviceList list_devices();
 BISECTOR_API std::optional<DeviceRequest> best_gpu(DeviceList list, Precision precision = Precision::automatic);
 
 struct BackendDescription {
-  std::string name;       // of the processor or device
-  std::string kind;       // "cpu", or a device's: "discrete", "integrated", "virtual", "software", "other"
+  std::string name;  // of the processor or device
+  std::string kind;  // "cpu", "ranks" of MPI, or a device's: "discrete", "integrated", "virtual", "software", "other"
   std::string precision;  // "single" or "double"
   std::string fallback;   // why a device was given up for this one; empty if none was
 };

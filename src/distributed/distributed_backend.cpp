@@ -153,7 +153,7 @@ DistributedBackend::~DistributedBackend() {
 }
 
 BackendDescription DistributedBackend::description() const {
-  return {fmt::format("{}, {} ranks", processor_name(), ranks_.size()), "cpu", "double", {}};
+  return {fmt::format("{}, {} ranks", processor_name(), ranks_.size()), "ranks", "double", {}};
 }
 
 std::vector<PartFigures> DistributedBackend::figures() {

@@ -61,7 +61,7 @@ Json device_json(const BackendDescription& device) {
 }
 
 Json device_seconds_json(const BackendDescription& device, const DeviceSeconds& seconds) {
-  if (device.kind == "cpu" && device.fallback.empty()) return nullptr;
+  if ((device.kind == "cpu" && device.fallback.empty()) || device.kind == "ranks") return nullptr;
   return {{"transfer", seconds.transfer}, {"grid", seconds.grid},      {"neighbours", seconds.neighbours},
           {"owners", seconds.owners},     {"clip", seconds.clip},      {"sort", seconds.sort},
           {"sum", seconds.sum},           {"descent", seconds.descent}};

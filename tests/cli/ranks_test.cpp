@@ -38,6 +38,7 @@ TEST_F(CliRanks, WriteTheBytesOfOneProcess) {
       << read_text(in("err"));
   EXPECT_EQ(read_text(in("three.off")), read_text(in("one.off")));
   EXPECT_NE(read_text(in("three.json")).find(", 3 ranks\""), std::string::npos);
+  EXPECT_NE(read_text(in("out")).find(", 3 ranks, double precision\n"), std::string::npos) << read_text(in("out"));
 }
 
 // A surface in parts takes no MPI, either.

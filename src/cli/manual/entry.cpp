@@ -102,6 +102,24 @@ Entry make_tetgen_entry() {
   return entry;
 }
 
+// It has the options of bisector.
+Entry make_mpi_entry() {
+  Entry entry;
+  entry.name = "bisector-mpi";
+  entry.about = "Share the work of bisector among ranks of MPI.";
+  entry.usage = "mpirun -n RANKS bisector COMMAND ...";
+  entry.description = {
+      "Is what bisector makes way for where Open MPI's mpirun starts it as one of several ranks; it is not made to be "
+      "called by hand. The first rank is the program: it reads, writes and prints. The others compute for it. The "
+      "result is the same, to the last byte, for any number of ranks.",
+      "It is a program of its own because only it links MPI. It lies beside bisector."};
+  entry.examples = {{"mpirun -n 8 bisector remesh scan.ply -o mesh.ply -n 1000000",
+                     "Remesh a surface whose diagrams eight processes compute."},
+                    {"mpirun -n 4 bisector remesh-parts huge.ply -o mesh.ply -n 1000000",
+                     "Remesh a surface of which each process reads and keeps a part."}};
+  return entry;
+}
+
 }  // namespace
 
 std::vector<Entry> make_entries() {
@@ -120,6 +138,7 @@ std::vector<Entry> make_entries() {
   }
   entries.push_back(make_step_entry());
   entries.push_back(make_tetgen_entry());
+  entries.push_back(make_mpi_entry());
   return entries;
 }
 

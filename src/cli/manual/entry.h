@@ -34,7 +34,7 @@ struct Entry {
   std::string no_output;  // what becomes of files if the exit code is not 0
 };
 
-// The program, then its commands, then bisector-step and bisector-tetgen.
+// The program, then its commands, then bisector-step, bisector-tetgen and bisector-mpi.
 std::vector<Entry> make_entries();
 
 }  // namespace bisector::cli::manual
