@@ -148,6 +148,7 @@ class VtkXmlReader {
     const std::string name(tag["Name"]);
     const std::size_t components = tag["NumberOfComponents"].empty() ? 1 : number(tag, "NumberOfComponents");
     if (section == "Points") {
+      if (!piece_.points.empty()) fail(path_, std::string("the points have several arrays; ") + kExportAgain);
       take_points(read_array(tag, 3, points_));
     } else if (section == "PointData" || section == "CellData") {
       const bool points = section == "PointData";

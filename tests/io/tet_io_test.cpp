@@ -408,6 +408,11 @@ TEST_F(TetIo, RefusesBadFilesInOneLine) {
   expect_error("a.vtk", replaced(legacy, "UNSTRUCTURED_GRID", "STRUCTURED_POINTS"), "UNSTRUCTURED_GRID");
   expect_error("a.vtu", "<VTKFile type='ImageData'><ImageData/></VTKFile>", "UnstructuredGrid");
   expect_error("a.vtu", "<VTKFile type='UnstructuredGrid' compressor='vtkLZ4DataCompressor'>", "vtkLZ4DataCompressor");
+  write_tet_mesh(path("good.vtu"), marked_cube(1));
+  std::string twice = slurp("good.vtu");
+  const std::size_t array = twice.find("<DataArray", twice.find("<Points>")), end = twice.find("</Points>");
+  twice.insert(end, twice.substr(array, end - array));
+  expect_error("a.vtu", twice, "the points have several arrays");
 }
 
 TEST_F(TetIo, RefusesToWriteWhatIsUnsound) {
