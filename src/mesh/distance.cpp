@@ -94,8 +94,8 @@ OneSided measure_one_side(const Surface& from, const Surface& to, std::size_t sa
 
 DistanceReport measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference, std::size_t samples,
                                 std::uint64_t random_seed, const Context& context) {
-  require_moderate_model(mesh.vertices, "vertex");
-  require_moderate_model(reference.vertices, "vertex of the reference");
+  require_moderate(mesh.vertices, "vertex");
+  require_moderate(reference.vertices, "vertex of the reference");
   const Surface ours(mesh, "mesh");
   context.check();
   const Surface theirs(reference, "reference");
