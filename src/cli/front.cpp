@@ -72,6 +72,7 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
   for (const job::OutputKind& kind : kinds) outputs.push_back({files.outputs.at(kind.name), kind.extensions});
   if (outputs.empty()) outputs.push_back({});  // the report does not replace the input either
   outputs.push_back(job::report_output(report_path));
+  outputs.push_back({job.checkpoint_file(), {}});  // it is removed once the others are written
   job::check_outputs(outputs, job.input_files());
   const ThreadLimit limit(job.threads);
   Console console(files.common.quiet, report_path == "-");

@@ -138,6 +138,8 @@ class Job {
 
   // A file from which a run that was cancelled can go on; empty if there is none.
   virtual std::string goes_on_from() const { return {}; }
+  // The checkpoint asked for; empty if none is.
+  virtual std::string checkpoint_file() const { return {}; }
   // Once all results are where they are wanted.
   virtual void finish() {}
 

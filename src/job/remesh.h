@@ -34,6 +34,7 @@ class RemeshJob final : public Job {
   std::vector<ArrayView> arrays() override;
   const std::vector<Attribute>& attributes() const override { return result.mesh.attributes; }
   std::string goes_on_from() const override { return saved_.path(); }
+  std::string checkpoint_file() const override { return saved_.wanted_path(); }
   void finish() override { saved_.remove(); }
 
   std::shared_ptr<const TriangleMesh> surface;  // the input

@@ -22,6 +22,7 @@ class SavedRun {
   // Before what takes long, if a checkpoint is asked for: opens it and names it in `context`. `input`: of all that the
   // run reads. Throws Error.
   void open(const Fingerprint& input, Context& context);
+  const std::string& wanted_path() const { return path_; }
   // The file, if there is something in it to go on from.
   std::string path() const;
   // Once the results are in their files.

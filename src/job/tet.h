@@ -36,6 +36,7 @@ class TetJob final : public Job {
   void write(std::string_view output, const std::string& path, const std::vector<std::string>& warnings) override;
   std::vector<ArrayView> arrays() override;
   std::string goes_on_from() const override { return saved_.path(); }
+  std::string checkpoint_file() const override { return saved_.wanted_path(); }
   void finish() override { saved_.remove(); }
   const std::vector<Attribute>& attributes() const override { return result.mesh.attributes; }
 

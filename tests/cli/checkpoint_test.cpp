@@ -106,8 +106,11 @@ TEST_F(CliCheckpoint, KilledTetGoesOn) {
 TEST_F(CliCheckpoint, BadUsage) {
   expect_failure(2, remesh("out.off", {"--resume"}), "--resume: it is for --checkpoint");
   expect_failure(2, remesh("out.off", {"--checkpoint-every", "5"}), "--checkpoint-every: it is for --checkpoint");
-  expect_failure(1, remesh("out.off", {"--checkpoint", in("none/run.ckpt")}), "run.ckpt: cannot be written");
-  expect_failure(1, remesh("out.off", {"--checkpoint", in("sphere.off"), "--resume"}), "is no checkpoint");
+  expect_failure(1, remesh("out.off", {"--checkpoint", in("none/run.ckpt")}), "run.ckpt: the folder");
+  expect_failure(1, remesh("out.off", {"--checkpoint", in("sphere.off"), "--resume"}), "would replace an input");
+  // It is removed in the end, and what has its name with it.
+  expect_failure(1, remesh("out.off", {"--checkpoint", in("out.off")}), "two outputs have this name");
+  expect_failure(1, remesh("out.off", {"--checkpoint", in("r.json"), "--report", in("r.json")}), "two outputs have");
   // Bad input leaves no file behind.
   expect_failure(1, {"remesh", in("none.off"), "-o", in("out.off"), "-n", "100", "--checkpoint", in("run.ckpt")},
                  "none.off");
