@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdio>
 
 #include "job/messages.h"
 #include "program.h"
@@ -38,6 +39,9 @@ std::string time_left(double seconds) {
   return fmt::format("{:.1f} h left", seconds / 3600);
 }
 
+// A full disk behind stderr stops no run.
+void put_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
+
 }  // namespace
 
 const std::atomic<bool>& watch_interrupts() {
@@ -50,7 +54,7 @@ void stop_watching_interrupts() {
   if (interrupted) throw Cancelled();
 }
 
-void print_error(std::string_view message) { fmt::print(stderr, "bisector: error: {}\n", job::one_line(message)); }
+void print_error(std::string_view message) { put_error(fmt::format("bisector: error: {}\n", job::one_line(message))); }
 
 Console::Console(bool quiet, bool stdout_is_taken)
     : quiet_(quiet), live_(!quiet && isatty(STDERR_FILENO)), out_(stdout_is_taken ? stderr : stdout),
@@ -67,7 +71,7 @@ job::Listener Console::listener() {
   if (!quiet_)
     listener.warning = [this](const std::string& warning) {
       clear_line();
-      fmt::print(stderr, "bisector: warning: {}\n", warning);
+      put_error(fmt::format("bisector: warning: {}\n", warning));
     };
   listener.cancel = &interrupted;
   return listener;
@@ -82,7 +86,7 @@ void Console::print(std::string_view line) {
 void Console::note(std::string_view line) {
   if (quiet_) return;
   clear_line();
-  fmt::print(stderr, "bisector: {}\n", job::one_line(line));
+  put_error(fmt::format("bisector: {}\n", job::one_line(line)));
 }
 
 void Console::print_written(const std::vector<std::string>& paths) {
@@ -111,14 +115,14 @@ void Console::show_line(std::string line) {
   line = job::one_line(line).substr(0, terminal_width() - 1);
   const std::size_t length = line.size();
   if (length < shown_) line.append(shown_ - length, ' ');
-  fmt::print(stderr, "\r{}", line);
+  put_error(fmt::format("\r{}", line));
   std::fflush(stderr);
   shown_ = length;
 }
 
 void Console::clear_line() {
   if (shown_ == 0) return;
-  fmt::print(stderr, "\r{}\r", std::string(shown_, ' '));
+  put_error(fmt::format("\r{}\r", std::string(shown_, ' ')));
   std::fflush(stderr);
   shown_ = 0;
 }
