@@ -8,6 +8,7 @@
 
 #include "bisector/preview.h"
 #include "compute/compute.h"
+#include "core/magnitude.h"
 #include "core/stopwatch.h"
 #include "io/files.h"
 #include "job/cells.h"
@@ -88,6 +89,7 @@ void RvdJob::check_usage(const Usage& usage) {
 void RvdJob::read(Journal& journal) {
   const Stopwatch reading;
   domain = read_domain(input, given.mesh, false, journal);
+  require_moderate_model(domain.tets ? domain.tets->vertices : domain.surface->vertices, "vertex");
   if (given.seeds || !seeds_file_.empty()) {
     seeds = read_seeds(seeds_file_, given, count_);
   } else if (domain.tets) {
@@ -96,6 +98,7 @@ void RvdJob::read(Journal& journal) {
     for (const SurfaceSample& sample : sample_surface(*domain.surface, count_, random_seed_))
       seeds.push_back(sample.point);
   }
+  require_moderate(seeds, "seed");
   io_ = reading.seconds();
 }
 

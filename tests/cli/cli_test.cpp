@@ -177,6 +177,11 @@ TEST_F(Cli, BadInputAndOutput) {
   expect_failure(1, {"remesh", sphere, "-o", out, "-n", "10", "--device", "cpu", "--precision", "single"},
                  "--precision");
   expect_failure(1, {"rvd", sphere, "-n", "10", "--device", "cpu", "--precision", "single"}, "--precision");
+  for (const auto& [length, what] : {std::pair{"1e80", "beyond 1e+40"}, std::pair{"1e-41", "1e-40 or more"}}) {
+    const std::string l = length;
+    write_text("scaled.off", "OFF\n3 1 0\n0 0 0\n" + l + " 0 0\n0 " + l + " 0\n3 0 1 2\n");
+    expect_failure(1, {"rvd", in("scaled.off"), "-n", "10"}, what);
+  }
   expect_failure(1, {"check", "--device", "cpu", "--precision", "single"}, "--precision");
   expect_failure(1, {"quality", in("missing.off")}, "missing.off");
   expect_failure(1, {"quality", sphere, "--report", "/dev/full"}, "/dev/full");
