@@ -39,8 +39,8 @@ std::string time_left(double seconds) {
   return fmt::format("{:.1f} h left", seconds / 3600);
 }
 
-// A full disk behind stderr stops no run.
-void put_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
+// What cannot be written, for a disk is full, stops no run; fmt::print would.
+void put(std::FILE* file, const std::string& text) { std::fputs(text.c_str(), file); }
 
 }  // namespace
 
@@ -54,7 +54,9 @@ void stop_watching_interrupts() {
   if (interrupted) throw Cancelled();
 }
 
-void print_error(std::string_view message) { put_error(fmt::format("bisector: error: {}\n", job::one_line(message))); }
+void print_error(std::string_view message) {
+  put(stderr, fmt::format("bisector: error: {}\n", job::one_line(message)));
+}
 
 Console::Console(bool quiet, bool stdout_is_taken)
     : quiet_(quiet), live_(!quiet && isatty(STDERR_FILENO)), out_(stdout_is_taken ? stderr : stdout),
@@ -71,7 +73,7 @@ job::Listener Console::listener() {
   if (!quiet_)
     listener.warning = [this](const std::string& warning) {
       clear_line();
-      put_error(fmt::format("bisector: warning: {}\n", warning));
+      put(stderr, fmt::format("bisector: warning: {}\n", warning));
     };
   listener.cancel = &interrupted;
   return listener;
@@ -80,13 +82,13 @@ job::Listener Console::listener() {
 void Console::print(std::string_view line) {
   if (quiet_) return;
   clear_line();
-  fmt::print(out_, "{}\n", line);
+  put(out_, fmt::format("{}\n", line));
 }
 
 void Console::note(std::string_view line) {
   if (quiet_) return;
   clear_line();
-  put_error(fmt::format("bisector: {}\n", job::one_line(line)));
+  put(stderr, fmt::format("bisector: {}\n", job::one_line(line)));
 }
 
 void Console::print_written(const std::vector<std::string>& paths) {
@@ -115,14 +117,14 @@ void Console::show_line(std::string line) {
   line = job::one_line(line).substr(0, terminal_width() - 1);
   const std::size_t length = line.size();
   if (length < shown_) line.append(shown_ - length, ' ');
-  put_error(fmt::format("\r{}", line));
+  put(stderr, fmt::format("\r{}", line));
   std::fflush(stderr);
   shown_ = length;
 }
 
 void Console::clear_line() {
   if (shown_ == 0) return;
-  put_error(fmt::format("\r{}\r", std::string(shown_, ' ')));
+  put(stderr, fmt::format("\r{}\r", std::string(shown_, ' ')));
   std::fflush(stderr);
   shown_ = 0;
 }

@@ -131,13 +131,11 @@ TEST_F(CliLimits, StandardStreamsThatAreClosedAreNotTheOutputs) {
   }
 }
 
-// Neither warnings nor errors.
+// Warnings, the summary and errors are lost there, nothing else.
 TEST_F(CliLimits, FullDiskBehindStderrStopsNoRun) {
-  const std::string full = " 2> /dev/full > /dev/null", program = BISECTOR_PROGRAM, output = in("out.off");
+  const std::string full = " --report - 2> /dev/full > /dev/null", program = BISECTOR_PROGRAM, output = in("out.off");
   const std::string warned = program + " remesh " + in("cube.off") + " -n 50 -o " + output;
-  write_text("cube.off",
-             "OFF\n8 6 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
-             "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  write_mesh(in("cube.off"), test::box(1));
   ASSERT_NE(run({"remesh", in("cube.off"), "-n", "50", "-o", output}).err.find("warning"), std::string::npos);
   fs::remove(output);
   EXPECT_EQ(WEXITSTATUS(std::system((warned + full).c_str())), 0);

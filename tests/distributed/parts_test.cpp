@@ -107,7 +107,12 @@ TEST_F(Parts, OfATinyModelAreAnErrorOfAllRanks) {
   const std::string path = write(mesh);
   for (const std::size_t size : {1, 3}) {
     ThreadRanks ranks(size);
-    EXPECT_THROW(read_on_all(path, 50, ranks.root()), Error);
+    try {
+      read_on_all(path, 50, ranks.root());
+      ADD_FAILURE() << "no error";
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("1e-40"), std::string::npos) << error.what();
+    }
   }
 }
 

@@ -45,13 +45,18 @@ std::vector<Option> make_options(CLI::App& app) {
   return options;
 }
 
-Entry make_entry(const std::string& name, CLI::App& app, const CommandText& text) {
+Entry make_entry(const std::string& name, const CommandText& text) {
   Entry entry;
   entry.name = name;
   entry.about = joined_lines(text.about);
   entry.usage = text.usage;
   entry.description = lines_of(text.description);
   entry.examples = text.examples;
+  return entry;
+}
+
+Entry make_entry(const std::string& name, CLI::App& app, const CommandText& text) {
+  Entry entry = make_entry(name, text);
   entry.options = make_options(app);
   entry.exit_codes = {std::begin(kExitCodes), std::end(kExitCodes)};
   return entry;
@@ -89,35 +94,32 @@ Entry make_step_entry() {
 
 // It has no options: its requests come through a socket.
 Entry make_tetgen_entry() {
-  Entry entry;
-  entry.name = "bisector-tetgen";
-  entry.about = "Fill a surface with tetrahedra for bisector.";
-  entry.usage = "bisector-tetgen";
-  entry.description = {
-      "Is run by bisector tet, and by programs that use Bisector's library, to fill a closed surface by TetGen. It "
-      "reads one request from the socket that is its standard input and writes the reply there; it is not made to be "
-      "called by hand.",
-      "It is a program of its own because TetGen may crash, and because TetGen is under the AGPL, version 3. Bisector "
-      "looks for it beside itself, or where the environment variable BISECTOR_TETGEN says."};
-  return entry;
+  return make_entry(
+      "bisector-tetgen",
+      {"Fill a surface with tetrahedra for bisector.",
+       "bisector-tetgen",
+       "Is run by bisector tet, and by programs that use Bisector's library, to fill a closed surface by TetGen. It "
+       "reads one request from the socket that is its standard input and writes the reply there; it is not made to be "
+       "called by hand.\n"
+       "It is a program of its own because TetGen may crash, and because TetGen is under the AGPL, version 3. Bisector "
+       "looks for it beside itself, or where the environment variable BISECTOR_TETGEN says.",
+       {}});
 }
 
-// It has the options of bisector.
+// Its options are those of bisector.
 Entry make_mpi_entry() {
-  Entry entry;
-  entry.name = "bisector-mpi";
-  entry.about = "Share the work of bisector among ranks of MPI.";
-  entry.usage = "mpirun -n RANKS bisector COMMAND ...";
-  entry.description = {
-      "Is what bisector makes way for where Open MPI's mpirun starts it as one of several ranks; it is not made to be "
-      "called by hand. The first rank is the program: it reads, writes and prints. The others compute for it. The "
-      "result is the same, to the last byte, for any number of ranks.",
-      "It is a program of its own because only it links MPI. It lies beside bisector."};
-  entry.examples = {{"mpirun -n 8 bisector remesh scan.ply -o mesh.ply -n 1000000",
-                     "Remesh a surface whose diagrams eight processes compute."},
-                    {"mpirun -n 4 bisector remesh-parts huge.ply -o mesh.ply -n 1000000",
-                     "Remesh a surface of which each process reads and keeps a part."}};
-  return entry;
+  return make_entry(
+      "bisector-mpi",
+      {"Share the work of bisector among ranks of MPI.",
+       "mpirun -n RANKS bisector COMMAND ...",
+       "Is what bisector makes way for where Open MPI's mpirun starts it as one of several ranks; it is not made to be "
+       "called by hand. The first rank is the program: it reads, writes and prints. The others compute for it. The "
+       "result is the same, to the last byte, for any number of ranks.\n"
+       "It is a program of its own because only it links MPI. It lies beside bisector.",
+       {{"mpirun -n 8 bisector remesh scan.ply -o mesh.ply -n 1000000",
+         "Remesh a surface whose diagrams eight processes compute."},
+        {"mpirun -n 4 bisector remesh-parts huge.ply -o mesh.ply -n 1000000",
+         "Remesh a surface of which each process reads and keeps a part."}}});
 }
 
 }  // namespace
