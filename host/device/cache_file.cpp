@@ -1,13 +1,12 @@
 #include "host/device/cache_file.h"
 
-#include <unistd.h>
-
-#include <atomic>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <span>
 #include <system_error>
+
+#include "core/temporary_name.h"
 
 namespace bisector::host {
 namespace {
@@ -33,14 +32,6 @@ std::uint64_t hash_of(std::span<const std::uint8_t> data) {
 
 Header header_of(const CacheOwner& owner, const std::vector<std::uint8_t>& data) {
   return {{'B', 'I', 'S', 'P', 'I', 'P', 'E', '1'}, owner, 0, data.size(), hash_of(data)};
-}
-
-// A file beside it that no other process or thread writes.
-fs::path temporary_of(const fs::path& path) {
-  static std::atomic<unsigned> count{0};
-  fs::path temporary = path;
-  temporary += "." + std::to_string(getpid()) + "." + std::to_string(count++) + ".tmp";
-  return temporary;
 }
 
 }  // namespace
@@ -73,7 +64,7 @@ bool store_cache(const fs::path& path, const CacheOwner& owner, const std::vecto
   if (data.empty() || load_cache(path, owner) == data) return true;
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
-  const fs::path temporary = temporary_of(path);
+  const fs::path temporary = path.parent_path() / temporary_name();
   const Header header = header_of(owner, data);
   std::ofstream file(temporary, std::ios::binary);
   file.write(reinterpret_cast<const char*>(&header), sizeof header);

@@ -32,6 +32,8 @@ class BISECTOR_API Checkpoint {
 
   // Whether there is nothing to go on from. Such a file is removed with the object.
   bool empty() const;
+  // What it had to go on from when it was opened, in words.
+  std::string found() const;
   // Removes the file, of a run that has ended.
   void remove();
 

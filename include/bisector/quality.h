@@ -78,7 +78,7 @@ BISECTOR_API DistanceReport measure_distance(const TriangleMesh& mesh, const Tri
 using FeatureEdges = std::vector<std::array<Index, 2>>;
 
 struct FeatureDistance {
-  // In percent of the diagonal of the reference's bounding box, by samples along the edges.
+  // In percent of the diagonal of the bounding box of the reference's triangles, by samples along the edges.
   double vertices = 0;        // largest distance of a vertex of the mesh's feature edges from those of the reference
   double to_reference = 0;    // of a point of the mesh's feature edges
   double from_reference = 0;  // of a point of the reference's feature edges from those of the mesh
@@ -86,7 +86,7 @@ struct FeatureDistance {
 
 // All 0 if neither has any; infinite if one alone has none.
 BISECTOR_API FeatureDistance measure_feature_distance(const std::vector<Vec3>& vertices, const FeatureEdges& edges,
-                                                      const std::vector<Vec3>& reference_vertices,
+                                                      const TriangleMesh& reference,
                                                       const FeatureEdges& reference_edges);
 
 // --- tetrahedral meshes ---

@@ -46,8 +46,8 @@ enum class TopologyControl {
 };
 
 enum class Energy {
-  automatic,    // constrained, but restricted where the input's normals are noise ; creases are then not
-                // looked for, and a dual that is a manifold like the input is not asked for the ball property
+  automatic,    // constrained. Where the input's normals are noise, creases are not looked for, a dual that is a
+                // manifold like the input is not asked for the ball property, and the result is fitted
   constrained,  // seeds end on the surface (CCVT)
   restricted,   // seeds may leave the surface (RCVT), but for those on features
 };
@@ -107,7 +107,14 @@ struct ImproveReport {
   std::size_t trials = 0;                 // changes that were tried on a patch
   std::size_t made = 0;                   // that stayed, of a patch each
   std::size_t inserted = 0, removed = 0;  // seeds, by those
-  std::size_t missed = 0;                 // triangles of the result with an angle beyond the goal
+  std::size_t missed = 0;                 // triangles that it left with an angle beyond the goal
+};
+
+// What was done in the mesh itself to bad angles and feature curves that no seeds could mend.
+struct MendReport {
+  std::size_t bad = 0;                    // triangles with an angle below 30 degrees that no two curves impose, before
+  std::size_t made = 0;                   // changes that stayed
+  std::size_t inserted = 0, removed = 0;  // vertices, by those
 };
 
 // What moving the vertices off the surface has changed.
@@ -150,9 +157,9 @@ struct FeatureResult {
 };
 
 struct RemeshResult {
-  // The restricted Delaunay triangulation of the seeds that own a cell, but for kept triangles and what surrounds kept
-  // edges that seeds had divided. Its feature_edges are the edges along the
-  // input's features; labels are those of the input's triangles in which its dual vertices lie.
+  // The restricted Delaunay triangulation of the seeds that own a cell, but for kept triangles, what surrounds kept
+  // edges that seeds had divided, and what was mended. Its feature_edges are the edges along the input's features;
+  // labels are those of the input's triangles in which its dual vertices lie.
   TriangleMesh mesh;
   std::vector<SeedPlace> places;   // of mesh's vertices
   std::vector<Index> kept;         // of each of mesh's vertices, the input's that it is, or kNone; empty: none is kept
@@ -166,10 +173,11 @@ struct RemeshResult {
   FeatureResult features;
   DetailResult detail;
   bool noisy = false;      // the input's normals were taken for noise
-  WeldResult welded;       // without the mesh
+  WeldResult welded;       // without the mesh; vertex_of is kNone where no triangle uses a vertex
   std::size_t wanted = 0;  // vertices
   double edge_length = 0;  // aimed at where the density is 1
   ImproveReport improved;
+  MendReport mended;
   FitReport fitted;
   DistanceOutcome distance;  // all 0 unless one was asked for
   int iterations = 0;        // accepted steps, all levels

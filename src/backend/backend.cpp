@@ -45,6 +45,7 @@ const Surface& Backend::surface() const {
 
 EvaluationReport Backend::evaluate(const std::vector<Vec3>& seeds, Want want, Diagram& diagram) {
   if (seeds.empty()) throw Error("there are no seeds; give at least one");
+  if (!(mass_ > 0)) throw Error("the area or volume is too small for numbers; mend the mesh, or scale it");
   const bool reads_dual = includes(want, Want::dual) && !includes(offers_, Want::dual);
   const Want computed = reads_dual ? (want & (Want::polygons | Want::polyhedra)) | Want::labels : want;
   if (!includes(offers_, computed)) throw std::logic_error("a backend of a surface was asked for polyhedra");

@@ -22,7 +22,8 @@ struct BatchOptions {
 
 struct BatchResult {
   job::Json summary;                // of all jobs of the file
-  std::size_t ran = 0, known = 0;   // of the shard: run now, and before
+  std::size_t jobs = 0;             // of the shard
+  std::size_t done_before = 0;      // of these, those that a batch before has done
   std::vector<std::string> failed;  // names of the shard's that are not done
 };
 

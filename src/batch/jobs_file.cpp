@@ -13,6 +13,7 @@
 #include "bisector/error.h"
 #include "job/job.h"
 #include "job/messages.h"
+#include "job/outputs.h"
 
 namespace bisector::batch {
 namespace {
@@ -24,6 +25,8 @@ using job::Json;
 constexpr const char* kOwnKeys[] = {"report", "quiet", "verbose", "help"};
 // What a batch writes beside the files of its jobs.
 constexpr const char* kSummary = "summary";
+// Of a job, in bytes: names of files have at most 255.
+constexpr std::size_t kLongestName = 200;
 
 [[noreturn]] void fail(const std::string& path, std::size_t line, const std::string& what) {
   throw Error(fmt::format("{}: line {}: {}", path, line, what));
@@ -36,8 +39,14 @@ class LineReader {
   BatchJob read(const std::string& text) const {
     BatchJob job;
     job.line = line_;
+    std::set<std::string> keys;
+    const auto note_key = [&](int depth, Json::parse_event_t event, Json& parsed) {
+      if (event == Json::parse_event_t::key && depth == 1 && !keys.insert(parsed.get<std::string>()).second)
+        fail(fmt::format("\"{}\" is given twice", parsed.get<std::string>()));
+      return true;
+    };
     try {
-      job.given = Json::parse(text);
+      job.given = Json::parse(text, note_key);
     } catch (const Json::exception&) {
       fail("is not JSON; a line is one object, such as {\"command\": \"remesh\", \"input\": \"in.off\", ...}");
     }
@@ -53,7 +62,7 @@ class LineReader {
     for (const auto& [key, value] : job.given.items()) {
       if (key == "command" || key == "input" || key == "name") continue;
       if (std::find(std::begin(kOwnKeys), std::end(kOwnKeys), key) != std::end(kOwnKeys))
-        fail(fmt::format("\"{}\" cannot be given; a batch keeps the report of each job", key));
+        fail(fmt::format("\"{}\" cannot be given; a batch keeps what each job reports and prints", key));
       const auto output = outputs.find(key);
       if (output != outputs.end()) {
         if (!value.is_string() || value.get<std::string>().empty())
@@ -68,6 +77,10 @@ class LineReader {
       add_option(option, value, job.words);
     }
     job.name = name_of(job);
+    if (job.name.empty()) fail("the job has no name; give it a \"name\", or an output that is no folder");
+    if (job.name.size() > kLongestName)
+      fail(fmt::format("the name {}... is too long for a file; give the job a \"name\" of at most {} characters",
+                       job.name.substr(0, 20), kLongestName));
     return job;
   }
 
@@ -142,14 +155,34 @@ std::vector<BatchJob> read_jobs(const std::string& path) {
   if (file.bad()) throw Error(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
   if (jobs.empty()) throw Error(path + ": has no jobs; write a JSON object on each line");
   make_unique(path, jobs);
-  std::map<fs::path, std::size_t> writer;
+  return jobs;
+}
+
+void check_files(const std::string& path, const std::vector<BatchJob>& jobs, const std::string& folder) {
+  const fs::path home = job::target_of(folder + '/' + kSummary).parent_path();
+  std::set<fs::path> own{job::target_of(path)};
+  for (const char* ending : {".json", ".csv", ".html"}) own.insert(home / (std::string(kSummary) + ending));
+  for (const BatchJob& job : jobs)
+    for (const char* ending : {".json", ".log"}) own.insert(home / (job.name + ending));
+  std::map<fs::path, std::size_t> writer;  // its line
   for (const BatchJob& job : jobs)
     for (const std::string& output : job.outputs) {
-      const auto [found, fresh] = writer.emplace(fs::absolute(output).lexically_normal(), job.line);
+      const fs::path file = job::target_of(output);
+      const bool hidden = file.parent_path() == home && file.filename().string().starts_with('.');
+      if (hidden || own.contains(file))
+        fail(path, job.line, output + " is a file of the batch itself; choose another name, or another folder for -o");
+      const auto [found, fresh] = writer.emplace(file, job.line);
       if (!fresh)
         fail(path, job.line, fmt::format("{} is written by line {}, too; choose another name", output, found->second));
     }
-  return jobs;
+  for (const BatchJob& job : jobs)
+    for (const std::string& input : job.inputs) {
+      const auto found = writer.find(job::target_of(input));
+      if (found != writer.end() && found->second != job.line)
+        fail(path, job.line,
+             fmt::format("{} is written by line {}; jobs run in any order: put this one into a batch of its own", input,
+                         found->second));
+    }
 }
 
 }  // namespace bisector::batch

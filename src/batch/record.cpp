@@ -1,6 +1,7 @@
 #include "batch/record.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <csignal>
@@ -23,12 +24,6 @@ constexpr std::pair<Ending, const char*> kWords[] = {{Ending::done, "done"},
                                                      {Ending::timeout, "timeout"},
                                                      {Ending::memory, "memory"}};
 
-bool is_newer(const std::string& file, const std::string& than) {
-  std::error_code error;
-  const fs::file_time_type time = fs::last_write_time(file, error);
-  return !error && time > fs::last_write_time(than, error) && !error;
-}
-
 }  // namespace
 
 const char* word_of(Ending ending) {
@@ -36,7 +31,17 @@ const char* word_of(Ending ending) {
       ->second;
 }
 
-Json make_record(const BatchJob& job, const Outcome& outcome, const std::string& message, Json report) {
+Json state_of(const std::vector<std::string>& files) {
+  Json state = Json::object();
+  for (const std::string& file : files) {
+    struct stat found {};
+    state[file] = nullptr;
+    if (stat(file.c_str(), &found) == 0) state[file] = {found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec};
+  }
+  return state;
+}
+
+Json make_record(const BatchJob& job, const Outcome& outcome, const std::string& message, Json report, Json files) {
   Json record{{"job", job.given}, {"status", word_of(outcome.ending)}};
   if (outcome.signal) record["signal"] = outcome.signal;
   else record["exit_code"] = outcome.exit_code;
@@ -44,19 +49,23 @@ Json make_record(const BatchJob& job, const Outcome& outcome, const std::string&
   record["memory_mib"] = static_cast<double>(outcome.most_memory) / (1024 * 1024);
   if (outcome.ending != Ending::done) record["message"] = message;
   record["report"] = std::move(report);
+  record["files"] = std::move(files);
   return record;
 }
+
+bool is_done(const Json& record) { return record["status"] == word_of(Ending::done); }
 
 std::optional<Json> read_record(const std::string& path, const BatchJob& job, bool retry) {
   std::ifstream file(path);
   if (!file) return {};
   Json record = Json::parse(file, nullptr, false);
-  if (!record.is_object() || !record.contains("job") || record["job"] != job.given || is_newer(job.input, path))
+  if (!record.is_object() || record.value("job", Json()) != job.given ||
+      record.value("files", Json()) != state_of(job.inputs))
     return {};
   const Json status = record.value("status", Json());
   const auto known = [&](const auto& word) { return status == word.second; };
   if (std::none_of(std::begin(kWords), std::end(kWords), known)) return {};
-  if (status != word_of(Ending::done)) return retry ? std::optional<Json>() : record;
+  if (!is_done(record)) return retry ? std::optional<Json>() : record;
   std::error_code error;
   for (const std::string& output : job.outputs)
     if (!fs::exists(output, error)) return {};
@@ -79,7 +88,7 @@ std::string message_of(const Outcome& outcome, const Limits& limits, const std::
   switch (outcome.ending) {
     case Ending::timeout: return fmt::format("took longer than {} s", limits.seconds);
     case Ending::memory:
-      return fmt::format("held more than {:.0f} MiB of memory", static_cast<double>(limits.memory) / (1024 * 1024));
+      return fmt::format("held more than {:.4g} MiB of memory", static_cast<double>(limits.memory) / (1024 * 1024));
     case Ending::crashed:
       return fmt::format("was killed by signal {} ({}){}", outcome.signal, strsignal(outcome.signal),
                          outcome.signal == SIGKILL ? ", perhaps for want of memory" : "");

@@ -22,6 +22,7 @@
 #include "c/mesh_arrays.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "core/threads.h"
 #include "job/devices.h"
 #include "job/job.h"
 #include "job/messages.h"
@@ -475,6 +476,7 @@ bisector_status bisector_run(const bisector_options* options, const bisector_mes
     Job& job = *object->job;
     job.given.mesh = input->given;
     job.input = input->given ? "mesh" : input->path;
+    if (job.threads != 1) bisector::start_threads();
     const bisector::ThreadLimit limit(job.threads);
     Journal journal(called.listener());
     journal.phase("reading " + job.input);

@@ -135,8 +135,18 @@ void StepStore::index() {
     places(kind)[head.step] = {offset, head.size};
     end_ = offset + head.size;
   }
+  found_ = describe(size - std::min(end_, size));
   if (end_ < size && ftruncate(descriptor_, static_cast<off_t>(end_)) != 0)
     fail(path_, fmt::format("cannot be written: {}", std::strerror(errno)));
+}
+
+std::string StepStore::describe(std::uint64_t left_out) const {
+  std::string found = "nothing that could be gone on from";
+  if (!empty())
+    found = fmt::format("{} step{} done{}", results_.size(), results_.size() == 1 ? "" : "s",
+                        states_.empty() ? "" : ", and one under way");
+  if (left_out > 0) found += fmt::format("; the last {} bytes are damaged or half written and left out", left_out);
+  return found;
 }
 
 bool StepStore::is_whole(const Head& head, std::uint64_t offset, std::uint64_t size) const {
@@ -261,6 +271,7 @@ Checkpoint::Checkpoint(const std::string& path, std::string_view identity, const
     : steps_(std::make_unique<StepStore>(path, identity, options)) {}
 Checkpoint::~Checkpoint() = default;
 bool Checkpoint::empty() const { return steps_->empty(); }
+std::string Checkpoint::found() const { return steps_->found(); }
 void Checkpoint::remove() { steps_->remove(); }
 
 }  // namespace bisector

@@ -29,6 +29,8 @@ class StepStore {
 
   bool empty() const { return results_.empty() && states_.empty(); }
   void remove();
+  // What there was when it was opened, in words.
+  const std::string& found() const { return found_; }
 
   // The next step of the run.
   StepKey begin(std::uint64_t start);
@@ -55,6 +57,7 @@ class StepStore {
   void open_file();
   void check_head_line(const std::string& line);
   void index();
+  std::string describe(std::uint64_t left_out) const;
   bool is_whole(const Head& head, std::uint64_t offset, std::uint64_t size) const;
   std::optional<std::string> read(const StepKey& step, Kind kind) const;
   void append(const StepKey& step, Kind kind, std::string_view bytes, const Context& context);
@@ -62,7 +65,7 @@ class StepStore {
   void compact();
 
   std::string path_;
-  std::string head_line_;
+  std::string head_line_, found_;
   CheckpointOptions options_;
   int descriptor_ = -1;
   bool failed_ = false;      // nothing is written any more

@@ -10,8 +10,8 @@
 #include "check/device_check.h"
 #include "commands.h"
 #include "console.h"
-#include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "core/threads.h"
 #include "front.h"
 #include "job/messages.h"
 #include "job/outputs.h"
@@ -122,7 +122,7 @@ void run(const CheckCommand& command) {
   const Stopwatch total;
   const std::string& report_path = command.common.report;
   check_outputs({{}, report_output(report_path)}, {});
-  const ThreadLimit limit(command.threads);
+  start_threads(command.threads);
   Console console(command.common.quiet, report_path == "-");
   const DeviceRequest device = choose_device(command.device);
 
@@ -150,6 +150,7 @@ void run(const CheckCommand& command) {
   }
   console.print(fmt::format("passed: {}, all as the CPU has them; {:.1f} s", cases, total.seconds()));
   console.print_written({report_path});
+  if (report_path.empty()) require_printed();
 }
 
 }  // namespace
@@ -169,7 +170,7 @@ Command add_check(CLI::App& program) {
       "Prints one line for each case, and exits with 1 if any does not agree."};
   CLI::App* app = add_command(program, "check", text);
   add_options(app, *command);
-  return {app, text, {}, [=] { run(*command); }};
+  return {app, text, {}, {}, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

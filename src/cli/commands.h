@@ -39,6 +39,8 @@ struct Command {
   CommandText text;
   // What options ask of each other; may be empty. Throws CLI::ValidationError.
   std::function<void()> check_usage;
+  // The files that its options name as input; may be empty.
+  std::function<std::vector<std::string>()> input_files;
   // Reads the input, calls the library, and writes and prints the result. Throws Error and Cancelled; then no output
   // was written, except for a check whose report tells what does not agree.
   std::function<void()> run;

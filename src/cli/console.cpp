@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 
 #include "job/messages.h"
 #include "program.h"
@@ -14,11 +16,16 @@
 namespace bisector::cli {
 namespace {
 
-std::atomic<bool> interrupted = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+constexpr char kCancelled[] = "bisector: cancelled\n";
+
+std::atomic<bool> interrupted = false, at_once = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "used in a signal handler");
+int print_failure = 0;  // error number; 0: none
 
 extern "C" void on_interrupt(int) {
-  if (interrupted.exchange(true)) _exit(kInterrupted);
+  if (!interrupted.exchange(true) && !at_once) return;
+  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kCancelled, sizeof kCancelled - 1);
+  _exit(kInterrupted);
 }
 
 void handle_interrupts(void (*handler)(int)) {
@@ -54,6 +61,16 @@ void stop_watching_interrupts() {
   if (interrupted) throw Cancelled();
 }
 
+void end_at_interrupts(bool at_once_now) { at_once = at_once_now; }
+
+void require_printed() {
+  if (print_failure == 0) return;
+  throw Error(fmt::format("what is printed cannot be written to stdout: {}; check where it is redirected to",
+                          std::strerror(print_failure)));
+}
+
+void print_cancelled() { put(stderr, kCancelled); }
+
 void print_error(std::string_view message) {
   put(stderr, fmt::format("bisector: error: {}\n", job::one_line(message)));
 }
@@ -75,6 +92,7 @@ job::Listener Console::listener() {
       clear_line();
       put(stderr, fmt::format("bisector: warning: {}\n", warning));
     };
+  listener.note = [this](const std::string& line) { note(line); };
   listener.cancel = &interrupted;
   return listener;
 }
@@ -83,6 +101,8 @@ void Console::print(std::string_view line) {
   if (quiet_) return;
   clear_line();
   put(out_, fmt::format("{}\n", line));
+  // Who reads a pipe sees it at once.
+  if ((std::fflush(out_) != 0 || std::ferror(out_)) && out_ == stdout && print_failure == 0) print_failure = errno;
 }
 
 void Console::note(std::string_view line) {

@@ -15,9 +15,16 @@ namespace bisector::cli {
 
 // From here on Ctrl-C and SIGTERM set the flag that is returned; a second one ends the program at once.
 const std::atomic<bool>& watch_interrupts();
+// Whether already the first of them ends the program at once.
+void end_at_interrupts(bool at_once);
 // From here on they are ignored, so that outputs are written together. Throws Cancelled if one came before.
 void stop_watching_interrupts();
 
+// Throws Error if something that was printed could not be written to stdout.
+void require_printed();
+
+// The last line of a run that was cancelled.
+void print_cancelled();
 // One line on stderr: "bisector: error: ...". Control characters in it are replaced.
 void print_error(std::string_view message);
 

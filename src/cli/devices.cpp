@@ -57,7 +57,7 @@ void run(const DevicesCommand& command) {
   if (list.devices.empty()) console.print("vulkan    none: " + list.problem);
   if (!best_gpu(list)) console.print(kNoGpu);
 
-  if (command.report.empty()) return;
+  if (command.report.empty()) return require_printed();
   write_report(command.report, devices_report(list), {});
   console.print_written({command.report});
 }
@@ -78,7 +78,7 @@ Command add_devices(CLI::App& program) {
       {{"bisector devices", "List the devices."}}};
   CLI::App* app = add_command(program, "devices", text);
   add_options(app, *command);
-  return {app, text, {}, [=] { run(*command); }};
+  return {app, text, {}, {}, [=] { run(*command); }};
 }
 
 }  // namespace bisector::cli

@@ -1,15 +1,31 @@
 #include "front.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/memory_limit.h"
-#include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "core/threads.h"
+#include "io/files.h"
 #include "job/outputs.h"
 
 namespace bisector::cli {
+
+namespace {
+
+std::vector<std::string> arguments;
+
+}  // namespace
+
+void set_arguments(int argc, char** argv) { arguments.assign(argv + std::min(argc, 1), argv + argc); }
 
 Help::Help(std::string usage) : usage_(std::move(usage)) {
   column_width(32);
@@ -42,12 +58,32 @@ void add_common_options(CLI::App* app, CommonOptions& options, const char* about
   app->add_flag("--verbose", options.verbose, "print the seconds of each phase")->group("Output");
 }
 
+namespace {
+
+// Bytes of a size such as 8GB, 1.5G or 500MB, in powers of 1024. Throws CLI::ValidationError.
+std::uint64_t bytes_of(const std::string& size) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(size.data(), size.data() + size.size(), number);
+  std::string unit(end, static_cast<std::size_t>(size.data() + size.size() - end));
+  unit.erase(0, unit.find_first_not_of(' '));
+  for (char& c : unit) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  if (unit.ends_with("IB")) unit.erase(unit.size() - 2);
+  else if (unit.ends_with('B')) unit.pop_back();
+  constexpr std::string_view kPowers = "KMGT";
+  const std::size_t power = unit.empty() ? 0 : kPowers.find(unit) + 1;
+  const double bytes = std::ldexp(number, 10 * static_cast<int>(power));
+  if (error != std::errc() || unit.size() > 1 || (power == 0 && !unit.empty()) || !(bytes >= 1 && bytes < 0x1p63))
+    throw CLI::ValidationError(
+        fmt::format("--memory {} is no size; give a number of bytes, or one with a unit, such as 8GB or 500MB", size));
+  return static_cast<std::uint64_t>(bytes);
+}
+
+}  // namespace
+
 void add_memory(CLI::App* app, std::uint64_t& bytes, const char* about) {
-  // The check is of what the transform, which comes first, has made of the word.
-  app->add_option("--memory", bytes, about)
+  app->add_option_function<std::string>(
+         "--memory", [&bytes](const std::string& size) { bytes = bytes_of(size); }, about)
       ->type_name("SIZE")
-      ->check(job::whole_number(1, UINT64_MAX).description(""))
-      ->transform(CLI::AsSizeValue(false).description(""))
       ->group("Computation");
 }
 
@@ -74,23 +110,28 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
   outputs.push_back(job::report_output(report_path));
   outputs.push_back({job.checkpoint_file(), {}});  // it is removed once the others are written
   job::check_outputs(outputs, job.input_files());
-  const ThreadLimit limit(job.threads);
+  start_threads(job.threads);
   Console console(files.common.quiet, report_path == "-");
   job::Journal& journal = console.journal();
 
   journal.phase("reading " + job.input);
+  end_at_interrupts(true);  // there is nothing to lose, and a pipe that nobody writes to would never open
   job.read(journal);
+  end_at_interrupts(false);
   for (const job::OutputKind& kind : kinds)
     if (const std::string& path = files.outputs.at(kind.name); !path.empty())
       job.check_format(kind.name, path, journal);
   compute(job, console);
   job::Json report;
   view::Scene scene;
-  if (!report_path.empty()) report = job.report(journal);
+  if (!report_path.empty()) {
+    report = job.report(journal);
+    report["arguments"] = arguments;
+  }
   if (job::is_page(report_path)) scene = job.scene(kinds.empty() ? "" : files.outputs.at(kinds.front().name));
 
   journal.phase("writing");
-  stop_watching_interrupts();
+  FilesTogether together;
   for (const job::OutputKind& kind : kinds) {
     const Stopwatch writing;
     if (const std::string& path = files.outputs.at(kind.name); !path.empty())
@@ -102,12 +143,16 @@ void run(job::Job& job, const JobFiles& files, const PrintSummary& print_summary
     report["seconds"] = job.seconds;
     job::write_report(report_path, report, journal.warnings(), scene);
   }
+  stop_watching_interrupts();
+  together.put_in_place();
   job.finish();
   print_summary(console, job, files);
   std::vector<std::string> written;
   for (const job::OutputKind& kind : kinds) written.push_back(files.outputs.at(kind.name));
   written.push_back(report_path);
   console.print_written(written);
+  const auto is_file = [](const std::string& path) { return !path.empty() && path != "-"; };
+  if (std::none_of(written.begin(), written.end(), is_file)) require_printed();
 }
 
 }  // namespace
@@ -133,7 +178,12 @@ Command add_job(CLI::App& program, std::shared_ptr<job::Job> job, const CommandT
       if (!path.empty()) job->plan(name, path);
     job->check_usage(job::Usage(*app));
   };
-  return {app, text, check_usage, [=] { run(*job, *files, print_summary); }};
+  const auto input_files = [=] {
+    std::vector<std::string> names = job->input_files();
+    std::erase(names, std::string());
+    return names;
+  };
+  return {app, text, check_usage, input_files, [=] { run(*job, *files, print_summary); }};
 }
 
 }  // namespace bisector::cli

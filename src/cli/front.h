@@ -21,6 +21,9 @@ struct CommonOptions {
   bool verbose = false;
 };
 
+// What the program was started with, without its own name: reports have it.
+void set_arguments(int argc, char** argv);
+
 // Adds a subcommand with nothing but its help.
 CLI::App* add_command(CLI::App& program, const char* name, const CommandText& text);
 

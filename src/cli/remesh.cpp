@@ -29,7 +29,8 @@ void print_summary(Console& console, const RemeshJob& job, const JobFiles& files
                               result.distance.upper, result.distance.lower,
                               counted(static_cast<std::size_t>(result.distance.runs), "run", "runs")));
   if (result.noisy)
-    console.print("noise      seeds were left off the surface, whose normals are noise at this edge length");
+    console.print(
+        "noise      normals are noise at this edge length: no creases were looked for, and the result was fitted");
   console.print(fmt::format("energy     {:.6e} after {} iterations", result.energy, result.iterations));
   print_device(console, result.device);
   console.print(fmt::format("time       {:.2f} s", job.seconds["total"].get<double>()));

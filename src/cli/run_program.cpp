@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "bisector/error.h"
 #include "console.h"
 #include "core/memory_limit.h"
+#include "front.h"
 #include "job/messages.h"
 #include "program.h"
 
@@ -31,13 +33,20 @@ void print_no_memory() {
               " MiB; raise it (--memory), ask for fewer vertices or use a larger machine");
 }
 
+void print_no_thread() {
+  const std::uint64_t limit = memory_limit();
+  if (limit == 0) return print_error(job::kNoThread);
+  print_error("the system refuses another thread: the limit of memory is " + std::to_string(limit >> 20) +
+              " MiB; raise it (--memory), or give fewer --threads");
+}
+
 // Runs the command and maps what it throws to an exit code.
 int run_guarded(const Command& command) {
   try {
     command.run();
     return kSuccess;
   } catch (const Cancelled&) {
-    std::fputs("bisector: cancelled\n", stderr);
+    print_cancelled();
     return kInterrupted;
   } catch (const JobsFailed& error) {
     print_error(error.what());
@@ -47,7 +56,8 @@ int run_guarded(const Command& command) {
   } catch (const Error& error) {
     print_error(job::with_advice(error));
   } catch (const std::exception& error) {
-    print_error(job::wants_thread(error) ? job::kNoThread : error.what());
+    if (job::wants_thread(error)) print_no_thread();
+    else print_error(error.what());
   }
   return command.failure ? command.failure : kFailure;
 }
@@ -63,11 +73,17 @@ int run_program(int argc, char** argv) {
     return found == commands.end() ? nullptr : &*found;
   };
 
+  set_arguments(argc, argv);
   try {
     app.parse(argc, argv);
     if (chosen() && chosen()->check_usage) chosen()->check_usage();
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
+    if (error.get_exit_code() == 0) {
+      app.exit(error);
+      if (std::cout.flush()) return kSuccess;
+      print_error("what is printed cannot be written to stdout; check where it is redirected to");
+      return kFailure;
+    }
     return fail_usage(error.what(), chosen());
   }
   if (!chosen()) {

@@ -1,6 +1,7 @@
 // Vectors with a fixed order of operations, so that sums and products round alike on every backend, and boxes.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -87,6 +88,20 @@ inline Box bounding_box(const std::vector<Vec3>& points) {
     }
   return box;
 }
+
+// Bounding box of the points that triangles use; the zero box if there are none.
+inline Box bounding_box(const std::vector<Vec3>& points, const std::vector<Triangle>& triangles) {
+  if (triangles.empty()) return {};
+  Box box{points[triangles[0][0]], points[triangles[0][0]]};
+  for (const Triangle& t : triangles)
+    for (const Index v : t)
+      for (int k = 0; k < 3; ++k) {
+        box.lo[k] = std::min(box.lo[k], points[v][k]);
+        box.hi[k] = std::max(box.hi[k], points[v][k]);
+      }
+  return box;
+}
+inline Box bounding_box(const TriangleMesh& mesh) { return bounding_box(mesh.vertices, mesh.triangles); }
 
 // Where on the segment from a (0) to b (1) the point nearest to p lies; 0 if a and b are the same point.
 double nearest_parameter(const Vec3& p, const Vec3& a, const Vec3& b);

@@ -59,8 +59,16 @@ void for_each_chunk(std::size_t chunks, const Body& body) {
 }
 #else
 template <class Body>
+[[gnu::noinline]] void run_chunk(const Body& body, std::size_t c) {
+  body(c);
+}
+
+template <class Body>
 void for_each_chunk(std::size_t chunks, const Body& body) {
-  tbb::parallel_for(std::size_t{0}, chunks, body);
+  // TBB would ask for threads all the same, and start them once a limit of one has ended.
+  if (thread_count() == 1)
+    for (std::size_t c = 0; c < chunks; ++c) run_chunk(body, c);
+  else tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) { run_chunk(body, c); });
 }
 #endif
 }  // namespace detail
@@ -117,7 +125,8 @@ void sort_in_parallel(std::vector<T>& values, const Less& less) {
 #if defined(__SANITIZE_THREAD__)
   std::sort(values.begin(), values.end(), less);
 #else
-  tbb::parallel_sort(values.begin(), values.end(), less);
+  if (thread_count() == 1) std::sort(values.begin(), values.end(), less);
+  else tbb::parallel_sort(values.begin(), values.end(), less);
 #endif
 }
 

@@ -153,7 +153,10 @@ DistributedBackend::~DistributedBackend() {
 }
 
 BackendDescription DistributedBackend::description() const {
-  return {fmt::format("{}, {} ranks", processor_name(), ranks_.size()), "ranks", "double", {}};
+  return {fmt::format("{}, {} {}", processor_name(), ranks_.size(), ranks_.size() == 1 ? "rank" : "ranks"),
+          "ranks",
+          "double",
+          {}};
 }
 
 std::vector<PartFigures> DistributedBackend::figures() {

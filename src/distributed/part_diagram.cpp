@@ -11,6 +11,7 @@
 
 #include "checkpoint/bytes.h"
 #include "core/append_range.h"
+#include "core/degenerate.h"
 #include "core/parallel.h"
 #include "distributed/unordered_sum.h"
 #include "voronoi/clip.h"
@@ -51,11 +52,17 @@ double greatest(std::size_t n, std::size_t run, const Value& value) {
   return largest_of(found);
 }
 
+bool has_area(const TriangleMesh& mesh) {
+  return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
+    return !collinear(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
+  });
+}
+
 }  // namespace
 
 PartDiagram::PartDiagram(SurfacePart part, Regions regions, int rank)
     : triangle_(std::move(part.triangle)), regions_(std::move(regions)), rank_(rank), box_(regions_.box(rank)) {
-  if (!part.mesh.triangles.empty()) {
+  if (has_area(part.mesh)) {
     surface_.emplace(std::move(part.mesh), std::move(part.density));
     for (int k = 0; k < 3; ++k) {
       box_.lo[k] = std::min(box_.lo[k], surface_->box.lo[k]);
@@ -86,7 +93,8 @@ PairCounts PartDiagram::evaluate(Ranks& ranks, const std::vector<Vec3>& seeds, N
   const bool wants_dual = includes(want, Want::dual), wants_polygons = includes(want, Want::labels);
   meet_seeds(ranks, shares, seeds, source, wants_dual ? want | Want::labels : want);
   shares_ = std::move(shares);
-  if (number != 0) kept_.keep(number, ids_, std::move(local_.moments.triangles), shares_.all());
+  // Without facets no diagram fills the list again: it has to stay one, of no rows.
+  if (number != 0) kept_.keep(number, ids_, std::exchange(local_.moments.triangles, {}), shares_.all());
   sum_cells(fetch_terms(ranks), includes(want, Want::triangles));
   set_step_masses(ranks);
   collect_cells(ranks, at_home_, count, includes(want, Want::triangles), diagram.moments);

@@ -84,7 +84,7 @@ class PartDiagram {
   void set_step_masses(Ranks& ranks);
   void rename_polygons();
 
-  std::optional<Surface> surface_;  // none where the rank has no facets
+  std::optional<Surface> surface_;  // none where the rank has no facet with an area
   std::vector<Index> triangle_;     // of each of the surface's, in the whole mesh
   Regions regions_;
   int rank_;

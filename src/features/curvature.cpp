@@ -240,7 +240,7 @@ PrincipalCurvatures principal_curvatures(const TriangleMesh& mesh, const std::ve
   result.max.assign(n, 0);
   result.min_direction.assign(n, {});
   result.max_direction.assign(n, {});
-  const double diagonal = bounding_box(mesh.vertices).diagonal();
+  const double diagonal = bounding_box(mesh).diagonal();
   if (!(diagonal > 0)) return result;
   int exponent = 0;
   std::frexp(diagonal, &exponent);

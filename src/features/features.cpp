@@ -88,7 +88,7 @@ class Folds {
   bool has_normal(std::size_t triangle) const { return !(normals_[triangle] == Vec3{}); }
 
   void find_normals() {
-    const double diagonal = bounding_box(points_).diagonal();
+    const double diagonal = bounding_box(points_, triangles_).diagonal();
     normals_.resize(triangles_.size());
     parallel_each(triangles_.size(), [&](std::size_t t) {
       const auto [a, b, c] = triangles_[t];

@@ -118,7 +118,7 @@ std::vector<Vec3> find_poles(const Samples& samples, double far) {
 }  // namespace
 
 LocalFeatureSize::LocalFeatureSize(const TriangleMesh& mesh, std::size_t count) {
-  diagonal_ = bounding_box(mesh.vertices).diagonal();
+  diagonal_ = bounding_box(mesh).diagonal();
   if (!(diagonal_ > 0)) return;
   // Spheres through four points have terms of the fifth power of a length; powers of two are exact.
   int exponent = 0;

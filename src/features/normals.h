@@ -15,10 +15,10 @@ namespace bisector {
 // counts. 0 if there is no area. The length must be positive.
 double normal_roughness(const TriangleMesh& mesh, double length);
 
-// Whether the gradients of CCVT, which need normals, are unreliable, so that RCVT should be used alone. At the edge
-// length that `vertices` vertices make on the surface the roughness has to exceed 12 degrees, and it must not be the
-// mere detail of a coarse result, which lessens with the length: noise is as rough at half the length, or, where the
-// triangles are too large for that, hardly rougher at twice the length.
+// Whether normals are noise, so that folds are no creases and cells need not be disks. At the edge length that
+// `vertices` vertices make on the surface the roughness has to exceed 12 degrees, and it must not be the mere detail of
+// a coarse result, which lessens with the length: noise is as rough at half the length, or, where the triangles are too
+// large for that, hardly rougher at twice the length.
 bool has_noisy_normals(const TriangleMesh& mesh, std::size_t vertices);
 
 }  // namespace bisector

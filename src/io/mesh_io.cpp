@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -22,6 +21,7 @@
 
 #include "bisector/error.h"
 #include "core/degenerate.h"
+#include "core/temporary_name.h"
 #include "io/attributes.h"
 #include "io/files.h"
 #include "io/formats.h"
@@ -360,6 +360,62 @@ void write_feature_edges(const std::string& path, const std::vector<Edge>& edges
   write_file(path, out);
 }
 
+// A file that has all of its bytes, but not yet its name.
+class FilesTogether::File {
+ public:
+  // `target`: `path` without links. Throws Error.
+  File(const std::string& path, const std::filesystem::path& target, const std::string& bytes)
+      : path_(path), target_(target) {
+    temporary_ = target.parent_path() / temporary_name();
+    // Nothing is left of a file without a name if the program is killed; not all file systems have such.
+    const std::string folder = target.has_parent_path() ? target.parent_path().string() : ".";
+    file_.emplace(folder, O_WRONLY | O_TMPFILE);
+    named_ = !file_->is_open() || ::access("/proc/self/fd", X_OK) != 0;
+    if (named_) file_.emplace(temporary_.string(), O_WRONLY | O_CREAT | O_EXCL);
+    if (!file_->is_open()) fail_write(path, errno);
+    if (!file_->write(bytes) || !file_->flush()) give_up();
+  }
+  ~File() {
+    if (named_) ::unlink(temporary_.c_str());
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
+  void put_in_place() {
+    if (!named_ && !file_->link_to(temporary_.string())) give_up();
+    named_ = true;
+    if (!file_->close() || ::rename(temporary_.c_str(), target_.c_str()) != 0) give_up();
+    named_ = false;
+  }
+
+ private:
+  [[noreturn]] void give_up() {
+    const int reason = errno;
+    if (std::exchange(named_, false)) ::unlink(temporary_.c_str());
+    fail_write(path_, reason);
+  }
+
+  std::string path_;
+  std::filesystem::path target_, temporary_;
+  std::optional<bisector::File> file_;
+  bool named_ = false;  // is there under its temporary name
+};
+
+namespace {
+
+thread_local FilesTogether* together = nullptr;
+
+}  // namespace
+
+FilesTogether::FilesTogether() { together = this; }
+
+FilesTogether::~FilesTogether() { together = nullptr; }
+
+void FilesTogether::put_in_place() {
+  for (const std::unique_ptr<File>& file : files_) file->put_in_place();
+  files_.clear();
+}
+
 void write_file(const std::string& path, const std::string& bytes) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -375,21 +431,9 @@ void write_file(const std::string& path, const std::string& bytes) {
     if (!device.is_open() || !device.write(bytes) || !device.close()) fail_write(path, errno);
     return;
   }
-
-  static std::atomic<unsigned> serial = 0;
-  const fs::path temporary = target.parent_path() / fmt::format(".bisector-{}-{}.tmp", ::getpid(), serial++);
-  // Nothing is left of a file without a name if the program is killed; not all file systems have such.
-  const std::string folder = target.has_parent_path() ? target.parent_path().string() : ".";
-  std::optional<File> file(std::in_place, folder, O_WRONLY | O_TMPFILE);
-  bool named = !file->is_open() || ::access("/proc/self/fd", X_OK) != 0;
-  if (named) file.emplace(temporary.string(), O_WRONLY | O_CREAT | O_EXCL);
-  if (!file->is_open()) fail_write(path, errno);
-  if (!file->write(bytes) || !file->flush() || !(named || (named = file->link_to(temporary.string()))) ||
-      !file->close() || ::rename(temporary.c_str(), target.c_str()) != 0) {
-    const int reason = errno;
-    if (named) ::unlink(temporary.c_str());
-    fail_write(path, reason);
-  }
+  auto file = std::make_unique<FilesTogether::File>(path, target, bytes);
+  if (together) together->files_.push_back(std::move(file));
+  else file->put_in_place();
 }
 
 }  // namespace bisector

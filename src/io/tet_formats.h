@@ -48,6 +48,8 @@ TetSoup read_vtu(const std::string& path, std::string_view bytes);
 // A scalar per vertex: of the point data of the VTK formats, or the first one of a Medit solution.
 std::vector<double> read_vtk_attribute(const std::string& path, std::string_view bytes, const std::string& name);
 std::vector<double> read_vtu_attribute(const std::string& path, std::string_view bytes, const std::string& name);
+// The file of numbers that read_tet_attribute() reads beside a Medit file; empty for files of other formats.
+std::string solution_beside(const std::string& path);
 std::vector<double> read_medit_solution(const std::string& path, std::string_view bytes);
 std::vector<double> read_medit_solution_binary(const std::string& path, std::string_view bytes);
 

@@ -193,6 +193,13 @@ void write_tet_mesh(const std::string& path, const TetMesh& mesh, const SecondOr
   write_file(path, format.bytes_of_tets(mesh, order));
 }
 
+std::string io::solution_beside(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  if (extension != ".mesh" && extension != ".meshb") return {};
+  const std::string stem = path.substr(0, path.size() - extension.size());
+  return extension == ".meshb" && std::filesystem::exists(stem + ".solb") ? stem + ".solb" : stem + ".sol";
+}
+
 std::vector<double> read_tet_attribute(const std::string& path, const std::string& name) {
   const std::string extension = lower_extension(path);
   if (extension == ".vtk") return read_vtk_attribute(path, read_bytes(path), name);
@@ -202,9 +209,8 @@ std::vector<double> read_tet_attribute(const std::string& path, const std::strin
     fail(path, fmt::format("there are no values '{}' at vertices, {} files are not read for them; use .vtk, .vtu, or "
                            ".mesh or .meshb with a .sol",
                            printable(name), extension.empty() ? "such" : printable(extension)));
-  const std::string stem = path.substr(0, path.size() - extension.size());
-  const bool binary_solution = binary && std::filesystem::exists(stem + ".solb");
-  const std::string solution = stem + (binary_solution ? ".solb" : ".sol"), bytes = read_bytes(solution);
+  const std::string solution = solution_beside(path), bytes = read_bytes(solution);
+  const bool binary_solution = lower_extension(solution) == ".solb";
   const std::vector<double> values =
       binary_solution ? read_medit_solution_binary(solution, bytes) : read_medit_solution(solution, bytes);
   const std::string mesh = read_bytes(path);

@@ -10,7 +10,9 @@
 #include "bisector/error.h"
 #include "bisector/io.h"
 #include "bisector/repair.h"
+#include "core/degenerate.h"
 #include "core/geometry.h"
+#include "core/magnitude.h"
 #include "job/messages.h"
 #include "job/outputs.h"
 #include "mesh/tet_topology.h"
@@ -23,7 +25,7 @@ namespace {
 // area says little.
 double default_alpha(const TriangleMesh& mesh, double edge) {
   constexpr double kFinest = 1.0 / 500, kCoarsest = 1.0 / 20;  // in diagonals of the bounding box
-  const double diagonal = bounding_box(mesh.vertices).diagonal();
+  const double diagonal = bounding_box(mesh).diagonal();
   return std::clamp(edge, kFinest * diagonal, kCoarsest * diagonal);
 }
 
@@ -86,6 +88,20 @@ Domain read_domain(const std::string& path, const std::shared_ptr<const GivenMes
   if (marks) domain.surface = std::make_shared<const TriangleMesh>(boundary_surface(mesh));
   else domain.surface = std::make_shared<const TriangleMesh>(TriangleMesh{mesh.vertices, boundary_facets(mesh.tets)});
   return domain;
+}
+
+void require_meshable(const std::string& path, const Domain& domain) {
+  const auto has_area = [&](const Triangle& t) {
+    const std::vector<Vec3>& p = domain.surface->vertices;
+    return std::isnormal(norm2(twice_area_normal(p[t[0]], p[t[1]], p[t[2]]))) && !collinear(p[t[0]], p[t[1]], p[t[2]]);
+  };
+  try {
+    require_moderate_model(domain.tets ? domain.tets->vertices : domain.surface->vertices, "vertex");
+    if (std::none_of(domain.surface->triangles.begin(), domain.surface->triangles.end(), has_area))
+      throw Error("no triangle has an area; check the export");
+  } catch (const Error& error) {
+    throw Error(path.empty() ? error.what() : path + ": " + error.what());
+  }
 }
 
 std::vector<Vec3> read_seeds(const std::string& path, const Given& given, std::size_t count) {

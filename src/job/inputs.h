@@ -26,6 +26,10 @@ std::shared_ptr<const TriangleMesh> read_surface(const std::string& path, const 
 Domain read_domain(const std::string& path, const std::shared_ptr<const GivenMesh>& given, bool marks,
                    Journal& journal);
 
+// Throws Error, which names the file, for coordinates that the library does not compute with and for surfaces without
+// area.
+void require_meshable(const std::string& path, const Domain& domain);
+
 // `count`: how many the options ask for, or 0. Throws Error if there is another number.
 std::vector<Vec3> read_seeds(const std::string& path, const Given& given, std::size_t count);
 

@@ -105,7 +105,7 @@ class Job {
   std::string input;  // a file, unless a mesh is given
   Given given;
   unsigned threads = 0;  // 0: all cores
-  // Files that options name, which an output must not replace.
+  // Files that it reads, where it does: no output other than the first may replace one. Empty names stand for none.
   virtual std::vector<std::string> input_files() const { return {input}; }
   // Says before the run that an output of OutputKind::planned will be wanted; the name is for warnings.
   virtual void plan(std::string_view output, const std::string& name) {

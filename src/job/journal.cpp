@@ -17,6 +17,10 @@ void Journal::phase(const std::string& what) {
   if (listener_.phase) listener_.phase(what);
 }
 
+void Journal::note(std::string_view message) {
+  if (listener_.note) listener_.note(one_line(message));
+}
+
 void Journal::warn(std::string_view message) {
   warnings_.push_back(one_line(message));
   if (listener_.warning) listener_.warning(warnings_.back());

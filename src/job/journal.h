@@ -16,6 +16,7 @@ struct Listener {
   std::function<void(const std::string&)> phase;    // what is being done
   std::function<void(const Progress&)> progress;    // within it
   std::function<void(const std::string&)> warning;  // one line each
+  std::function<void(const std::string&)> note;     // likewise, of what is as it should be
   const std::atomic<bool>* cancel = nullptr;        // may be null
 };
 
@@ -30,6 +31,7 @@ class Journal {
   // Says what is being done. Throws Cancelled if the caller asked to stop.
   void phase(const std::string& what);
   void warn(std::string_view message);
+  void note(std::string_view message);
   // All so far, in order.
   const std::vector<std::string>& warnings() const { return warnings_; }
 

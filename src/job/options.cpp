@@ -1,5 +1,7 @@
 #include "job/options.h"
 
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cmath>
 #include <memory>
@@ -134,12 +136,12 @@ void add_compute_options(CLI::App* app, ComputeOptions& options) {
 void add_threads(CLI::App* app, unsigned& threads) {
   app->add_option("--threads", threads, "at most so many; default: all cores. The result is the same")
       ->type_name("N")
-      ->check(whole_number(1, 1024))
+      ->transform(whole_number(1, 1024))
       ->group("Computation");
 }
 
 CLI::Option* add_random_seed(CLI::App* app, std::uint64_t& random_seed, const char* help) {
-  return app->add_option("--random-seed", random_seed, help)->type_name("N")->check(whole_number(0, UINT64_MAX));
+  return app->add_option("--random-seed", random_seed, help)->type_name("N")->transform(whole_number(0, UINT64_MAX));
 }
 
 void add_edge_length(CLI::App* app, double& length, double& relative) {
@@ -169,7 +171,7 @@ void add_edge_bounds(CLI::App* app, SizingOptions& sizing) {
 void add_iterations(CLI::App* app, int& iterations, const char* help) {
   app->add_option("--iterations", iterations, help)
       ->type_name("N")
-      ->check(whole_number(0, 1'000'000))
+      ->transform(whole_number(0, 1'000'000))
       ->group("Optimisation");
 }
 
@@ -234,6 +236,16 @@ void Usage::refuse(const char* option, const char* why) const {
   if (given(option)) throw CLI::ValidationError(std::string(option) + ": " + why);
 }
 
+namespace {
+
+// A number as it reads shortest, 1e3 for 1000.0; other words as they are.
+std::string plain(const std::string& value) {
+  const std::optional<double> number = number_in<double>(value);
+  return number ? fmt::format("{}", *number) : value;
+}
+
+}  // namespace
+
 std::string Usage::words_of_result() const {
   static const std::set<std::string> none = {"device", "threads", "neighbors", "memory"};
   std::set<std::string> words;
@@ -242,7 +254,7 @@ std::string Usage::words_of_result() const {
     if (option->count() == 0 || option->get_positional() || group == "Output" || group == "Checkpoint" ||
         none.count(name) > 0)
       continue;
-    for (const std::string& value : option->results()) words.insert(name + '=' + value + '\n');
+    for (const std::string& value : option->results()) words.insert(name + '=' + plain(value) + '\n');
   }
   std::string all;
   for (const std::string& word : words) all += word;

@@ -21,7 +21,8 @@ inline constexpr std::uint64_t kMostSeeds = 100'000'000;
 
 // --- What a value may be ---
 
-// Decimal digits only: CLI11 alone would read 010 as eight and skip over much else.
+// Decimal digits only: CLI11 alone would read 010 as eight and skip over much else. To be used with transform(), for it
+// takes zeros in front away.
 CLI::Validator whole_number(std::uint64_t least, std::uint64_t most);
 CLI::Validator number_below(double most);  // and at least 0
 CLI::Validator number_above_zero();

@@ -11,18 +11,12 @@
 #include <filesystem>
 
 #include "bisector/error.h"
+#include "core/temporary_name.h"
 
 namespace bisector::job {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Where the bytes go: links are followed.
-fs::path target_of(const std::string& path) {
-  std::error_code error;
-  const fs::path target = fs::weakly_canonical(path, error);
-  return error ? fs::path(path) : target;
-}
 
 bool is_special(const fs::path& path) {
   std::error_code error;
@@ -51,7 +45,7 @@ void check_writable(const std::string& path) {
   if (!fs::is_directory(folder, error))
     throw Error(fmt::format("{}: the folder {} does not exist; create it first", path, folder.string()));
   // Permissions do not tell all: a file system may be read-only or full.
-  const fs::path trial = folder / fmt::format(".bisector-{}-trial.tmp", getpid());
+  const fs::path trial = folder / temporary_name();
   const int descriptor = open(trial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0)
     throw Error(fmt::format("{}: the folder {} cannot be written to: {}; choose another", path, folder.string(),
@@ -62,6 +56,12 @@ void check_writable(const std::string& path) {
 }
 
 }  // namespace
+
+fs::path target_of(const std::string& path) {
+  std::error_code error;
+  const fs::path target = fs::weakly_canonical(fs::absolute(path, error), error);
+  return error ? fs::path(path) : target;
+}
 
 std::string extension_of(const std::string& path) {
   std::string extension = fs::path(path).extension();

@@ -1,6 +1,7 @@
 // Finding out before a long computation what would keep its outputs from being written after it.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,9 @@ struct Output {
 };
 
 std::string extension_of(const std::string& path);  // in lower case, with the dot
+
+// Where the bytes of a path go, by its one name: links are followed.
+std::filesystem::path target_of(const std::string& path);
 
 // A report that goes to stdout needs no check.
 inline Output report_output(const std::string& path) { return {path == "-" ? "" : path, {}}; }

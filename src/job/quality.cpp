@@ -1,11 +1,29 @@
 #include "job/quality.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
+#include "bisector/error.h"
+#include "core/magnitude.h"
 #include "core/stopwatch.h"
 #include "mesh/tet_topology.h"
 
 namespace bisector::job {
+namespace {
+
+// Squares of lengths are doubles without loss between these.
+constexpr double kLeastMeasured = 1e-150, kMostMeasured = 1e150;
+
+// Throws Error.
+void require_measurable(const Domain& domain, const std::string& path) {
+  const double largest = largest_coordinate(domain.tets ? domain.tets->vertices : domain.surface->vertices);
+  if (largest > kMostMeasured || (0 < largest && largest < kLeastMeasured))
+    throw Error(fmt::format("{}the largest coordinate is {:g}, where areas are no longer numbers; scale the mesh",
+                            path.empty() ? "" : path + ": ", largest));
+}
+
+}  // namespace
 
 Json measured_size_json(const Domain& domain) {
   return domain.tets ? size_json(*domain.tets) : input_json(*domain.surface);
@@ -22,6 +40,8 @@ void QualityJob::read(Journal& journal) {
   mesh = read_domain(input, given.mesh, true, journal);
   if (given.reference || !reference_file.empty())
     reference = read_domain(reference_file, given.reference, true, journal);
+  require_measurable(mesh, input);
+  if (reference.surface) require_measurable(reference, reference_file);
   seconds["io"] = reading.seconds();
 }
 

@@ -131,7 +131,7 @@ Json trims_json(const std::string& input, const TriangleMesh& mesh, const Segmen
                 const RegionBorders& borders) {
   Json json = start_report("segment");
   json["input"] = input;
-  json["diagonal"] = bounding_box(mesh.vertices).diagonal();
+  json["diagonal"] = bounding_box(mesh).diagonal();
   json["rms"] = segmentation.rms;
   json["regions"] = Json::array();
   for (std::size_t r = 0; r < segmentation.regions.size(); ++r) {

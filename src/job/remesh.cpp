@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "bisector/io.h"
 #include "bisector/preview.h"
 #include "core/geometry.h"
+#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "io/files.h"
 #include "job/inputs.h"
@@ -21,8 +24,27 @@ void require_sound(const RemeshResult& result) {
   if (result.untiled > 0)
     throw Error(fmt::format("the final diagram does not tile {} of the input; please report this as a bug",
                             counted(result.untiled, "triangle", "triangles")));
-  if (result.mesh.triangles.empty())
-    throw Error("the seeds are too few to span a triangle of this surface; ask for more vertices");
+}
+
+// The cells of too few seeds lie on the surface in a row.
+void require_triangles(const RemeshResult& result, const TriangleMesh& surface) {
+  if (!result.mesh.triangles.empty()) return;
+  constexpr double kMost = 1e9;  // vertices
+  const double area = fixed_sum(surface.triangles.size(), [&](std::size_t t) {
+    const Triangle& v = surface.triangles[t];
+    return 0.5 * norm(twice_area_normal(surface.vertices[v[0]], surface.vertices[v[1]], surface.vertices[v[2]]));
+  });
+  const double diagonal = bounding_box(surface).diagonal(), wide = area / diagonal;
+  const double wanted = 2 / std::numbers::sqrt3 * area / (wide * wide);  // whose edges are as long as it is wide
+  if (wanted < kMost) {
+    const double digit = std::pow(10.0, std::floor(std::log10(wanted)) - 1);  // two of them say enough
+    throw Error(
+        fmt::format("the vertices are too few to span a triangle of this surface, which is about {:.2g} wide; "
+                    "ask for some {:.0f}",
+                    wide, digit * std::round(wanted / digit)));
+  }
+  throw Error(fmt::format("the surface is too narrow for triangles: {:.2g} wide at a length of {:.2g}; mend it", wide,
+                          diagonal));
 }
 
 void warn_of_features(Journal& journal, const RemeshResult& result) {
@@ -113,7 +135,7 @@ std::vector<OutputKind> RemeshJob::outputs() const {
 void RemeshJob::add_options(CLI::App* app) {
   app->add_option("-n", options_.vertices, "vertices of the result, at least 4")
       ->type_name("N")
-      ->check(whole_number(4, kMostSeeds))
+      ->transform(whole_number(4, kMostSeeds))
       ->group("Seeds");
   add_file(app, "--seeds", seeds_, "FILE.xyz",
            "start from these points (\"x y z\" lines) in one level;\n"
@@ -161,8 +183,8 @@ void RemeshJob::add_options(CLI::App* app) {
             "enforce (mend it; default), check (warn) or off")
       ->group("Optimisation");
   add_words(app, "--energy", options_.energy, kEnergyWords,
-            "ccvt (seeds on the surface), rcvt (free) or auto (ccvt\n"
-            "unless the input is noise at this edge length; default)")
+            "ccvt (seeds on the surface), rcvt (free) or auto (ccvt,\n"
+            "without creases where the input is noise; default)")
       ->group("Optimisation");
   app->add_option("--min-angle", options_.min_angle,
                   "degrees that the last pass tries to get all angles\n"
@@ -182,7 +204,7 @@ void RemeshJob::add_options(CLI::App* app) {
                   "coarse-to-fine levels, 1 to 8; default: as many as the\n"
                   "count allows, at most 3")
       ->type_name("N")
-      ->check(whole_number(1, 8))
+      ->transform(whole_number(1, 8))
       ->group("Optimisation");
   add_compute_options(app, options_.compute);
   add_threads(app, threads);
@@ -205,7 +227,7 @@ void RemeshJob::add_distance_options(CLI::App* app) {
                   "ask for no more vertices for it; default: ten times as\n"
                   "many as without")
       ->type_name("N")
-      ->check(whole_number(4, kMostSeeds))
+      ->transform(whole_number(4, kMostSeeds))
       ->group("Size");
 }
 
@@ -270,10 +292,8 @@ void RemeshJob::keep() {
 void RemeshJob::complete_options() {
   if (!attribute_.empty()) options_.sizing.attribute = read_density(input, attribute_, given, surface->vertices.size());
   if (!feature_file_.empty()) options_.features.given = read_feature_edges(feature_file_, *surface);
-  if (edge_length_relative_ > 0)
-    options_.edge_length = edge_length_relative_ * bounding_box(surface->vertices).diagonal();
-  if (distance_max_relative_ > 0)
-    options_.distance_max = distance_max_relative_ * bounding_box(surface->vertices).diagonal();
+  if (edge_length_relative_ > 0) options_.edge_length = edge_length_relative_ * bounding_box(*surface).diagonal();
+  if (distance_max_relative_ > 0) options_.distance_max = distance_max_relative_ * bounding_box(*surface).diagonal();
   if (weld_ >= 0) options_.weld = weld_;
   keep();
   leave_out_folds(wrap_, options_.features);
@@ -292,6 +312,7 @@ void RemeshJob::plan(std::string_view output, const std::string&) {
 void RemeshJob::read(Journal& journal) {
   const Stopwatch reading;
   surface = read_surface(input, given.mesh, journal);
+  require_meshable(input, {surface, nullptr});
   io_ = reading.seconds();
   complete_options();
   wrapped_ = wrap_if_asked(wrap_, *surface, options_.vertices, options_.edge_length, false, journal, wrap_mesh_);
@@ -315,9 +336,10 @@ Fingerprint RemeshJob::fingerprint() const {
 void RemeshJob::compute(Journal& journal) {
   journal.phase("preparing");
   Context context = journal.context();
-  saved_.open(fingerprint(), context);
+  saved_.open(fingerprint(), journal, context);
   result = remesh(remeshed_surface(), options_, context);
   require_sound(result);
+  require_triangles(result, *surface);
   warn_of_features(journal, result);
   if (options_.topology != TopologyControl::off) warn_of_topology(journal, result);
   if (result.distance.upper > options_.distance_max)
@@ -399,12 +421,17 @@ Json RemeshJob::report(Journal& journal) {
   report["noisy"] = result.noisy;
   report["weld"] = weld_json(result.welded);
   if (!wrapped_.is_null()) report["wrap"] = wrapped_;
-  if (options_.min_angle > 0 && options_.energy != Energy::restricted && !result.noisy)
+  if (options_.min_angle > 0 && options_.energy != Energy::restricted) {
     report["improved"] = {{"made", result.improved.made},
                           {"inserted", result.improved.inserted},
                           {"removed", result.improved.removed},
                           {"missed", result.improved.missed}};
-  if (options_.fit)
+    report["mended"] = {{"bad", result.mended.bad},
+                        {"made", result.mended.made},
+                        {"inserted", result.mended.inserted},
+                        {"removed", result.mended.removed}};
+  }
+  if (options_.fit || result.noisy)
     report["fit"] = {{"iterations", result.fitted.iterations},
                      {"damped", result.fitted.damped},
                      {"restored", result.fitted.restored}};

@@ -36,7 +36,7 @@ std::vector<OutputKind> RemeshPartsJob::outputs() const {
 void RemeshPartsJob::add_options(CLI::App* app) {
   app->add_option("-n", options_.vertices, "vertices of the result, at least 4")
       ->type_name("N")
-      ->check(whole_number(4, kMostSeeds))
+      ->transform(whole_number(4, kMostSeeds))
       ->required()
       ->group("Seeds");
   add_random_seed(app, options_.random_seed, "another number, another start; default 1")->group("Seeds");

@@ -72,7 +72,7 @@ void RvdJob::add_options(CLI::App* app) {
   add_file(app, "--seeds", seeds_file_, "FILE.xyz", "the seeds, as \"x y z\" lines")->group("Seeds");
   app->add_option("-n", count_, "so many random seeds instead")
       ->type_name("N")
-      ->check(whole_number(1, kMostSeeds))
+      ->transform(whole_number(1, kMostSeeds))
       ->group("Seeds");
   add_random_seed(app, random_seed_, "another number, another start; default 1")->group("Seeds");
   add_compute_options(app, compute_);
@@ -89,7 +89,7 @@ void RvdJob::check_usage(const Usage& usage) {
 void RvdJob::read(Journal& journal) {
   const Stopwatch reading;
   domain = read_domain(input, given.mesh, false, journal);
-  require_moderate_model(domain.tets ? domain.tets->vertices : domain.surface->vertices, "vertex");
+  require_meshable(input, domain);
   if (given.seeds || !seeds_file_.empty()) {
     seeds = read_seeds(seeds_file_, given, count_);
   } else if (domain.tets) {

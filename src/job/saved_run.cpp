@@ -11,7 +11,7 @@ void SavedRun::add_options(CLI::App* app) {
                   "seconds between states of the optimiser in it; default 60.\n"
                   "Ended steps are kept always")
       ->type_name("SECONDS")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_below(1e100))
       ->group("Checkpoint");
   app->add_flag("--resume", options_.resume, "go on from the checkpoint, if it is there, to the same result")
       ->group("Checkpoint");
@@ -24,10 +24,11 @@ void SavedRun::check_usage(const Usage& usage) {
   words_ = usage.words_of_result();
 }
 
-void SavedRun::open(const Fingerprint& input, Context& context) {
+void SavedRun::open(const Fingerprint& input, Journal& journal, Context& context) {
   if (path_.empty()) return;
   checkpoint_ = std::make_unique<Checkpoint>(path_, words_ + std::to_string(input.value()), options_);
   context.checkpoint = checkpoint_.get();
+  if (options_.resume) journal.note(path_ + " has " + checkpoint_->found());
 }
 
 std::string SavedRun::path() const { return checkpoint_ && !checkpoint_->empty() ? path_ : ""; }

@@ -9,6 +9,7 @@
 #include "bisector/checkpoint.h"
 #include "bisector/context.h"
 #include "checkpoint/fingerprint.h"
+#include "job/journal.h"
 #include "job/options.h"
 
 namespace bisector::job {
@@ -20,8 +21,8 @@ class SavedRun {
   void check_usage(const Usage& usage);
 
   // Before what takes long, if a checkpoint is asked for: opens it and names it in `context`. `input`: of all that the
-  // run reads. Throws Error.
-  void open(const Fingerprint& input, Context& context);
+  // run reads. Notes what a run that is resumed finds. Throws Error.
+  void open(const Fingerprint& input, Journal& journal, Context& context);
   const std::string& wanted_path() const { return path_; }
   // The file, if there is something in it to go on from.
   std::string path() const;

@@ -153,7 +153,7 @@ void SegmentJob::add_options(CLI::App* app) {
   app->add_flag("--project", options_.project, "move the vertices onto the surfaces found")->group("Output");
   app->add_option("--proxies", options_.proxies, "so many regions")
       ->type_name("N")
-      ->check(whole_number(1, kMostSeeds))
+      ->transform(whole_number(1, kMostSeeds))
       ->group("Regions");
   app->add_option("--error", options_.error,
                   "as few regions as keep the root mean square distance to\n"
@@ -174,7 +174,7 @@ void SegmentJob::add_options(CLI::App* app) {
   add_random_seed(app, options_.random_seed, "another number, another random start; default 1")->group("Regions");
   app->add_option("--iterations", options_.iterations, "Lloyd steps at most, each time; default 30")
       ->type_name("N")
-      ->check(whole_number(0, 100'000))
+      ->transform(whole_number(0, 100'000))
       ->group("Regions");
   app->add_flag("--regularize", options_.regularize,
                 "parallel and perpendicular axes, coincident axes and\n"
@@ -191,7 +191,7 @@ void SegmentJob::add_options(CLI::App* app) {
                   "triangles up to so many steps from a border may change\n"
                   "sides; default as many as it takes")
       ->type_name("K")
-      ->check(whole_number(1, 1000))
+      ->transform(whole_number(1, 1000))
       ->group("Borders");
   add_threads(app, threads);
 }
@@ -215,6 +215,7 @@ void SegmentJob::plan(std::string_view output, const std::string& name) {
 void SegmentJob::read(Journal& journal) {
   const Stopwatch reading;
   surface = read_surface(input, given.mesh, journal);
+  require_meshable(input, {surface, nullptr});
   io_ = reading.seconds();
 }
 
@@ -229,7 +230,7 @@ void SegmentJob::compute(Journal& journal) {
   result = segment(*surface, options_, journal.context());
   mesh = labelled_mesh(*surface, result);
   colours_ = region_colours(mesh, result);
-  diagonal = bounding_box(surface->vertices).diagonal();
+  diagonal = bounding_box(*surface).diagonal();
   seconds = segment_seconds(result.seconds);
   const Stopwatch polygonising;
   if (!polygons_name_.empty()) polygonise(journal);

@@ -13,6 +13,7 @@
 #include "bisector/preview.h"
 #include "core/geometry.h"
 #include "core/stopwatch.h"
+#include "io/tet_formats.h"
 #include "job/messages.h"
 #include "job/outputs.h"
 #include "job/words.h"
@@ -138,7 +139,7 @@ std::vector<OutputKind> TetJob::outputs() const {
 void TetJob::add_options(CLI::App* app) {
   app->add_option("-n", options_.vertices, "vertices of the result, about; at least 8")
       ->type_name("N")
-      ->check(whole_number(8, kMostSeeds))
+      ->transform(whole_number(8, kMostSeeds))
       ->group("Seeds");
   add_file(app, "--seeds", seeds_, "FILE.xyz",
            "start from these points (\"x y z\" lines) inside the\n"
@@ -198,7 +199,7 @@ void TetJob::add_options(CLI::App* app) {
                   "1 (straight edges; default) or 2: a node on each edge,\n"
                   "those of the boundary on the surface (.msh, .vtu)")
       ->type_name("N")
-      ->check(whole_number(1, 2))
+      ->transform(whole_number(1, 2))
       ->group("Size");
   add_iterations(app, options_.iterations, "steps, of which each phase may make a share; default 100");
   add_tolerance(app, options_.tolerance,
@@ -223,7 +224,11 @@ void TetJob::check_usage(const Usage& usage) {
 }
 
 std::vector<std::string> TetJob::input_files() const {
-  return {input, seeds_, feature_file_, split_sizes(sizes_).first};
+  const std::string sizes = split_sizes(sizes_).first;
+  std::vector<std::string> files{input, seeds_, feature_file_, sizes};
+  if (!attribute_.empty()) files.push_back(io::solution_beside(input));
+  files.push_back(io::solution_beside(sizes));
+  return files;
 }
 
 void TetJob::complete_options() {
@@ -233,7 +238,7 @@ void TetJob::complete_options() {
   else if (!sizes_.empty()) options_.sizing.sizes = read_sizes(sizes_);
   if (!feature_file_.empty()) options_.features.given = read_feature_edges(feature_file_, *walls_);
   if (edge_length_relative_ > 0)
-    options_.edge_length = edge_length_relative_ * bounding_box(domain.surface->vertices).diagonal();
+    options_.edge_length = edge_length_relative_ * bounding_box(*domain.surface).diagonal();
   if (weld_ >= 0) options_.weld = weld_;
   leave_out_folds(wrap_, options_.features);
   options_.threads = threads;
@@ -246,6 +251,7 @@ void TetJob::complete_options() {
 void TetJob::read(Journal& journal) {
   const Stopwatch reading;
   domain = read_domain(input, given.mesh, false, journal);
+  require_meshable(input, domain);
   if (domain.tets && options_.enclosed_regions)
     throw Error(
         "--regions: it is for surfaces, and tetrahedra have regions of their own, which are kept; leave it out");
@@ -301,7 +307,7 @@ Fingerprint TetJob::fingerprint() const {
 
 void TetJob::compute(Journal& journal) {
   Context context = journal.context();
-  saved_.open(fingerprint(), context);
+  saved_.open(fingerprint(), journal, context);
   result = !wrapped_.is_null() ? tetrahedralise(wrap_mesh_, options_, context)
            : domain.tets       ? tetrahedralise(*domain.tets, options_, context)
                                : tetrahedralise(*domain.surface, options_, context);

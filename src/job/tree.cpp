@@ -170,7 +170,7 @@ void TreeJob::add_options(CLI::App* app) {
       ->group("Radii");
   app->add_option("--clusters", options_.clusters, "at most so many; default: as many as it takes")
       ->type_name("N")
-      ->check(whole_number(1, kMostSeeds))
+      ->transform(whole_number(1, kMostSeeds))
       ->group("Clusters");
   app->add_option("--delta", options_.delta,
                   "split clusters whose points are farther, rms, from a\n"
@@ -180,7 +180,7 @@ void TreeJob::add_options(CLI::App* app) {
       ->group("Clusters");
   app->add_option("--max-cluster-points", options_.max_cluster_points, "split clusters of more points too")
       ->type_name("M")
-      ->check(whole_number(24, kMostSeeds))
+      ->transform(whole_number(24, kMostSeeds))
       ->group("Clusters");
   add_threads(app, threads);
 }

@@ -126,7 +126,7 @@ class Divider {
 };
 
 double size_of(const TriangleMesh& mesh) {
-  const Box box = bounding_box(mesh.vertices);
+  const Box box = bounding_box(mesh);
   return std::max(norm(box.lo), norm(box.hi)) + box.diagonal();
 }
 

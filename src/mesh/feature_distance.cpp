@@ -52,20 +52,19 @@ double farthest(const std::vector<Vec3>& vertices, const FeatureEdges& edges, co
 }  // namespace
 
 FeatureDistance measure_feature_distance(const std::vector<Vec3>& vertices, const FeatureEdges& edges,
-                                         const std::vector<Vec3>& reference_vertices,
-                                         const FeatureEdges& reference_edges) {
+                                         const TriangleMesh& reference, const FeatureEdges& reference_edges) {
   FeatureDistance result;
   if (edges.empty() && reference_edges.empty()) return result;
   if (edges.empty() || reference_edges.empty()) {
     result.vertices = result.to_reference = result.from_reference = std::numeric_limits<double>::infinity();
     return result;
   }
-  const double diagonal = bounding_box(reference_vertices).diagonal(), percent = 100 / diagonal;
-  const Creases mine(vertices, edges), theirs(reference_vertices, reference_edges);
+  const double diagonal = bounding_box(reference).diagonal(), percent = 100 / diagonal;
+  const Creases mine(vertices, edges), theirs(reference.vertices, reference_edges);
   for (const auto& edge : edges)
     for (Index v : edge) result.vertices = std::max(result.vertices, percent * theirs.distance(vertices[v]));
   result.to_reference = percent * farthest(vertices, edges, theirs, kSpacing * diagonal);
-  result.from_reference = percent * farthest(reference_vertices, reference_edges, mine, kSpacing * diagonal);
+  result.from_reference = percent * farthest(reference.vertices, reference_edges, mine, kSpacing * diagonal);
   return result;
 }
 

@@ -68,7 +68,10 @@ std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t 
   parallel_each(count, [&](std::size_t i) {
     Random random(random_seed, i);
     const double at = random.uniform() * mass.back();
-    const auto triangle = static_cast<Index>(std::upper_bound(mass.begin(), mass.end(), at) - mass.begin());
+    auto found = std::upper_bound(mass.begin(), mass.end(), at);
+    // A product may be rounded up to the sum itself, as where that is the least number there is.
+    if (found == mass.end()) found = std::lower_bound(mass.begin(), mass.end(), at);
+    const auto triangle = static_cast<Index>(found - mass.begin());
     const auto [a, b, c] = mesh.triangles[triangle];
     const auto w =
         density.empty() ? uniform_weights(random) : linear_weights(random, density[a], density[b], density[c]);

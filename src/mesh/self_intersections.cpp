@@ -98,7 +98,7 @@ class Slabs {
       }
       boxes_[i] = TriangleBox(box, i);
     });
-    const Box box = bounding_box(welded.vertices);
+    const Box box = bounding_box(welded);
     for (int k = 1; k < 3; ++k)
       if (box.hi[k] - box.lo[k] > box.hi[axis_] - box.lo[axis_]) axis_ = k;
     std::vector<double> begins(boxes_.size());

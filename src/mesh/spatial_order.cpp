@@ -8,13 +8,32 @@
 
 namespace bisector {
 
+namespace {
+
+// The vertices that triangles use.
+std::vector<Index> order_of_vertices(const TriangleMesh& mesh) {
+  std::vector<char> used(mesh.vertices.size(), 0);
+  for (const Triangle& t : mesh.triangles)
+    for (const Index v : t) used[v] = 1;
+  std::vector<Index> vertices;
+  for (Index v = 0; v < used.size(); ++v)
+    if (used[v]) vertices.push_back(v);
+  std::vector<Vec3> points(vertices.size());
+  parallel_each(points.size(), [&](std::size_t k) { points[k] = mesh.vertices[vertices[k]]; });
+  std::vector<Index> order = hilbert_order(points);
+  for (Index& v : order) v = vertices[v];
+  return order;
+}
+
+}  // namespace
+
 OrderedMesh in_spatial_order(const TriangleMesh& mesh) {
   OrderedMesh result;
-  const std::size_t vertices = mesh.vertices.size(), triangles = mesh.triangles.size();
-  const std::vector<Index> order = hilbert_order(mesh.vertices);
-  result.vertex_of.resize(vertices);
-  result.mesh.vertices.resize(vertices);
-  parallel_each(vertices, [&](std::size_t k) {
+  const std::size_t triangles = mesh.triangles.size();
+  const std::vector<Index> order = order_of_vertices(mesh);
+  result.vertex_of.assign(mesh.vertices.size(), kNone);
+  result.mesh.vertices.resize(order.size());
+  parallel_each(order.size(), [&](std::size_t k) {
     result.vertex_of[order[k]] = static_cast<Index>(k);
     result.mesh.vertices[k] = mesh.vertices[order[k]];
   });

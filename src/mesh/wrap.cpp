@@ -105,11 +105,12 @@ WrapResult wrap(const TriangleMesh& mesh, double alpha, double thickness, const 
   for (const Vec3& p : mesh.vertices) points.emplace_back(p.x, p.y, p.z);
   for (const Triangle& t : mesh.triangles) {
     const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-    if (collinear(a, b, c)) continue;
+    // Nearest points of those that only exact numbers tell from a line are not numbers.
+    if (collinear(a, b, c) || !std::isnormal(norm2(cross(b - a, c - a)))) continue;
     faces.push_back({t[0], t[1], t[2]});
   }
   if (faces.empty()) throw Error("no triangle has an area; there is nothing to wrap");
-  const double least = kLeastAlpha * bounding_box(mesh.vertices).diagonal();
+  const double least = kLeastAlpha * bounding_box(mesh).diagonal();
   if (!(alpha >= least && std::isfinite(alpha)))
     throw Error(fmt::format("{:.4g} is too small a radius for wrapping; it must be at least {:.4g}", alpha, least));
   if (!(thickness >= 0 && std::isfinite(thickness)))

@@ -229,7 +229,7 @@ void Division::join(const RemeshOptions& options, RemeshResult& result) const {
   result.topology_matches = same_topology(result.topology, result.input_topology);
   result.features.curves = graph.curves.size();
   result.features.corners = graph.corners.size();
-  result.features.distance = measure_feature_distance(mesh.vertices, mesh.feature_edges, whole().vertices, graph.edges);
+  result.features.distance = measure_feature_distance(mesh.vertices, mesh.feature_edges, whole(), graph.edges);
   result.welded = welded_;
   result.welded.mesh = {};
 }

@@ -65,6 +65,7 @@ class Planner {
 
   struct Trial {
     double width = 0;
+    bool resolves_short = true;  // curves that are no creases have edges as short as they are, whatever the width
     SimplifiedFeatures simplified;
     std::vector<Vec3> points;
     std::vector<double> lengths;
@@ -72,9 +73,10 @@ class Planner {
   };
 
   // `most`: more vertices need not be told from one another.
-  Trial trial(double width, double coarsening, double most) const {
+  Trial trial(double width, bool resolves_short, double coarsening, double most) const {
     Trial t;
     t.width = width;
+    t.resolves_short = resolves_short;
     t.simplified = simplify_features(features_, mesh_.vertices, weights_, width, links_, neighbours_);
     find_sizes(t, coarsening);
     t.vertices = count(t, coarsening, most);
@@ -82,16 +84,25 @@ class Planner {
   }
 
   // What resolves all details.
-  Trial finest(double coarsening) const { return trial(kFinest * mean_, coarsening, kFarTooMany * vertices_); }
+  Trial finest(double coarsening) const { return trial(kFinest * mean_, true, coarsening, kFarTooMany * vertices_); }
 
   // The least width that there are vertices for. `all` is what resolves all details.
   Trial within_budget(Trial all) const {
     if (all.vertices <= vertices_) return all;
     double fine = kFinest * mean_, coarse = kCoarsest * mean_;
-    Trial best = trial(coarse, kCoarsening, vertices_);
+    const auto attempt = [&](double width, bool resolves_short) {
+      return trial(width, resolves_short, kCoarsening, vertices_);
+    };
+    Trial best = attempt(coarse, true);
+    const bool resolves_short = best.vertices <= vertices_;
+    if (!resolves_short) {
+      best = attempt(fine, false);
+      if (best.vertices <= vertices_) return best;
+      best = attempt(coarse, false);
+    }
     for (int k = 0; k < kBisections; ++k) {
       const double middle = std::sqrt(fine * coarse);
-      Trial t = trial(middle, kCoarsening, vertices_);
+      Trial t = attempt(middle, resolves_short);
       if (t.vertices <= vertices_) {
         coarse = middle;
         best = std::move(t);
@@ -160,7 +171,8 @@ class Planner {
       // Curves that are no creases stay however near to each other they are. Where the shortest edges to be had are
       // still too long for the gap, they would leave slivers in it all the same.
       if (stays[p] && kPerGap * gaps[p] < kBelowWidth * t.width) gaps[p] = kInfinity;
-      const double length = std::max(std::min(bound[p], kPerGap * gaps[p]), kBelowWidth * t.width);
+      double length = std::max(std::min(bound[p], kPerGap * gaps[p]), kBelowWidth * t.width);
+      if (stays[p] && t.resolves_short) length = std::min(length, bound[p]);
       if (length >= plain[p]) continue;
       t.points.push_back(network.points()[p]);
       t.lengths.push_back(length);

@@ -28,10 +28,12 @@ inline constexpr double kDetailGradation = 0.35;
 // details; details below it are merged or let go (features/simplify.h). Details are the gaps between curves
 // (curve_gaps), the lengths of curves, quarters of the lengths of closed ones, and limbs that the edges could not run
 // around (features/disk_radius.h). Curves that are no creases stay; gaps between them that are too narrow for the edges
-// bound nothing. Where their corners alone are more than half of `vertices`, nothing is planned: all features stay.
+// bound nothing, and short ones get edges as short as they are, whatever the width, unless the coarsest details do not
+// fit beside them: edges that grow from one take some forty vertices for each doubling of their length. Where the
+// corners of these curves alone are more than half of `vertices`, nothing is planned: all features stay.
 // `edge_length` is the length aimed at without details, one value per vertex.
-// With `all` everything is resolved that is not finer than a sixteenth of the mean edge length; throws Error where that
-// takes far more vertices than there are.
+// With `all` everything is resolved that is not finer than a sixteenth of the mean edge length, and those short curves;
+// throws Error where that takes far more vertices than there are.
 DetailPlan plan_details(const TriangleMesh& mesh, const FeatureGraph& features, const std::vector<double>& edge_length,
                         std::size_t vertices, bool all);
 

@@ -187,7 +187,7 @@ class Fit {
 };
 
 Fit::Fit(const TriangleMesh& reference, TriangleMesh& mesh, const FitOptions& options)
-    : reference_(reference), mesh_(mesh), options_(options), diagonal_(bounding_box(reference.vertices).diagonal()),
+    : reference_(reference), mesh_(mesh), options_(options), diagonal_(bounding_box(reference).diagonal()),
       nearest_on_reference_(reference), corners_(corners_at_vertices(mesh)), fixed_(options.fixed),
       start_(mesh.vertices) {
   if (fixed_.empty()) fixed_.assign(mesh.vertices.size(), 0);

@@ -38,9 +38,8 @@ constexpr std::size_t kPoorTried = 30, kPoorShare = 30;
 // In average costs of a triangle: the price of each triangle at a seed beyond or short of six; by how much a trial may
 // be worse after the first sweeps; and what the right number of seeds may cost, per seed.
 constexpr double kIrregular = 10, kTrialSlack = 4, kPrice = 20;
-// Triangles with a smaller angle, in degrees, that are left are searched for: changes of up to so many steps, of which
-// the best are gone on from after each.
-constexpr double kBadAngle = 30;
+// Bad angles that are left are searched for: changes of up to so many steps, of which the best are gone on from after
+// each.
 constexpr int kSearchSteps = 3;
 constexpr std::size_t kSearchWidth = 4;
 constexpr double kSearchGain = 4;  // average costs of a triangle that a result must save
@@ -189,9 +188,6 @@ class Improver {
   std::vector<Index> seeds_around(Index middle) const;
   PatchVertex vertex_of(Index seed, const CellMap& map) const;
   ImprovePatch patch_of(const std::vector<Index>& seeds, const CellMap& map) const;
-  // The curve that two seeds are neighbours on; kNone if it passes one of them, which is the corner of others, or if
-  // there is more than one between two corners.
-  Index curve_between(Index a, Index b) const;
   Change best_change(Index middle, const CellMap& map, Aim aim, std::size_t& trials) const;
   std::optional<ImprovePatch> try_one(const ImprovePatch& start, Aim aim, std::size_t& trials) const;
   std::optional<ImprovePatch> search(const ImprovePatch& start, std::size_t rank, std::size_t& trials) const;
@@ -239,8 +235,8 @@ class Improver {
   const ImproveOptions& options_;
   SavedStep& saved_;
   ShapeGoal goal_;
-  std::vector<std::vector<Index>> corner_curves_;  // that end at each corner
-  std::size_t poor_left_ = 0;                      // poor seeds that may still be tried
+  const CurvesBetween curves_between_;
+  std::size_t poor_left_ = 0;  // poor seeds that may still be tried
   std::size_t searches_left_ = 0;
   std::vector<char> tried_;  // by seed: how often in vain since something near it has changed
   Snapshot now_;
@@ -255,13 +251,7 @@ class Improver {
 
 Improver::Improver(CvtRun& run, const FeatureTrace& trace, const ImproveOptions& options, SavedStep& saved)
     : run_(run), trace_(trace), options_(options), saved_(saved),
-      goal_(shape_goal(options.min_angle, options.max_angle)) {
-  if (!has_curves()) return;
-  corner_curves_.resize(run.curves().graph().corners.size());
-  for (Index curve = 0; curve < run.curves().size(); ++curve)
-    for (const Index corner : run.curves().ends(curve))
-      if (corner != kNone) corner_curves_[corner].push_back(curve);
-}
+      goal_(shape_goal(options.min_angle, options.max_angle)), curves_between_(run.curves()) {}
 
 void Improver::measure(Snapshot& s) {
   run_.context().check();
@@ -378,27 +368,6 @@ PatchVertex Improver::vertex_of(Index seed, const CellMap& map) const {
   return vertex;
 }
 
-Index Improver::curve_between(Index a, Index b) const {
-  const SeedPlace &u = now_.seeds.place(a), &v = now_.seeds.place(b);
-  if (u.curve != kNone || v.curve != kNone) {
-    const Index curve = u.curve != kNone ? u.curve : v.curve;
-    const auto on_it = [&](const SeedPlace& place) {
-      const auto [first, last] = run_.curves().ends(curve);
-      return place.curve == curve || (place.corner != kNone && (place.corner == first || place.corner == last));
-    };
-    return on_it(u) && on_it(v) ? curve : kNone;
-  }
-  if (u.corner == kNone || v.corner == kNone) return kNone;
-  Index found = kNone;
-  for (const Index curve : corner_curves_[u.corner]) {
-    const auto [first, last] = run_.curves().ends(curve);
-    if (first == last || (first != v.corner && last != v.corner)) continue;
-    if (found != kNone) return kNone;
-    found = curve;
-  }
-  return found;
-}
-
 // The seeds given and their triangles; the seeds come first and are free, as far as they may be.
 ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& map) const {
   std::vector<Index> triangles;
@@ -427,7 +396,7 @@ ImprovePatch Improver::patch_of(const std::vector<Index>& seeds, const CellMap& 
       const int next = (m + 1) % 3;
       if (on_curve[m])
         locked.push_back({std::min(local[m], local[next]), std::max(local[m], local[next]),
-                          curve_between(corners[m], corners[next])});
+                          curves_between_(now_.seeds.place(corners[m]), now_.seeds.place(corners[next]))});
     }
   }
   for (std::size_t k = 0; k < members.size(); ++k)
@@ -466,51 +435,30 @@ std::optional<ImprovePatch> Improver::try_one(const ImprovePatch& start, Aim aim
   return best;
 }
 
-// A beam search: what several changes at the worst triangle lead to. Of all results the one that costs least but for
-// `rank` others, if it costs less than now.
+// Of all results the one that costs least but for `rank` others, if it costs less than now.
 std::optional<ImprovePatch> Improver::search(const ImprovePatch& start, std::size_t rank, std::size_t& trials) const {
-  struct State {
+  struct Result {
     ImprovePatch patch;
     double cost;
-  };
-  const auto same = [&](const State& a, const State& b) { return std::abs(a.cost - b.cost) < now_.average; };
-  const auto keep_best = [&](std::vector<State>& states, std::size_t count) {
-    std::stable_sort(states.begin(), states.end(), [](const State& s, const State& t) { return s.cost < t.cost; });
-    states.erase(std::unique(states.begin(), states.end(), same), states.end());
-    if (states.size() > count) states.erase(states.begin() + static_cast<std::ptrdiff_t>(count), states.end());
   };
   const double before = start.cost(now_.average, irregular_price());
   const std::size_t encroachments = start.encroachments();
   const ShapeExcess worst = allowed(start.worst());
-  std::vector<State> beam{{start, before}}, best;
-  for (int step = 0; step < kSearchSteps; ++step) {
-    std::vector<State> next;
-    for (const State& state : beam) {
-      const auto attempt = [&](const auto& operation) {
-        ImprovePatch patch = state.patch;
-        if (!operation(patch)) return;
-        ++trials;
-        patch.relax_all(kSweeps);
-        const double cost = patch.cost(now_.average, irregular_price());
-        next.push_back({std::move(patch), cost});
-      };
-      std::vector<Index> vertices;
-      for (const auto& [a, b] : state.patch.edges_at_worst()) {
-        attempt([&](ImprovePatch& patch) { return patch.split(a, b); });
-        attempt([&](ImprovePatch& patch) { return patch.flip(a, b); });
-        for (const Index v : {a, b})
-          if (std::find(vertices.begin(), vertices.end(), v) == vertices.end()) vertices.push_back(v);
-      }
-      for (const Index v : vertices) attempt([&](ImprovePatch& patch) { return patch.remove(v); });
-    }
-    keep_best(next, kSearchWidth);
-    for (const State& state : next)
-      if (state.cost < before - kSearchGain * now_.average && state.patch.worst().within(worst) &&
-          state.patch.encroachments() <= encroachments)
-        best.push_back(state);
-    keep_best(best, rank + 1);
-    beam = std::move(next);
-  }
+  std::vector<Result> best;
+  const auto cost_of = [&](const ImprovePatch& patch) {
+    ++trials;
+    return patch.cost(now_.average, irregular_price());
+  };
+  const auto alike = [&](const Result& a, const Result& b) { return std::abs(a.cost - b.cost) < now_.average; };
+  search_changes(start, {kSearchSteps, kSearchWidth, kSweeps, now_.average}, cost_of,
+                 [&](const ImprovePatch& patch, double cost, bool gone_on_from) {
+                   if (!gone_on_from || !(cost < before - kSearchGain * now_.average) || !patch.worst().within(worst) ||
+                       patch.encroachments() > encroachments)
+                     return;
+                   best.push_back({patch, cost});
+                 });
+  std::stable_sort(best.begin(), best.end(), [](const Result& a, const Result& b) { return a.cost < b.cost; });
+  best.erase(std::unique(best.begin(), best.end(), alike), best.end());
   if (best.size() <= rank) return {};
   return std::move(best[rank].patch);
 }
@@ -531,8 +479,10 @@ Change Improver::best_change(Index middle, const CellMap& map, Aim aim, std::siz
   for (Index k = 0; k < best->vertices().size(); ++k) {
     const PatchVertex& vertex = best->vertices()[k];
     if (vertex.place.curve != kNone) change.curves.push_back(vertex.place.curve);
-    if (const Index corner = vertex.place.corner; corner != kNone && has_curves())
-      change.curves.insert(change.curves.end(), corner_curves_[corner].begin(), corner_curves_[corner].end());
+    if (const Index corner = vertex.place.corner; corner != kNone && has_curves()) {
+      const std::vector<Index>& ending = curves_between_.at_corner(corner);
+      change.curves.insert(change.curves.end(), ending.begin(), ending.end());
+    }
     if (vertex.removed) {
       if (vertex.seed != kNone) change.removed.push_back(vertex.seed);
     } else if (vertex.seed == kNone || !(vertex.x == now_.seeds.position(vertex.seed))) {
@@ -846,7 +796,7 @@ void Improver::smooth() {
       worse[v] = next.kinds[v] != now_.kinds[v] || !worst_excess(next, v).within(worst_excess(now_, v)) ||
                  (curve != kNone && newly_broken(next, curve));
       if (const Index corner = now_.seeds.place(v).corner; corner != kNone && has_curves())
-        for (const Index c : corner_curves_[corner]) worse[v] |= newly_broken(next, c);
+        for (const Index c : curves_between_.at_corner(corner)) worse[v] |= newly_broken(next, c);
     });
     bool changed = false;
     for (Index v = 0; v < n; ++v) {

@@ -6,7 +6,6 @@
 #include <numbers>
 #include <utility>
 
-#include "backend/project.h"
 #include "core/parallel.h"
 
 namespace bisector {
@@ -26,7 +25,8 @@ constexpr double kFacing = 0.2;                        // least cosine between a
 constexpr double kFirstStep = 0.1, kLastStep = 0.003;  // of the mean edge length
 constexpr double kDelaunaySlack = 1e-9;
 constexpr int kFlipPasses = 8;
-constexpr int kFlipEvery = 3;  // sweeps
+constexpr int kMostCrossed = 16;  // edges in the way of one of a curve
+constexpr int kFlipEvery = 3;     // sweeps
 
 double beyond(double excess) { return excess > 0 ? excess * (kLinear + kQuadratic * excess) : 0; }
 
@@ -41,12 +41,6 @@ Index opposite(const Triangle& t, Index a, Index b) {
   for (const Index v : t)
     if (v != a && v != b) return v;
   return kNone;
-}
-
-bool turns(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& facing) {
-  const Vec3 n = cross(b - a, c - a);
-  const double along = dot(n, facing);
-  return !(facing == Vec3{}) && !(along > 0 && along * along > kFacing * kFacing * norm2(n));
 }
 
 // The lowest point of the parabola through values at -1, 0 and 1, not too far off.
@@ -102,7 +96,17 @@ bool angle_is_imposed(const std::array<Vec3, 3>& corners, const std::array<bool,
   return locked[(least + 1) % 3] && locked[(least + 2) % 3];
 }
 
-Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
+double free_angle_lack(const std::array<Vec3, 3>& corners, const std::array<bool, 3>& locked, double degrees) {
+  double least = degrees;
+  for (int m = 0; m < 3; ++m) {
+    if (locked[m] && locked[(m + 2) % 3]) continue;
+    const Vec3 u = corners[(m + 1) % 3] - corners[m], v = corners[(m + 2) % 3] - corners[m];
+    least = std::min(least, std::atan2(norm(cross(u, v)), dot(u, v)) * kDegrees);
+  }
+  return degrees - least;
+}
+
+SurfacePoint CellMap::foot(const Vec3& p, Index& owner) const {
   double nearest = norm2(seeds_[owner] - p);
   for (Index last = kNone; last != owner;) {
     last = owner;
@@ -114,10 +118,47 @@ Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
       }
     }
   }
-  const SurfacePoint foot = nearest_on_triangles(surface_, {cells_.begin(owner), cells_.end(owner)}, p);
-  if (!foot.facet) return p;
-  normal = foot.facet->normal;
-  return foot.at;
+  return nearest_on_triangles(surface_, {cells_.begin(owner), cells_.end(owner)}, p);
+}
+
+Vec3 CellMap::project(const Vec3& p, Index& owner, Vec3& normal) const {
+  const SurfacePoint on = foot(p, owner);
+  if (!on.facet) return p;
+  normal = on.facet->normal;
+  return on.at;
+}
+
+Index CellMap::triangle_at(const Vec3& p, Index owner) const {
+  const SurfacePoint on = foot(p, owner);
+  if (!on.facet) return kNone;
+  return surface_.summaries[static_cast<std::size_t>(on.facet - surface_.facets.data())].triangle;
+}
+
+CurvesBetween::CurvesBetween(const FeatureCurves& curves) : curves_(curves) {
+  at_corner_.resize(curves.graph().corners.size());
+  for (Index curve = 0; curve < curves.size(); ++curve)
+    for (const Index corner : curves.ends(curve))
+      if (corner != kNone) at_corner_[corner].push_back(curve);
+}
+
+Index CurvesBetween::operator()(const SeedPlace& u, const SeedPlace& v) const {
+  if (u.curve != kNone || v.curve != kNone) {
+    const Index curve = u.curve != kNone ? u.curve : v.curve;
+    const auto on_it = [&](const SeedPlace& place) {
+      const auto [first, last] = curves_.ends(curve);
+      return place.curve == curve || (place.corner != kNone && (place.corner == first || place.corner == last));
+    };
+    return on_it(u) && on_it(v) ? curve : kNone;
+  }
+  if (u.corner == kNone || v.corner == kNone) return kNone;
+  Index found = kNone;
+  for (const Index curve : at_corner_[u.corner]) {
+    const auto [first, last] = curves_.ends(curve);
+    if (first == last || (first != v.corner && last != v.corner)) continue;
+    if (found != kNone) return kNone;
+    found = curve;
+  }
+  return found;
 }
 
 Index ImprovePatch::add_vertex(const PatchVertex& vertex) {
@@ -163,13 +204,41 @@ std::vector<Triangle> ImprovePatch::triangles() const {
 }
 
 double ImprovePatch::cost(double average, double irregular) const {
+  return shape_cost_sum(average, irregular) + kEncroached * static_cast<double>(encroachments());
+}
+
+ImprovePatch::Lack ImprovePatch::lack(double degrees) const {
+  Lack lack;
+  for (const PatchTriangle& t : triangles_) {
+    if (!t.alive) continue;
+    std::array<Vec3, 3> x;
+    for (int m = 0; m < 3; ++m) x[m] = vertices_[t.v[m]].x;
+    const double under = free_angle_lack(x, locked_edges(t), degrees);
+    lack.squares += under * under;
+    lack.most = std::max(lack.most, under);
+  }
+  return lack;
+}
+
+std::array<bool, 3> ImprovePatch::locked_edges(const PatchTriangle& t) const {
+  std::array<bool, 3> locked;
+  for (int m = 0; m < 3; ++m) locked[m] = is_locked(t.v[m], t.v[(m + 1) % 3]);
+  return locked;
+}
+
+double ImprovePatch::shape_cost_sum(double average, double irregular) const {
   double sum = 0;
   for (const PatchTriangle& t : triangles_)
     if (t.alive) sum += t.cost - average;
   for (Index v = 0; v < vertices_.size(); ++v)
     if (vertices_[v].place.kind == Kind::surface && !vertices_[v].removed)
       sum += irregular * std::abs(excess_degree(v));
-  return sum + kEncroached * static_cast<double>(encroachments());
+  return sum;
+}
+
+bool ImprovePatch::is_folded() const {
+  return std::any_of(triangles_.begin(), triangles_.end(),
+                     [&](const PatchTriangle& t) { return t.alive && turns(t.v, t.facing); });
 }
 
 ShapeExcess ImprovePatch::worst() const {
@@ -221,9 +290,16 @@ std::array<double, 2> ImprovePatch::stretch(const LockedEdge& edge) const {
 
 int ImprovePatch::excess_degree(Index v) const { return static_cast<int>(stars_[v].size() + vertices_[v].outside) - 6; }
 
+bool ImprovePatch::turns(const Triangle& t, const Vec3& facing) const {
+  const Vec3& a = vertices_[t[0]].x;
+  const Vec3 n = cross(vertices_[t[1]].x - a, vertices_[t[2]].x - a);
+  const double along = dot(n, facing);
+  return !(facing == Vec3{}) && !(along > 0 && along * along > kFacing * kFacing * norm2(n));
+}
+
 double ImprovePatch::cost_of(const PatchTriangle& t) const {
-  const Vec3 &a = vertices_[t.v[0]].x, &b = vertices_[t.v[1]].x, &c = vertices_[t.v[2]].x;
-  return turns(a, b, c, t.facing) ? kFolded : shape_cost(a, b, c, goal_);
+  if (turns(t.v, t.facing)) return kFolded;
+  return shape_cost(vertices_[t.v[0]].x, vertices_[t.v[1]].x, vertices_[t.v[2]].x, goal_);
 }
 
 double ImprovePatch::star_cost(Index v) const {
@@ -277,20 +353,74 @@ void ImprovePatch::kill(std::size_t t) {
   triangles_[t].alive = false;
 }
 
-bool ImprovePatch::flip(Index a, Index b) {
+template <class Facing>
+bool ImprovePatch::flip_facing(Index a, Index b, const Facing& facing_of) {
   std::size_t left, right;
   if (is_locked(a, b) || !triangles_at(a, b, left, right)) return false;
   const Index c = opposite(triangles_[left].v, a, b), d = opposite(triangles_[right].v, a, b);
   if (c == d) return false;
   for (const Index t : stars_[c])
     if (has(triangles_[t].v, d)) return false;
-  const Vec3 facing = unit(triangles_[left].facing + triangles_[right].facing);
+  const Vec3 before = unit(triangles_[left].facing + triangles_[right].facing);
   const Triangle one{a, d, c}, two{d, b, c};
-  for (const Triangle& t : {one, two})
-    if (turns(vertices_[t[0]].x, vertices_[t[1]].x, vertices_[t[2]].x, facing)) return false;
-  replace(left, one, facing);
-  replace(right, two, facing);
+  const Vec3 facing_one = facing_of(one, before), facing_two = facing_of(two, before);
+  if (turns(one, facing_one) || turns(two, facing_two)) return false;
+  replace(left, one, facing_one);
+  replace(right, two, facing_two);
   return true;
+}
+
+bool ImprovePatch::flip(Index a, Index b) {
+  return flip_facing(a, b, [](const Triangle&, const Vec3& before) { return before; });
+}
+
+bool ImprovePatch::flip_by_surface(Index a, Index b) {
+  return flip_facing(a, b, [&](const Triangle& t, Vec3 facing) {
+    const Vec3 middle = (1.0 / 3) * (vertices_[t[0]].x + vertices_[t[1]].x + vertices_[t[2]].x);
+    Index owner = vertices_[t[0]].owner;
+    if (owner != kNone) map_->project(middle, owner, facing);
+    return facing;
+  });
+}
+
+bool ImprovePatch::crossed_edge(Index from, Index to, std::array<Index, 2>& edge) const {
+  // In the plane through the way and the normals around, for triangles that cut a crease have planes of their own.
+  const Vec3 &start = vertices_[from].x, way = unit(vertices_[to].x - start);
+  Vec3 up{};
+  for (const Index t : stars_[from]) up = up + triangles_[t].facing;
+  const Vec3 across = cross(up, way);
+  double best = 0;
+  for (const Index t : stars_[from]) {
+    const Triangle& v = triangles_[t].v;
+    const int m = v[0] == from ? 0 : v[1] == from ? 1 : 2;
+    const Index c = v[(m + 1) % 3], d = v[(m + 2) % 3];
+    const double at_c = dot(vertices_[c].x - start, across), at_d = dot(vertices_[d].x - start, across);
+    if (!(std::min(at_c, at_d) < 0 && std::max(at_c, at_d) > 0)) continue;
+    const double share = at_c / (at_c - at_d);
+    const Vec3 crossing = (1 - share) * vertices_[c].x + share * vertices_[d].x;
+    const double ahead = dot(unit(crossing - start), way);
+    if (!(ahead > best)) continue;
+    best = ahead;
+    edge = {c, d};
+  }
+  return best > 0;
+}
+
+bool ImprovePatch::flip_on_the_way(Index from, Index to) {
+  std::array<Index, 2> edge;
+  return crossed_edge(from, to, edge) && flip_by_surface(edge[0], edge[1]);
+}
+
+bool ImprovePatch::connect(Index a, Index b, Index curve) {
+  for (int flips = 0; flips < kMostCrossed; ++flips) {
+    if (std::any_of(stars_[a].begin(), stars_[a].end(), [&](Index t) { return has(triangles_[t].v, b); })) {
+      if (is_locked(a, b)) return false;
+      set_locked(a, b, curve);
+      return true;
+    }
+    if (!flip_on_the_way(a, b) && !flip_on_the_way(b, a)) return false;
+  }
+  return false;
 }
 
 void ImprovePatch::make_delaunay() {
@@ -326,7 +456,7 @@ bool ImprovePatch::can_collapse(Index v, Index to) const {
     Triangle moved = triangle.v;
     for (Index& w : moved)
       if (w == v) w = to;
-    if (turns(vertices_[moved[0]].x, vertices_[moved[1]].x, vertices_[moved[2]].x, triangle.facing)) return false;
+    if (turns(moved, triangle.facing)) return false;
   }
   for (const Index t : stars_[v])
     for (const Index w : triangles_[t].v)
@@ -387,7 +517,8 @@ PatchVertex ImprovePatch::between(Index a, Index b) const {
   PatchVertex middle;
   middle.free = true;
   middle.x = 0.5 * (u.x + v.x);
-  Index owner = u.owner;
+  Index owner = u.owner != kNone ? u.owner : v.owner;
+  if (owner == kNone) return middle;
   const LockedEdge* locked = locked_edge(a, b);
   if (!locked) {
     middle.x = map_->project(middle.x, owner, middle.normal);
@@ -474,13 +605,11 @@ std::vector<std::array<Index, 2>> ImprovePatch::edges_at_worst() const {
   for (const PatchTriangle& t : triangles_) {
     if (!t.alive || (worst && t.cost <= worst->cost)) continue;
     std::array<Vec3, 3> x;
-    std::array<bool, 3> locked;
-    for (int m = 0; m < 3; ++m) {
-      x[m] = vertices_[t.v[m]].x;
-      locked[m] = is_locked(t.v[m], t.v[(m + 1) % 3]);
-    }
+    for (int m = 0; m < 3; ++m) x[m] = vertices_[t.v[m]].x;
     const bool free = std::any_of(t.v.begin(), t.v.end(), [&](Index v) { return vertices_[v].free; });
-    if (free && !angle_is_imposed(x, locked)) worst = &t;
+    if (!free) continue;
+    const std::array<bool, 3> locked = locked_edges(t);
+    if (!angle_is_imposed(x, locked) || free_angle_lack(x, locked, kBadAngle) > 0) worst = &t;
   }
   std::vector<std::array<Index, 2>> edges;
   if (!worst) return edges;

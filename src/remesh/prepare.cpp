@@ -90,7 +90,7 @@ void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
       const Vec3 across = 0.5 * (mesh.vertices[t[(k + 1) % 3]] + mesh.vertices[t[(k + 2) % 3]]) - mesh.vertices[t[k]];
       if (const double length = norm(across); length > 0) inwards[t[k]] += (1 / length) * across;
     }
-  const double step = kApart * bounding_box(mesh.vertices).diagonal();
+  const double step = kApart * bounding_box(mesh).diagonal();
   for (Index v = 0; v < original.size(); ++v)
     if (const double length = norm(inwards[v]); is_split[v] && length > 0)
       mesh.vertices[v] += (step / length) * inwards[v];
@@ -190,7 +190,9 @@ OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given
       for (Index& v : edge) v = vertex_of[v];
   for (Index& v : options.keep_vertices) v = vertex_of[v];
   if (density.empty()) return;
-  for (std::size_t v = 0; v < vertices; ++v) density[vertex_of[v]] = given.sizing.attribute[v];
+  density.resize(mesh.vertices.size());
+  for (std::size_t v = 0; v < vertices; ++v)
+    if (vertex_of[v] != kNone) density[vertex_of[v]] = given.sizing.attribute[v];
 }
 
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
@@ -199,7 +201,7 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
   if (topology.boundary_edges + topology.non_manifold_edges == 0) return keep_apart(input, 0);
   WeldResult best = keep_apart(input, topology.boundary_edges);
   std::size_t borders = topology.boundary_edges, non_manifold = topology.non_manifold_edges;
-  const double diagonal = bounding_box(input.vertices).diagonal();
+  const double diagonal = bounding_box(input).diagonal();
   for (const double rounding : kRoundings) {
     if (borders + non_manifold == 0) break;
     WeldResult welded = weld(input, rounding * diagonal);
@@ -252,8 +254,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
     sizing_.attribute = separation.values(std::move(values));
   }
   sizing_.sharp = features_.edges;
-  // The folds of noise are no details.
-  if (given_seeds_ == 0 && options.detail != DetailMode::off && !noisy_) plan(options);
+  if (given_seeds_ == 0 && options.detail != DetailMode::off) plan(options);
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,

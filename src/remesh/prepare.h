@@ -38,14 +38,14 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
 WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double>& tolerance, const Context& context);
 
 // An input as a run takes it: in spatial order, so that what is near in space is near in memory, and the result does
-// not depend on the order in which a file lists triangles and vertices.
+// not depend on the order in which a file lists triangles and vertices, nor on vertices that no triangle uses.
 struct OrderedInput {
   // Throws Error if labels or densities are not one for each triangle or vertex, or given edges are none of the mesh's.
   OrderedInput(const TriangleMesh& input, const RemeshOptions& options);
 
   TriangleMesh mesh;
   RemeshOptions options;         // with what they say of vertices by those of `mesh`
-  std::vector<Index> vertex_of;  // of each vertex of the input
+  std::vector<Index> vertex_of;  // of each vertex of the input; kNone: no triangle uses it
 };
 
 // What is done to an input before seeds are placed.

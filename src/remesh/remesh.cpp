@@ -27,6 +27,7 @@
 #include "remesh/feature_recovery.h"
 #include "remesh/fit.h"
 #include "remesh/improve.h"
+#include "remesh/mend.h"
 #include "remesh/prepare.h"
 #include "remesh/sheets.h"
 #include "remesh/slivers.h"
@@ -73,6 +74,10 @@ double steps_share(std::size_t level, std::size_t levels) {
 }
 
 int share_of(int iterations, double share) { return static_cast<int>(std::ceil(iterations * share)); }
+
+// Whether cells are to be disks. Those of free seeds and of rough surfaces seldom are, and the dual's topology
+// suffices.
+bool asks_for_disks(const RemeshPlan& plan) { return plan.constrained && !plan.noisy; }
 
 void check_plan(const RemeshPlan& plan) {
   if (!plan.places.empty() && plan.places.size() != plan.seeds.size())
@@ -167,6 +172,8 @@ class Pipeline {
   void extract();
   void analyse_result();
   void extract_features(const std::vector<Index>& vertex_of);
+  double mend(const Diagram& diagram, std::vector<Index>& vertex_of);
+  void report_features();
   void fit();
 
   Backend& backend_;
@@ -303,7 +310,7 @@ bool Pipeline::can_localise() const { return localises_ && plan_.constrained && 
 
 // Folds of a rough surface give cells pieces that leave no trace in the dual.
 bool Pipeline::dual_suffices() {
-  if (plan_.constrained) return false;
+  if (asks_for_disks(plan_)) return false;
   std::vector<Triangle> dual = run_.diagram(Want::dual).dual.triangles;
   orient(dual, run_.seeds.size());
   return same_topology(analyse_topology(dual, run_.seeds.size()), input_topology_);
@@ -407,13 +414,33 @@ void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
     mesh.feature_edges.push_back({std::min(vertex_of[a], vertex_of[b]), std::max(vertex_of[a], vertex_of[b])});
   }
   std::sort(mesh.feature_edges.begin(), mesh.feature_edges.end());
+}
+
+// `vertex_of` of the seeds and sheets follows. The seconds that it takes.
+double Pipeline::mend(const Diagram& diagram, std::vector<Index>& vertex_of) {
+  const Stopwatch watch;
+  const Csr<Index> rings = vertex_neighbours(diagram.dual.triangles, run_.seeds.size());
+  const CellMap map(surface_, run_.seeds.positions(), diagram.moments.triangles, rings);
+  MendMesh mended{
+      result_.mesh, result_.places, std::vector<Index>(result_.mesh.vertices.size(), kNone), features_.broken, {}};
+  for (Index i = 0; i < run_.seeds.size(); ++i)
+    if (vertex_of[i] != kNone) mended.owners[vertex_of[i]] = i;
+  const ImproveOptions options{plan_.min_angle, kMaxAngle, wanted_};
+  result_.mended = mend_angles(map, curves_, trace_, options, mended, run_.context());
+  if (!mended.number.empty())
+    for (Index& v : vertex_of)
+      if (v != kNone) v = mended.number[v];
+  return watch.seconds();
+}
+
+void Pipeline::report_features() {
+  const TriangleMesh& mesh = result_.mesh;
   FeatureResult& result = result_.features;
-  for (std::size_t i = 0; i < run_.seeds.size(); ++i) result.seeds += !run_.seeds.on_surface(i);
+  for (const SeedPlace& place : result_.places) result.seeds += place.kind != SeedPlace::Kind::surface;
   result.curves = curves_.size();
   result.corners = curves_.graph().corners.size();
   result.broken = features_.broken.size();
-  result.distance =
-      measure_feature_distance(mesh.vertices, mesh.feature_edges, surface_.mesh.vertices, curves_.graph().edges);
+  result.distance = measure_feature_distance(mesh.vertices, mesh.feature_edges, surface_.mesh, curves_.graph().edges);
 }
 
 void Pipeline::extract() {
@@ -424,21 +451,24 @@ void Pipeline::extract() {
   if (run_.has_features()) features_ = check_features(trace_, curves_, run_.seeds.places(), diagram);
   const Divided divided = divide_sheets();
   const Dual dual = divided.polygons ? extract_dual(*divided.polygons) : diagram.dual;
-  const std::vector<Index> vertex_of = dual_vertices(dual, divided.vertices.size());
+  std::vector<Index> vertex_of = dual_vertices(dual, divided.vertices.size());
   result_.mesh = dual_mesh(divided.vertices, dual, vertex_of);
-  analyse_result();
   result_.places.resize(result_.mesh.vertices.size());
   for (Index i = 0; i < run_.seeds.size(); ++i)
     if (vertex_of[i] != kNone) result_.places[vertex_of[i]] = run_.seeds.place(i);
   if (!surface_.mesh.labels.empty())
     for (Index t : dual.mesh_triangle) result_.mesh.labels.push_back(surface_.mesh.labels[t]);
   extract_features(vertex_of);
+  const double mending = plan_.min_angle > 0 && plan_.constrained ? mend(diagram, vertex_of) : 0;
+  analyse_result();
+  report_features();
   result_.ball_property = divided.ball.holds;
   result_.divided = divided.vertices.size() - run_.seeds.size();
   result_.faults = topology_faults(divided.ball, divided.vertices);
   for (TopologyFault& fault : result_.faults)
     for (Index& seed : fault.seeds) seed = vertex_of[seed];
-  result_.seconds.extract += watch.seconds();
+  result_.seconds.improve += mending;
+  result_.seconds.extract += watch.seconds() - mending;
 }
 
 void Pipeline::fit() {
@@ -449,9 +479,11 @@ void Pipeline::fit() {
     for (Index v : edge) fit.fixed[v] = 1;
   for (std::size_t v = 0; v < fit.fixed.size(); ++v)
     if (is_held(result_.places[v])) fit.fixed[v] = 1;
-  const QualityReport quality = measure_quality(result_.mesh);
-  fit.min_angle = std::min(quality.theta_min, plan_.min_angle);
-  fit.min_quality = std::min(quality.q_min, kFitQuality);
+  // Without a quality pass any triangle may become like the worst.
+  if (plan_.constrained && plan_.min_angle > 0) {
+    fit.min_angle = plan_.min_angle;
+    fit.min_quality = kFitQuality;
+  }
   result_.fitted = fit_to_surface(surface_.mesh, result_.mesh, fit, run_.context());
   result_.seconds.fit += watch.seconds();
 }
@@ -494,7 +526,7 @@ SizeBounds Pipeline::crowded() {
   SizeBounds found;
   const MeshTopology& input = input_topology_;
   const bool controlled = plan_.branches || (input.manifold && input.oriented);
-  if (plan_.topology != TopologyControl::enforce || !plan_.constrained || !controlled) return found;
+  if (plan_.topology != TopologyControl::enforce || !asks_for_disks(plan_) || !controlled) return found;
   run_.localise(localises_);
   const BallReport report = check_ball_property(surface_, run_.diagram(Want::labels).polygons);
   if (report.cells.empty() || report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
@@ -537,7 +569,7 @@ RemeshResult Pipeline::finish() {
   if (run_.has_features()) complete(run_, plan_.constrained);
   if (plan_.min_angle > 0 && plan_.constrained) improve_quality();
   extract();
-  if (plan_.fit) fit();
+  if (plan_.fit || plan_.noisy) fit();
   result_.iterations = run_.totals.iterations;
   result_.evaluations = run_.totals.evaluations;
   result_.device_work = run_.totals.device_work;
@@ -642,8 +674,9 @@ class Runs {
         progress_(context) {
     OrderedInput ordered(input, options);
     vertex_of_ = std::move(ordered.vertex_of);
-    input_of_.resize(vertex_of_.size());
-    for (Index v = 0; v < vertex_of_.size(); ++v) input_of_[vertex_of_[v]] = v;
+    input_of_.resize(ordered.mesh.vertices.size());
+    for (Index v = 0; v < vertex_of_.size(); ++v)
+      if (vertex_of_[v] != kNone) input_of_[vertex_of_[v]] = v;
     preparation_.emplace(std::move(ordered), context, branches);
     new_crossings_.emplace(preparation_->mesh());
     may_shorten_ = options.seeds.empty() && options.detail != DetailMode::off;
@@ -675,7 +708,7 @@ class Runs {
   const Context& context_;
   Compute compute_;
   RunProgress progress_;
-  std::vector<Index> vertex_of_, input_of_;  // the vertex in spatial order of each of the input's, and back
+  std::vector<Index> vertex_of_, input_of_;  // the vertex in spatial order of each of the input's, or kNone, and back
   std::optional<Preparation> preparation_;
   std::optional<NewCrossings> new_crossings_;
   bool may_shorten_ = false;  // once, where cells are no disks
@@ -693,7 +726,7 @@ Runs::Run Runs::make_run(bool last) {
     RemeshPlan plan = plan_of(options_);
     plan.vertices = prepared.vertices;
     plan.branches = branches_;
-    if (prepared.noisy) plan.constrained = false;
+    plan.noisy = prepared.noisy;
     for (Index& v : prepared.kept.corners) {
       plan.held.push_back(v != kNone);
       if (v != kNone) v = input_of_[v];
@@ -722,7 +755,7 @@ Runs::Run Runs::make_run(bool last) {
     result.detail = prepared.detail;
     spent_ = {pipeline.spent().totals, result.seconds};
     Run run{judge(std::move(result)), {}};
-    last = last || !plan.constrained || plan.min_angle == 0;
+    last = last || !asks_for_disks(plan) || plan.min_angle == 0;
     const Crossings crossings = last && !best_ ? Crossings{} : new_crossings_->of(run.judged.result.mesh);
     run.judged.crossings = crossings.pairs;
     if (!last && (!best_ || is_better(run.judged, *best_))) run.next = another_run(pipeline, run.judged, crossings);
@@ -781,8 +814,9 @@ RemeshResult Runs::take_best() {
   chosen.seconds.prepare = preparing_;
   chosen.seconds.total = watch_.seconds();
   chosen.welded = preparation_->welded();
-  for (std::size_t v = 0; v < input_.vertices.size(); ++v)
-    chosen.welded.vertex_of[v] = preparation_->welded().vertex_of[vertex_of_[v]];
+  chosen.welded.vertex_of = std::move(vertex_of_);
+  for (Index& v : chosen.welded.vertex_of)
+    if (v != kNone) v = preparation_->welded().vertex_of[v];
   return std::move(chosen);
 }
 

@@ -23,6 +23,7 @@ struct RemeshPlan {
   double tolerance = 1e-6;
   int levels = 0;
   bool constrained = true;  // seeds end on the surface (CCVT)
+  bool noisy = false;       // its normals say nothing: the result is fitted
   TopologyControl topology = TopologyControl::enforce;
   bool branches = false;  // sheets are meant to meet in edges: topology is controlled there, too
   double min_angle = 40;

@@ -195,7 +195,7 @@ class Field {
       if (limits.least) ranges_[v].least = (*limits.least)(mesh.vertices[v]);
       if (limits.most) ranges_[v].most = most[v];
     });
-    const double diagonal = bounding_box(mesh.vertices).diagonal();
+    const double diagonal = bounding_box(mesh).diagonal();
     unit_ = diagonal;
     least_ = std::min(kSmallestFeature * uniform / diagonal, 1.0);
     exponent_ = options.exponent > 0 ? options.exponent : kind_ == DensityKind::lfs ? 2 : 1;

@@ -16,7 +16,7 @@ namespace bisector {
 namespace {
 
 // Degrees below which a triangle is a sliver; one below the second, or more than that share of slivers, is too many.
-constexpr double kSliver = 30, kWorst = 25;
+constexpr double kSliver = kBadAngle, kWorst = 25;
 constexpr double kShare = 1e-3;
 // Of the triangles; where more are slivers, other edge lengths are no help.
 constexpr double kHopeless = 0.05;
@@ -33,25 +33,22 @@ Slivers find_slivers(const TriangleMesh& mesh) {
     const Triangle& v = mesh.triangles[t];
     return std::array{mesh.vertices[v[0]], mesh.vertices[v[1]], mesh.vertices[v[2]]};
   };
-  struct Thin {
-    std::size_t triangle;
-    double under;  // degrees that its smallest angle lacks
-  };
-  std::vector<std::vector<Thin>> thin((mesh.triangles.size() + kTrianglesAtOnce - 1) / kTrianglesAtOnce);
+  std::vector<std::vector<std::size_t>> thin((mesh.triangles.size() + kTrianglesAtOnce - 1) / kTrianglesAtOnce);
   parallel_chunks(mesh.triangles.size(), kTrianglesAtOnce, [&](std::size_t c, std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto [a, b, d] = corners(t);
-      if (const double under = shape_excess(a, b, d, goal).under; under > 0) thin[c].push_back({t, under});
+      if (shape_excess(a, b, d, goal).under > 0) thin[c].push_back(t);
     }
   });
 
   Slivers found;
   std::size_t count = 0;
   bool has_bad_one = false;
-  for (const std::vector<Thin>& chunk : thin)
-    for (const auto [t, under] : chunk) {
+  for (const std::vector<std::size_t>& chunk : thin)
+    for (const std::size_t t : chunk) {
       const std::array<Vec3, 3> p = corners(t);
-      if (angle_is_imposed(p, edges_among(mesh.triangles[t], mesh.feature_edges))) continue;
+      const double lack = free_angle_lack(p, edges_among(mesh.triangles[t], mesh.feature_edges), kSliver);
+      if (lack == 0) continue;
       double longest = 0, perimeter = 0;
       for (int k = 0; k < 3; ++k) {
         const double length = norm(p[(k + 1) % 3] - p[k]);
@@ -59,7 +56,7 @@ Slivers find_slivers(const TriangleMesh& mesh) {
         perimeter += length;
       }
       ++count;
-      has_bad_one |= kSliver - under < kWorst;
+      has_bad_one |= kSliver - lack < kWorst;
       const double height = longest > 0 ? norm(twice_area_normal(p[0], p[1], p[2])) / longest : 0;
       for (const Vec3& corner : p) {
         found.bounds.points.push_back(corner);

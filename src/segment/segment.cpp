@@ -86,7 +86,7 @@ std::size_t possible_count(const SegmentDomain& domain, std::size_t proxies, con
 
 // The root mean square distance that SegmentOptions::error allows, in the unit-sized model.
 double allowed_rms(const SegmentDomain& domain, double percent) {
-  return percent / 100 * bounding_box(domain.vertices).diagonal();
+  return percent / 100 * bounding_box(domain.vertices, domain.triangles).diagonal();
 }
 
 Partition fit_all(Lloyd& lloyd, std::vector<Index> labels) {

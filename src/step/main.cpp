@@ -32,6 +32,7 @@
 #include <ostream>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bisector/error.h"
@@ -92,6 +93,12 @@ bool print_shape(const TopoDS_Shape& given, bool iges, const Unit& unit, std::os
   return printer.Print(out);
 }
 
+// What cannot be written, for a disk is full, stops nothing.
+template <class... Values>
+void say(std::FILE* file, fmt::format_string<Values...> text, Values&&... values) {
+  std::fputs(fmt::format(text, std::forward<Values>(values)...).c_str(), file);
+}
+
 void run(const Options& options) {
   const bool iges = is_iges(options.output);
   const step::Trims trims = step::read_trims(options.input);
@@ -100,8 +107,8 @@ void run(const Options& options) {
   for (std::size_t r = 0; r < shell.flaws.size(); ++r) {
     if (shell.flaws[r].empty()) ++sound;
     else
-      fmt::print(stderr, "bisector-step: warning: the face of region {} ({}) {}\n", r,
-                 name_of(type_of(trims.regions[r].surface)), shell.flaws[r]);
+      say(stderr, "bisector-step: warning: the face of region {} ({}) {}\n", r,
+          name_of(type_of(trims.regions[r].surface)), shell.flaws[r]);
   }
   std::ostringstream out;
   if (!print_shape(shell.shape, iges, unit_of(options.unit), out))
@@ -110,7 +117,7 @@ void run(const Options& options) {
   const char* kind = shell.shape.ShapeType() == TopAbs_SOLID   ? "a solid"
                      : shell.shape.ShapeType() == TopAbs_SHELL ? "a shell"
                                                                : "faces";
-  fmt::print("written    {}: {} of {} faces, {} sound\n", options.output, kind, shell.faces.size(), sound);
+  say(stdout, "written    {}: {} of {} faces, {} sound\n", options.output, kind, shell.faces.size(), sound);
 }
 
 }  // namespace
@@ -128,9 +135,9 @@ int main(int argc, char** argv) {
     run(options);
     return 0;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "bisector-step: {}\n", error.what());
+    say(stderr, "bisector-step: {}\n", error.what());
   } catch (const Standard_Failure& failure) {
-    fmt::print(stderr, "bisector-step: OpenCASCADE failed: {}\n", failure.GetMessageString());
+    say(stderr, "bisector-step: OpenCASCADE failed: {}\n", failure.GetMessageString());
   }
   return 1;
 }

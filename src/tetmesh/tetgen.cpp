@@ -180,6 +180,11 @@ void explain(int status, const Child& child) {
   if (WIFSIGNALED(status)) {
     if (WTERMSIG(status) == SIGKILL)
       throw Error(fmt::format("TetGen was killed, most likely because memory ran out; free some, or {}", kSimplify));
+    if (memory_limit() > 0)
+      throw Error(
+          fmt::format("TetGen crashed ({}), most likely for want of memory, of which it has what is left of {} "
+                      "MiB; allow more, or {}",
+                      ::strsignal(WTERMSIG(status)), memory_limit() >> 20, kSimplify));
     throw Error(fmt::format("TetGen crashed on this surface ({}){}; {}", ::strsignal(WTERMSIG(status)),
                             child.last_words(), kSimplify));
   }

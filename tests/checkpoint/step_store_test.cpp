@@ -1,6 +1,7 @@
 // The file of a checkpoint: what was kept comes back, whatever happened to the file's end.
 #include "checkpoint/step_store.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -107,7 +108,14 @@ TEST_F(StepStoreFile, CutOffAnywhereKeepsWhatIsWhole) {
     EXPECT_EQ(kept.result(kept.begin(1)).has_value(), at >= ends[2]) << at;
     EXPECT_FALSE(kept.result(kept.begin(2))) << at;
     EXPECT_FALSE(kept.result(kept.begin(3))) << at;
+    EXPECT_EQ(kept.found(),
+              fmt::format("{} done; the last {} bytes are damaged or half written and left out",
+                          at < ends[2] ? "1 step" : "2 steps", whole.size() - ends[at < ends[2] ? 1 : 2]));
   }
+  store("run.ckpt", whole);
+  EXPECT_EQ(open(true).found(), "4 steps done");
+  store("run.ckpt", "");
+  EXPECT_EQ(open(true).found(), "nothing that could be gone on from");
 }
 
 TEST_F(StepStoreFile, OfAnotherRunIsRefused) {

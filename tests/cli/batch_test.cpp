@@ -13,7 +13,9 @@
 #include <thread>
 #include <vector>
 
+#include "bisector/io.h"
 #include "support/command_line.h"
+#include "support/solids.h"
 
 namespace bisector {
 namespace {
@@ -113,8 +115,72 @@ TEST_F(CliBatch, RunsEachJobOnce) {
   EXPECT_NE(run(batch()).out.find("1 of them before"), std::string::npos);
   fs::remove(in("b.off"));
   EXPECT_NE(run(batch()).out.find("2 of them before"), std::string::npos);
-  fs::last_write_time(in("sphere.off"), fs::file_time_type::clock::now() + std::chrono::hours(1));
+  // Older than the record, as a file is that has been moved here, and still another one.
+  fs::last_write_time(in("sphere.off"), fs::file_time_type::clock::now() - std::chrono::hours(1));
   EXPECT_NE(run(batch()).out.find("0 of them before"), std::string::npos);
+  EXPECT_NE(run(batch()).out.find("3 of them before"), std::string::npos);
+}
+
+TEST_F(CliBatch, NoticesChangesOfAllFilesOfAJob) {
+  write_text("kept.txt", "0\n");
+  write_text("jobs.jsonl",
+             line("a", 100).insert(1, fmt::format("\"keep_vertices\": \"{}\", ", in("kept.txt"))) + line("b", 100));
+  EXPECT_EQ(run(batch()).code, 0);
+  EXPECT_NE(run(batch()).out.find("2 of them before"), std::string::npos);
+  write_text("kept.txt", "0\n1\n");
+  EXPECT_NE(run(batch()).out.find("1 of them before"), std::string::npos);
+}
+
+// Numbers beside a Medit file are read with it; a job that replaces its own input does not run again for that.
+TEST_F(CliBatch, KnowsWhatBelongsToAnInput) {
+  const TetMesh solid = test::tet_box(3);
+  write_tet_mesh(in("cube.mesh"), solid);
+  const auto write_sizes = [&](double size) {
+    std::string text =
+        "MeshVersionFormatted 2\nDimension 3\nSolAtVertices " + std::to_string(solid.vertices.size()) + "\n1 1\n";
+    for (std::size_t v = 0; v < solid.vertices.size(); ++v) text += std::to_string(size) + "\n";
+    write_text("cube.sol", text + "End\n");
+  };
+  write_sizes(1);
+  fs::copy_file(in("sphere.off"), in("own.off"));
+  fs::create_symlink(in("own.off"), in("link.off"));
+  write_text(
+      "jobs.jsonl",
+      fmt::format(
+          "{{\"command\": \"tet\", \"input\": \"{0}\", \"output\": \"{1}\", \"n\": 50, \"density\": \"attribute:x\"}}\n"
+          "{{\"command\": \"remesh\", \"input\": \"{2}\", \"output\": \"{3}\", \"n\": 50}}\n",
+          in("cube.mesh"), in("out.mesh"), in("link.off"), in("own.off")));
+  EXPECT_EQ(run(batch()).code, 0);
+  EXPECT_NE(run(batch()).out.find("2 of them before"), std::string::npos);
+  write_sizes(2.5);
+  EXPECT_NE(run(batch()).out.find("1 of them before"), std::string::npos);
+}
+
+TEST_F(CliBatch, NamesOfJobsAreNoFilesOfOthers) {
+  write_text("jobs.jsonl", line("a", 100).insert(1, "\"name\": \"x.report\", ") +
+                               line("b", 100).insert(1, "\"name\": \"x\", ") +
+                               line("c", 100).insert(1, "\"name\": \"x.json\", "));
+  EXPECT_EQ(run(batch()).code, 0);
+  for (const char* name : {"x.report", "x", "x.json"}) EXPECT_EQ(record(name)["status"], "done");
+  EXPECT_NE(run(batch()).out.find("3 of 3 jobs done, 3 of them before"), std::string::npos);
+}
+
+TEST_F(CliBatch, CountsWhatWasDoneBefore) {
+  write_text("jobs.jsonl", line("a", 100) + line("b", 100) + line("crash", 100));
+  EXPECT_EQ(run(batch({"--program", misbehaving()})).code, 1);
+  EXPECT_NE(run(batch({"--program", misbehaving()})).out.find("2 of 3 jobs done, 2 of them before"), std::string::npos);
+  EXPECT_NE(run(batch({"--retry", "--program", misbehaving()})).out.find("2 of 3 jobs done, 2 of them before"),
+            std::string::npos);
+  EXPECT_NE(run(batch({"--retry"})).out.find("3 of 3 jobs done, 2 of them before"), std::string::npos);
+}
+
+TEST_F(CliBatch, TellsOfEachJobAtOnceAndKeepsTheSummary) {
+  write_text("jobs.jsonl", line("a", 100) + line("hang", 100));
+  const pid_t process = start(batch({"--program", misbehaving()}));
+  while (!fs::exists(in("results/summary.html"))) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  kill(process, SIGKILL);
+  EXPECT_NE(finish(process).out.find("done"), std::string::npos);
+  EXPECT_EQ(summary()["statuses"], (Json{{"done", 1}, {"waiting", 1}}));
 }
 
 TEST_F(CliBatch, WhatFailsCostsNothingButItself) {
@@ -209,7 +275,18 @@ TEST_F(CliBatch, OneProcessRunsAShard) {
   const pid_t first = start(batch({"--program", program}));
   while (!fs::exists(in("calls"))) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   expect_failure(255, batch(), "are being run by another process");
+  expect_failure(255, batch({"--shard", "1/2"}), "are being run by another process");
   EXPECT_EQ(finish(first).code, 0);
+
+  // Shards that have a job in common, and such that have none.
+  fs::remove_all(in("results"));
+  fs::remove(in("calls"));
+  const pid_t odd = start(batch({"--program", program, "--shard", "1/2"}));
+  while (!fs::exists(in("calls"))) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  for (const char* shard : {"0/1", "3/4", "0/3"})
+    expect_failure(255, batch({"--shard", shard}), "are being run by another process");
+  EXPECT_EQ(run(batch({"--shard", "2/4"})).code, 0);
+  EXPECT_EQ(finish(odd).code, 0);
 }
 
 // The recipes of cli.md.
@@ -259,7 +336,23 @@ TEST_F(CliBatch, BadJobsAreOneLineAndNothingIsRun) {
   expect(line("a", 100).insert(1, "\"name\": \"x/y\", "), "\"x/y\" cannot be the name");
   expect(line("a", 100).insert(1, "\"name\": \"x\", ") + line("b", 100).insert(1, "\"name\": \"x\", "),
          "line 2: the name \"x\" is that of line 1");
+  expect(line("a", 100).insert(1, "\"n\": 50, "), "line 1: \"n\" is given twice");
+  expect(line("a", 100).insert(1, fmt::format("\"name\": \"{}\", ", std::string(260, 'x'))), "is too long for a file");
+  expect(line(std::string(240, 'x'), 100), "is too long for a file");
+  expect(good + fmt::format("{{\"command\": \"quality\", \"input\": \"{}\"}}\n", in("a.off")),
+         "line 2: " + in("a.off") + " is written by line 1; jobs run in any order");
+  expect(line("b", 100).insert(1, fmt::format("\"keep_vertices\": \"{}\", ", in("a.off"))) + good,
+         "line 1: " + in("a.off") + " is written by line 2; jobs run in any order");
+  expect(line("a", 100).insert(1, fmt::format("\"map\": \"{}\", ", in("results/a.json"))),
+         "is a file of the batch itself");
+  expect(line("a", 100).insert(1, fmt::format("\"map\": \"{}\", ", in("jobs.jsonl"))), "is a file of the batch itself");
+  expect(line("a", 100).insert(1, fmt::format("\"map\": \"{}\", ", in("./results/.start.lock"))),
+         "is a file of the batch itself");
+  expect(line("a", 100) + fmt::format("{{\"command\": \"quality\", \"input\": \"{}\"}}\n", in("./a.off")),
+         "written by line 1");
   write_text("jobs.jsonl", good);
+  for (const char* size : {"8GX", "-1GB", "0", "GB", "1e30", "8 G B", "nan"})
+    expect_failure(255, batch({std::string("--memory=") + size}), "is no size; give a number of bytes");
   expect_failure(255, batch({"--shard", "2/2"}), "--shard 2/2 is not INDEX/COUNT");
   expect_failure(255, {"batch", in("none.jsonl"), "-o", in("results")}, "none.jsonl: cannot be opened");
   expect_failure(255, {"batch", in("jobs.jsonl")}, "-o is required");

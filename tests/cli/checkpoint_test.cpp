@@ -83,6 +83,7 @@ TEST_F(CliCheckpoint, SigtermWritesOneAndResumeGoesOn) {
 
   const Result resumed = run(remesh("out.off", kept({"--resume", "--threads", "1"})));
   EXPECT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_NE(resumed.err.find("run.ckpt has "), std::string::npos) << resumed.err;
   EXPECT_EQ(read_text(in("out.off")), expected);
   EXPECT_FALSE(fs::exists(in("run.ckpt")));
 }

@@ -1,16 +1,23 @@
 // Runs that the system gives too little memory or disk, or whose reader goes away.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <csignal>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <random>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "bisector/error.h"
+#include "job/outputs.h"
 #include "support/command_line.h"
 
 namespace bisector {
@@ -73,12 +80,14 @@ TEST_F(CliLimits, TooLittleMemoryIsSaidAndNothingIsLost) {
       whole = read_text(in(one.output));
     }
     int refused = 0, done = 0;
-    for (const int mebibytes : {2, 10, 14, 18, 26, 1000}) {
+    std::vector<int> sizes{2, 1000};
+    for (int mebibytes = 6; mebibytes < 30; mebibytes += 2) sizes.push_back(mebibytes);  // where it begins to be enough
+    for (const int mebibytes : sizes) {
       write_text(one.output, "old");
       const std::set<std::string> before = files();
       std::vector<std::string> words = one.words;
       const std::string memory = std::to_string(mebibytes) + "MB";
-      words.insert(words.end(), {"--threads", "2", "--memory", memory});
+      words.insert(words.end(), {"--threads", mebibytes % 4 ? "1" : "2", "--memory", memory});
       const std::string what = one.words.front() + " in " + memory + ": ";
       const Result result = run(words);
       EXPECT_EQ(files(), before) << what;
@@ -129,6 +138,81 @@ TEST_F(CliLimits, StandardStreamsThatAreClosedAreNotTheOutputs) {
     EXPECT_EQ(read_text(output), read_text(whole)) << closed;
     EXPECT_TRUE(test::Json::accept(read_text(report))) << closed;
   }
+}
+
+// Whichever of them fails, and whether it is written first or last.
+TEST_F(CliLimits, OutputsAppearTogether) {
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+  const std::vector<std::string> words{"remesh",      in("sphere.off"), "-n",          "100",      "-o",
+                                       in("out.off"), "--preview",      in("out.png"), "--report", in("out.json")};
+  ASSERT_EQ(run(words).code, 0);
+  std::set<std::uintmax_t> sizes;
+  for (const char* name : {"out.off", "out.png", "out.json"}) {
+    sizes.insert(fs::file_size(in(name)));
+    write_text(name, "old");
+  }
+  ASSERT_EQ(sizes.size(), 3u);
+  sizes.erase(*sizes.rbegin());
+  const std::set<std::string> before = files();
+  for (const std::uintmax_t size : sizes) {  // room for one of the three, and for two
+    const rlimit small{size, limit.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const pid_t process = start(words);
+    setrlimit(RLIMIT_FSIZE, &limit);
+    EXPECT_EQ(finish(process).code, 1);
+    for (const char* name : {"out.off", "out.png", "out.json"}) EXPECT_EQ(read_text(in(name)), "old") << name << size;
+    EXPECT_EQ(files(), before);
+  }
+  std::vector<std::string> to_stdout(words.begin(), words.end() - 1);
+  to_stdout.push_back("-");
+  std::string command = BISECTOR_PROGRAM;
+  for (const std::string& word : to_stdout) command += ' ' + word;
+  EXPECT_EQ(WEXITSTATUS(std::system((command + " > /dev/full 2> " + in("err")).c_str())), 1);
+  EXPECT_EQ(read_text(in("out.off")), "old");
+  EXPECT_NE(read_text(in("err")).find("the report cannot be written to stdout"), std::string::npos);
+}
+
+// Where what is printed is all that there is.
+TEST_F(CliLimits, TextThatCannotBePrintedIsAnError) {
+  const std::string program = BISECTOR_PROGRAM, sphere = in("sphere.off"), full = " > /dev/full 2> " + in("err");
+  for (const std::string& words : {"quality " + sphere, std::string("devices"), std::string("--version"),
+                                   std::string("remesh --help"), "rvd " + sphere + " -n 20"}) {
+    EXPECT_EQ(WEXITSTATUS(std::system((program + ' ' + words + full).c_str())), 1) << words;
+    EXPECT_NE(read_text(in("err")).find("bisector: error: what is printed cannot be written to stdout"),
+              std::string::npos)
+        << words << read_text(in("err"));
+  }
+  EXPECT_EQ(WEXITSTATUS(std::system((program + " quality " + sphere + " --report " + in("q.json") + full).c_str())), 0);
+  EXPECT_EQ(WEXITSTATUS(std::system((program + " quality " + sphere + " --quiet" + full).c_str())), 0);
+}
+
+// Nobody opens the other end.
+TEST_F(CliLimits, APipeThatDoesNotOpenIsGivenUpAtOnce) {
+  ASSERT_EQ(mkfifo(in("pipe.off").c_str(), 0600), 0);
+  const pid_t process = start({"quality", in("pipe.off")});
+  while (!test::catches_interrupts(process)) ::usleep(1000);
+  ::usleep(100'000);
+  kill(process, SIGTERM);
+  const Result result = finish(process);
+  EXPECT_EQ(result.code, 130);
+  EXPECT_EQ(result.err, "bisector: cancelled\n");
+}
+
+// As do machines of a cluster, or threads that use the C interface.
+TEST_F(CliLimits, RunsThatWriteToOneFolderDoNotMeet) {
+  std::vector<std::thread> threads;
+  std::atomic<int> refused = 0;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([&, path = in(std::to_string(t) + ".off")] {
+      for (int k = 0; k < 500; ++k) try {
+          job::check_outputs({{path, {}}}, {});
+        } catch (const Error&) {
+          ++refused;
+        }
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(refused, 0);
 }
 
 // Warnings, the summary and errors are lost there, nothing else.

@@ -60,6 +60,14 @@ TEST_F(CliRanks, ErrorsAreOneLineAndEndAll) {
   }
 }
 
+// Its jobs would be ranks of nothing.
+TEST_F(CliRanks, BatchesAreRefused) {
+  write_text("jobs.jsonl", "{\"command\": \"quality\", \"input\": \"" + in("sphere.off") + "\"}\n");
+  EXPECT_EQ(run_ranks(2, "batch " + in("jobs.jsonl") + " -o " + in("results")), 255);
+  EXPECT_NE(read_text(in("err")).find("start it without mpirun"), std::string::npos) << read_text(in("err"));
+  EXPECT_FALSE(std::filesystem::exists(in("results")));
+}
+
 // Ranks that would all do the same, and write the same file.
 TEST_F(CliRanks, WithoutTheProgramForThemNothingIsDone) {
   const std::string lonely = in("lonely");

@@ -222,6 +222,18 @@ TEST_F(Parts, DescendAsTheCpuDoes) {
   }
 }
 
+void expect_same_of_ranks(const std::vector<std::size_t>& sizes, const std::string& path, const RemeshOptions& options,
+                          const PartsResult& reference) {
+  for (const std::size_t size : sizes) {
+    ThreadRanks ranks(size);
+    set_ranks(&ranks.root());
+    const PartsResult found = remesh_parts(path, options);
+    set_ranks(nullptr);
+    EXPECT_TRUE(same_bits(found.mesh.vertices, reference.mesh.vertices)) << size;
+    EXPECT_EQ(found.mesh.triangles, reference.mesh.triangles) << size;
+  }
+}
+
 TEST_F(Parts, AreRemeshedAlikeByAnyNumberOfRanks) {
   const std::string path = write(torus(200, 120));
   RemeshOptions options;
@@ -235,13 +247,36 @@ TEST_F(Parts, AreRemeshedAlikeByAnyNumberOfRanks) {
   const QualityReport quality = measure_quality(reference.mesh);
   EXPECT_GT(quality.q_ave, 0.93);
   EXPECT_GT(quality.valence6, 0.8);
-  for (const std::size_t size : {2, 3}) {
-    ThreadRanks ranks(size);
-    set_ranks(&ranks.root());
-    const PartsResult found = remesh_parts(path, options);
-    set_ranks(nullptr);
-    EXPECT_TRUE(same_bits(found.mesh.vertices, reference.mesh.vertices));
-    EXPECT_EQ(found.mesh.triangles, reference.mesh.triangles);
+  expect_same_of_ranks({2, 3}, path, options, reference);
+}
+
+// A rank may have none but triangles without area: there are so many that the last of three has no other.
+TEST_F(Parts, MayHaveNoAreaOnARank) {
+  TriangleMesh mesh = box(2);
+  const Index first = static_cast<Index>(mesh.vertices.size());
+  for (int k = 0; k < 600; ++k) {
+    mesh.vertices.push_back({10.0 + k, 0, 0});
+    if (k >= 2) mesh.triangles.push_back({first, first + static_cast<Index>(k) - 1, first + static_cast<Index>(k)});
+  }
+  const std::string path = write(mesh);
+  RemeshOptions options;
+  options.vertices = 60;
+  const PartsResult reference = remesh_parts(path, options);
+  expect_same_of_ranks({2, 3}, path, options, reference);
+}
+
+// Ranks without a triangle have cells all the same, of none.
+TEST_F(Parts, MayBeFewerThanRanks) {
+  RemeshOptions options;
+  options.vertices = 20;
+  for (const std::vector<Triangle>& triangles : {std::vector<Triangle>{{0, 1, 2}}, {{0, 1, 2}, {1, 3, 2}}}) {
+    TriangleMesh mesh;
+    mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+    mesh.triangles = triangles;
+    const std::string path = write(mesh);
+    const PartsResult reference = remesh_parts(path, options);
+    EXPECT_EQ(reference.topology.euler, 1);
+    expect_same_of_ranks({2, 3, 4}, path, options, reference);
   }
 }
 

@@ -145,6 +145,13 @@ TEST(Sampling, NeighbouringSeedsGiveUnrelatedPoints) {
   EXPECT_LT(std::abs(chi_square_excess(observed, expected)), 3.5);
 }
 
+TEST(Sampling, OfTheLeastAreaThereIs) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0.5, 1e-300, 0}};
+  mesh.triangles = {{0, 0, 1}, {0, 1, 2}, {1, 1, 2}};
+  for (const SurfaceSample& sample : sample_surface(mesh, 100, 1)) EXPECT_EQ(sample.triangle, 1u);
+}
+
 TEST(Sampling, RefusesWhatCannotBeSampled) {
   TriangleMesh flat = collinear_among_good();
   flat.triangles = {flat.triangles[1]};

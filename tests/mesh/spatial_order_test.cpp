@@ -48,10 +48,24 @@ TEST(SpatialOrder, TakesFacesFromTheInput) {
   for (Index t = 0; t < mesh.triangles.size(); ++t) mesh.face_of_triangle[t] = t / 2;
   mesh.vertices.push_back({9, 9, 9});  // that no triangle uses
   const OrderedMesh ordered = in_spatial_order(mesh);
-  EXPECT_EQ(ordered.mesh.vertices.size(), mesh.vertices.size());
   std::vector<Index> faces = ordered.mesh.face_of_triangle, want = mesh.face_of_triangle;
   std::sort(faces.begin(), faces.end());
   EXPECT_EQ(faces, want);
+}
+
+TEST(SpatialOrder, LeavesOutWhatNoTriangleUses) {
+  const TriangleMesh mesh = torus(8, 6);
+  TriangleMesh more = mesh;
+  more.vertices.insert(more.vertices.begin(), {{1e9, 0, 0}, {0, 0, 0}});
+  for (Triangle& t : more.triangles)
+    for (Index& v : t) v += 2;
+  const OrderedMesh want = in_spatial_order(mesh), got = in_spatial_order(more);
+  EXPECT_EQ(got.mesh.vertices, want.mesh.vertices);
+  EXPECT_EQ(got.mesh.triangles, want.mesh.triangles);
+  ASSERT_EQ(got.vertex_of.size(), more.vertices.size());
+  EXPECT_EQ(got.vertex_of[0], kNone);
+  EXPECT_EQ(got.vertex_of[1], kNone);
+  EXPECT_TRUE(std::equal(want.vertex_of.begin(), want.vertex_of.end(), got.vertex_of.begin() + 2));
 }
 
 }  // namespace

@@ -129,6 +129,34 @@ TEST(Detail, ThinWallsHaveGoodTrianglesWhereSheetsMeet) {
   EXPECT_GT(measure_quality(result.mesh).theta_min, 25);
 }
 
+// A hole stays, however small, so edges grow from its length.
+TEST(Detail, SmallHolesHaveEdgesAsShortAsThey) {
+  TriangleMesh ball = icosphere(3);
+  const Triangle around = ball.triangles.back();
+  ball.triangles.pop_back();
+  const auto [a, b, c] = around;
+  const Vec3 centre = (1.0 / 3) * (ball.vertices[a] + ball.vertices[b] + ball.vertices[c]);
+  const auto hole = static_cast<Index>(ball.vertices.size());
+  for (const Index v : around) ball.vertices.push_back(centre + 0.002 * (ball.vertices[v] - centre));
+  for (Index k = 0; k < 3; ++k) {
+    const Index next = (k + 1) % 3;
+    ball.triangles.push_back({around[k], around[next], hole + next});
+    ball.triangles.push_back({around[k], hole + next, hole + k});
+  }
+  FeatureGraph border = sharp_graph(ball);
+  ASSERT_EQ(border.curves.size(), 3u);
+  for (FeatureCurve& curve : border.curves) curve.kind = FeatureKind::border;
+  const double side = norm(ball.vertices[hole + 1] - ball.vertices[hole]);
+  const std::vector<double> lengths(ball.vertices.size(), 0.1);
+  const DetailPlan plan = plan_details(ball, border, lengths, 1000, false);
+  ASSERT_FALSE(plan.lengths.empty());
+  const double finest = *std::min_element(plan.lengths.begin(), plan.lengths.end());
+  EXPECT_GE(finest, 0.5 * side);
+  EXPECT_LE(finest, 1.01 * side);
+  // Not where the vertices are too few for the edges around it.
+  for (const double length : plan_details(ball, border, lengths, 400, false).lengths) EXPECT_GT(length, 2 * side);
+}
+
 TEST(Detail, IsTheSameWithAnyNumberOfThreads) {
   const TriangleMesh mesh = chamfered(0.05);
   const DetailPlan all = plan_for(mesh, 600);

@@ -11,17 +11,16 @@
 #include <numbers>
 
 #include "backend/cpu_backend.h"
-#include "backend/project.h"
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/geometry.h"
-#include "cvt/multilevel.h"
+#include "mesh/topology.h"
 #include "remesh/feature_recovery.h"
-#include "remesh/feature_seeds.h"
 #include "remesh/improve_patch.h"
 #include "remesh/topology_control.h"
 #include "support/diagram.h"
 #include "support/models.h"
+#include "support/optimised.h"
 
 namespace bisector::test {
 namespace {
@@ -84,29 +83,33 @@ TEST(ShapeExcess, IsImposedBetweenLockedEdges) {
     }
 }
 
-// --- The patch ---
-
-Csr<Index> rings_of(const Dual& dual, std::size_t seeds) {
-  std::vector<std::vector<Index>> rings(seeds);
-  for (const Triangle& t : dual.triangles)
-    for (int m = 0; m < 3; ++m)
-      for (const Index w : {t[(m + 1) % 3], t[(m + 2) % 3]}) rings[t[m]].push_back(w);
-  Csr<Index> csr;
-  for (std::vector<Index>& ring : rings) {
-    std::sort(ring.begin(), ring.end());
-    ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
-    csr.values.insert(csr.values.end(), ring.begin(), ring.end());
-    csr.offsets.push_back(csr.values.size());
+// What angle_is_imposed says of the smallest angle alone, this says of each.
+TEST(FreeAngleLack, IsOfAnglesThatAreNotBetweenLockedEdges) {
+  const std::array<Vec3, 3> triangle{Vec3{0, 0, 0}, Vec3{3, 0, 0}, Vec3{2.5, 1, 0}};
+  const double at_first = std::atan2(1, 2.5) * 180 / std::numbers::pi;
+  const double at_second = std::atan2(1, 0.5) * 180 / std::numbers::pi, third = 180 - at_first - at_second;
+  for (const double degrees : {20.0, 30.0, 70.0, 100.0}) {
+    const auto lack = [&](std::initializer_list<double> angles) {
+      double most = 0;
+      for (const double angle : angles) most = std::max(most, degrees - angle);
+      return most;
+    };
+    EXPECT_NEAR(free_angle_lack(triangle, {false, false, false}, degrees), lack({at_first, at_second, third}), 1e-9);
+    EXPECT_NEAR(free_angle_lack(triangle, {true, false, false}, degrees), lack({at_first, at_second, third}), 1e-9);
+    EXPECT_NEAR(free_angle_lack(triangle, {true, false, true}, degrees), lack({at_second, third}), 1e-9);
+    EXPECT_NEAR(free_angle_lack(triangle, {true, true, false}, degrees), lack({at_first, third}), 1e-9);
+    EXPECT_EQ(free_angle_lack(triangle, {true, true, true}, degrees), 0);
   }
-  return csr;
 }
+
+// --- The patch ---
 
 // The whole dual of seeds on a surface as a patch.
 struct WholePatch {
   explicit WholePatch(TriangleMesh mesh, std::vector<Vec3> given)
       : surface(std::move(mesh)), seeds(std::move(given)),
         diagram(diagram_of(surface, seeds, NeighbourSource::nearest)), dual(extract_dual(diagram.polygons)),
-        rings(rings_of(dual, seeds.size())), map(surface, seeds, diagram.moments.triangles, rings),
+        rings(vertex_neighbours(dual.triangles, seeds.size())), map(surface, seeds, diagram.moments.triangles, rings),
         patch(map, nullptr, kGoal) {
     for (Index v = 0; v < seeds.size(); ++v) {
       PatchVertex vertex;
@@ -192,7 +195,7 @@ TEST(ImprovePatch, EncroachmentsTellOfCellsThatCutTheCurve) {
       seeds.add(x, {});
     }
     const Diagram diagram = diagram_of(surface, seeds.positions(), NeighbourSource::nearest);
-    const Csr<Index> rings = rings_of(diagram.dual, seeds.size());
+    const Csr<Index> rings = vertex_neighbours(diagram.dual.triangles, seeds.size());
     const CellMap map(surface, seeds.positions(), diagram.moments.triangles, rings);
     ImprovePatch patch(map, &curves, kGoal);
     for (Index v = 0; v < seeds.size(); ++v) {
@@ -257,13 +260,8 @@ TEST(ImprovePatch, RelaxingNeverCostsAndStaysOnTheSurface) {
       cost = next;
     }
   EXPECT_LT(cost, 0.5 * first);
-  for (const PatchVertex& vertex : patch.vertices()) {
-    double nearest = 1;
-    for (const Facet& f : whole.surface.facets)
-      nearest =
-          std::min(nearest, norm2(nearest_on_triangle(vertex.x, f.corners[0], f.corners[1], f.corners[2]) - vertex.x));
-    EXPECT_LT(nearest, 1e-28);
-  }
+  for (const PatchVertex& vertex : patch.vertices())
+    EXPECT_LT(norm2(nearest_of_all(whole.surface, vertex.x) - vertex.x), 1e-28);
 }
 
 // A seed that is held stays nearer to where it was, the more so the more it is held.
@@ -287,14 +285,7 @@ struct Problem {
       : surface(mesh), backend(surface, NeighbourSource::nearest), curves(graph, surface.mesh.vertices),
         trace(surface, curves), input(analyse_topology(mesh.triangles, mesh.vertices.size())),
         run(backend, curves, context) {
-    OptimiseOptions step;
-    step.iterations = iterations;
-    step.constrained = true;
-    const CurveMeasure measure(surface, curves);
-    if (curves.size() > 0) run.seeds = seeds_on_features(curves, measure, measure.scale(count));
-    run.seeds.add(initial_seeds(surface, count - run.seeds.size(), 1));
-    optimise(run, step);
-    if (curves.size() > 0) recover_features(run, trace, measure, measure.scale(count), step);
+    place_and_optimise(run, trace, count, iterations);
     before = run.seeds;
     quality_before = quality();
   }
@@ -323,12 +314,7 @@ struct Problem {
     EXPECT_GE(after.q_ave, was.q_ave);
     EXPECT_GE(after.theta_min_ave, was.theta_min_ave);
     const double tolerance = 1e-12 * bounding_box(surface.mesh.vertices).diagonal();
-    for (const Vec3& x : run.seeds.positions()) {
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const Facet& f : surface.facets)
-        nearest = std::min(nearest, norm2(nearest_on_triangle(x, f.corners[0], f.corners[1], f.corners[2]) - x));
-      EXPECT_LE(std::sqrt(nearest), tolerance);
-    }
+    for (const Vec3& x : run.seeds.positions()) EXPECT_LE(norm(nearest_of_all(surface, x) - x), tolerance);
   }
 
   Surface surface;

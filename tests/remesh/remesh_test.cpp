@@ -139,6 +139,31 @@ TEST(RemeshInput, MayBeListedInAnyOrder) {
   }
 }
 
+TEST(RemeshInput, MayHaveVerticesThatNoTriangleUses) {
+  const TriangleMesh mesh = wavy_patch(40);
+  TriangleMesh other = mesh;
+  other.vertices.insert(other.vertices.begin(), {{0, 0, 0}, {1e6, 0, 0}});
+  other.vertices.insert(other.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
+  for (Triangle& t : other.triangles)
+    for (Index& v : t) v += 2;
+  RemeshOptions options = options_for(400);
+  options.keep_vertices = {mesh.triangles[100][0]};
+  options.sizing.kind = DensityKind::attribute;
+  for (const Vec3& v : mesh.vertices) options.sizing.attribute.push_back(2 + v.x);
+  const RemeshResult a = remesh(mesh, options);
+  std::vector<double>& densities = options.sizing.attribute;
+  densities.insert(densities.begin(), {1e-9, 1e9});
+  densities.resize(other.vertices.size(), 1);
+  options.keep_vertices[0] += 2;
+  const RemeshResult b = remesh(other, options);
+  EXPECT_TRUE(same_mesh(a.mesh, b.mesh));
+  ASSERT_EQ(a.kept.size(), b.kept.size());
+  for (std::size_t v = 0; v < a.kept.size(); ++v) EXPECT_EQ(b.kept[v], a.kept[v] == kNone ? kNone : a.kept[v] + 2);
+  ASSERT_EQ(b.welded.vertex_of.size(), other.vertices.size());
+  EXPECT_EQ(b.welded.vertex_of[1], kNone);
+  EXPECT_EQ(b.welded.vertex_of[2], a.welded.vertex_of[0]);
+}
+
 TEST(RemeshThin, APlateKeepsItsTwoSides) {
   TriangleMesh plate = box(8);
   for (Vec3& v : plate.vertices) v.z *= 0.02;
@@ -265,6 +290,32 @@ TEST(RemeshOptionsTest, GivenSeedsAreTheStart) {
   // The free minimum leaves the surface, and lies below.
   EXPECT_LT(free.energy, constrained.energy);
   for (const Vec3& x : constrained.mesh.vertices) EXPECT_LE(distance_to(mesh, x), 1e-11);
+}
+
+// A goal that not all triangles reach.
+TEST(RemeshOptionsTest, FittingMakesNoTriangleWorseThatMissesTheGoal) {
+  const TriangleMesh mesh = icosphere(4);
+  RemeshOptions options = options_for(300);
+  options.iterations = 5;
+  options.min_angle = 50;
+  const RemeshResult before = remesh(mesh, options);
+  options.fit = true;
+  const RemeshResult after = remesh(mesh, options);
+  ASSERT_EQ(after.mesh.triangles, before.mesh.triangles);
+  EXPECT_GT(after.fitted.iterations, 0);
+  const auto smallest = [](const TriangleMesh& of, const Triangle& t) {
+    TriangleMesh one;
+    for (const Index v : t) one.vertices.push_back(of.vertices[v]);
+    one.triangles = {{0, 1, 2}};
+    return measure_quality(one).theta_min;
+  };
+  std::size_t missing = 0;
+  for (const Triangle& t : before.mesh.triangles) {
+    const double was = smallest(before.mesh, t);
+    missing += was < options.min_angle;
+    EXPECT_GE(smallest(after.mesh, t), std::min(was, options.min_angle) - 1e-6);
+  }
+  EXPECT_GT(missing, 10u);
 }
 
 TEST(RemeshOptionsTest, EveryNumberOfLevelsGivesTheCount) {
