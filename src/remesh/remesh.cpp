@@ -15,6 +15,7 @@
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "compute/compute.h"
+#include "core/degenerate.h"
 #include "core/magnitude.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -471,8 +472,14 @@ void Pipeline::extract() {
   result_.seconds.extract += watch.seconds() - mending;
 }
 
+// What has no area, as the dual of too few seeds may have none, stays as it is.
 void Pipeline::fit() {
   const Stopwatch watch;
+  const TriangleMesh& mesh = result_.mesh;
+  const auto has_area = [&](const Triangle& t) {
+    return triangle_area(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]) > 0;
+  };
+  if (std::none_of(mesh.triangles.begin(), mesh.triangles.end(), has_area)) return;
   FitOptions fit;
   fit.fixed.assign(result_.mesh.vertices.size(), 0);
   for (const auto& edge : result_.mesh.feature_edges)

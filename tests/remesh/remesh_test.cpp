@@ -272,6 +272,14 @@ TEST(RemeshHard, FewVerticesGiveWhatTheyCan) {
   EXPECT_EQ(tetrahedron.mesh.triangles.size(), 4u);
 }
 
+TEST(RemeshHard, ThereIsNothingToFitWithoutTriangles) {
+  RemeshOptions options = options_for(4);
+  options.fit = true;
+  options.topology = TopologyControl::check;
+  const RemeshResult result = remesh(torus(24, 16), options);
+  EXPECT_TRUE(result.mesh.triangles.empty());
+}
+
 TEST(RemeshOptionsTest, GivenSeedsAreTheStart) {
   const TriangleMesh mesh = icosphere(3);
   RemeshOptions options;
