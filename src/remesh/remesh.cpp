@@ -21,6 +21,7 @@
 #include "core/stopwatch.h"
 #include "cvt/multilevel.h"
 #include "cvt/optimise.h"
+#include "cvt/optimise_around.h"
 #include "mesh/topology.h"
 #include "remesh/around_kept.h"
 #include "remesh/coarse_surface.h"
@@ -58,6 +59,9 @@ constexpr double kMostOnFeatures = 1e6, kMostOnFeaturesPerVertex = 1000;
 // cell, or curve, in so many is such.
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
+// Of the seeds wanted, by how many those of an earlier run may be off. Where topology took many more, it has to be
+// found anew for other edge lengths.
+constexpr double kMostOff = 0.01;
 constexpr int kRefinements = 3;  // of a result, while that makes it better
 // Runs for a distance to the input, how many times the vertices they may take, and the gap between bounds of it.
 constexpr int kNearings = 8;
@@ -128,6 +132,9 @@ class Pipeline {
   void place();
   // The same for seeds that a run for another density on the same surface has placed: on the finest level alone.
   void place_again(const PlacedSeeds& earlier);
+  // The same for seeds that such a run has finished with: only where there is need of more seeds are they placed and
+  // optimised. False, and nothing is placed, if that is nowhere, or if they are not about as many as they should be.
+  bool place_around(const PlacedSeeds& earlier);
   const PlacedSeeds& seeds() const { return run_.seeds; }
   // Where cells are still no disks then, and how long edges should be there. Empty if topology is not enforced, or if
   // so many cells fail that the seeds are too few.
@@ -154,6 +161,7 @@ class Pipeline {
   double cost(std::size_t seeds) const { return static_cast<double>(surface_.facets.size() + 3 * seeds); }
   std::vector<std::size_t> choose_levels() const;
   void place_on_features(std::size_t count);
+  bool place_on_short_curves();
   void to_next_level(std::size_t count);
   void make_stand_ins(const std::vector<std::size_t>& counts);
   bool begin_on_stand_in(std::size_t level);
@@ -529,6 +537,50 @@ void Pipeline::place_again(const PlacedSeeds& earlier) {
   optimise_levels({wanted_});
 }
 
+bool Pipeline::place_around(const PlacedSeeds& earlier) {
+  const double off = static_cast<double>(earlier.size()) - static_cast<double>(wanted_);
+  if (std::abs(off) > kMostOff * static_cast<double>(wanted_)) return false;
+  run_.localise(localises_);
+  run_.seeds = earlier;
+  const SeedsBefore before = seeds_before(run_);
+  bool changed = place_on_short_curves();
+  meet_count(run_, std::max(wanted_, earlier.size()));
+  follow_density(run_);
+  changed |= !std::equal(before.positions.begin(), before.positions.end(), run_.seeds.positions().begin(),
+                         run_.seeds.positions().end());
+  if (!changed) {
+    run_.localise(false);
+    return false;
+  }
+  step_.constrained = plan_.constrained;
+  step_.phase = "around shorter edges";
+  step_.iterations = share_of(plan_.iterations, kFinestShare);
+  step_.done = 0;
+  step_.share = 1;
+  optimise_around(run_, before, step_);
+  step_.done = 1;
+  step_.share = 0;
+  return true;
+}
+
+// Curves that have fewer seeds than they should get theirs anew. True if there are any.
+bool Pipeline::place_on_short_curves() {
+  const double scale = measure_.scale(wanted_);
+  std::vector<std::size_t> missing(curves_.size());
+  for (Index c = 0; c < curves_.size(); ++c) missing[c] = measure_.edges(c, scale) - (curves_.closed(c) ? 0 : 1);
+  for (const SeedPlace& place : run_.seeds.places())
+    if (place.curve != kNone && missing[place.curve] > 0) --missing[place.curve];
+  if (std::all_of(missing.begin(), missing.end(), [](std::size_t n) { return n == 0; })) return false;
+  const PlacedSeeds fresh = seeds_on_features(curves_, measure_, scale, run_.seeds.places());
+  const auto is_on_short = [&](const SeedPlace& place) { return place.curve != kNone && missing[place.curve] > 0; };
+  std::vector<char> removed(run_.seeds.size());
+  for (std::size_t i = 0; i < removed.size(); ++i) removed[i] = is_on_short(run_.seeds.place(i));
+  run_.seeds.remove(removed);
+  for (std::size_t i = 0; i < fresh.size(); ++i)
+    if (is_on_short(fresh.place(i))) run_.seeds.add(fresh.position(i), fresh.place(i));
+  return true;
+}
+
 SizeBounds Pipeline::crowded() {
   SizeBounds found;
   const MeshTopology& input = input_topology_;
@@ -743,8 +795,8 @@ Runs::Run Runs::make_run(bool last) {
     const std::unique_ptr<Backend> backend = compute_.backend(surface);
     Pipeline pipeline(*backend, prepared.features, plan, progress_.context(), make_backend);
     pipeline.count(spent_);
-    if (earlier_) pipeline.place_again(*earlier_);
-    else pipeline.place();
+    if (!earlier_) pipeline.place();
+    else if (!best_ || !pipeline.place_around(*earlier_)) pipeline.place_again(*earlier_);
     if (std::exchange(may_shorten_, false)) {
       const SizeBounds crowded = pipeline.crowded();
       if (!crowded.points.empty()) {

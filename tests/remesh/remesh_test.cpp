@@ -13,8 +13,10 @@
 
 #include "backend/project.h"
 #include "bisector/error.h"
+#include "bisector/io.h"
 #include "bisector/quality.h"
 #include "core/geometry.h"
+#include "remesh/slivers.h"
 #include "remesh/topology_control.h"
 #include "support/diagram.h"
 #include "support/models.h"
@@ -430,6 +432,27 @@ TEST(RemeshHard, AThinTipKeepsTheTopology) {
 }
 
 // Bounds that hold for samples and for the known distance of a chord.
+// So few vertices for a cube with engraved letters leave slivers in the first result.
+TEST(RemeshHard, ARunAgainMovesSeedsAroundWhatItMends) {
+  const TriangleMesh mesh = read_mesh(BISECTOR_SOURCE_DIR "/examples/engraved.off");
+  std::vector<std::string> phases;
+  Context context;
+  context.progress = [&](const Progress& p) { phases.push_back(p.phase); };
+  RemeshOptions options = options_for(100);
+  const RemeshResult result = remesh(mesh, options, context);
+  const auto mentions = [](const char* words) {
+    return [words](const std::string& phase) { return phase.find(words) != std::string::npos; };
+  };
+  EXPECT_TRUE(std::any_of(phases.begin(), phases.end(), mentions("around shorter edges")));
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_EQ(result.features.broken, 0u);
+  EXPECT_EQ(result.untiled, 0u);
+  EXPECT_FALSE(find_slivers(result.mesh).worth_another_run);
+  EXPECT_EQ(count_self_intersections(result.mesh), 0u);
+  options.threads = 1;
+  EXPECT_TRUE(same_mesh(remesh(mesh, options).mesh, result.mesh));
+}
+
 TEST(RemeshDistance, IsBroughtDownToWhatIsAskedFor) {
   const TriangleMesh ball = icosphere(4);
   RemeshOptions options = options_for(60);
