@@ -238,8 +238,10 @@ void Usage::refuse(const char* option, const char* why) const {
 
 namespace {
 
-// A number as it reads shortest, 1e3 for 1000.0; other words as they are.
+// A number as it reads shortest, 1000 for 1e3; other words as they are.
 std::string plain(const std::string& value) {
+  // Of these a double has not all digits.
+  if (const std::optional<std::uint64_t> whole = number_in<std::uint64_t>(value)) return fmt::format("{}", *whole);
   const std::optional<double> number = number_in<double>(value);
   return number ? fmt::format("{}", *number) : value;
 }
