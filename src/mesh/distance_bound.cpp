@@ -10,6 +10,7 @@
 #include "bisector/error.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
+#include "mesh/used_vertices.h"
 #include "spatial/nearest.h"
 
 namespace bisector {
@@ -132,9 +133,7 @@ double size_of(const TriangleMesh& mesh) {
 
 // The largest distance of a corner.
 double corner_distance(const TriangleMesh& from, const Target& to) {
-  std::vector<char> used(from.vertices.size(), 0);
-  for (const Triangle& t : from.triangles)
-    for (const Index v : t) used[v] = 1;
+  const std::vector<char> used = mark_used_vertices(from.triangles, from.vertices.size());
   std::vector<double> distances(used.size(), 0);
   parallel_each(used.size(), [&](std::size_t v) {
     if (used[v]) distances[v] = norm(from.vertices[v] - to.nearest(from.vertices[v]).point);

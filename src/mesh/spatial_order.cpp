@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "mesh/used_vertices.h"
 #include "spatial/hilbert.h"
 
 namespace bisector {
@@ -12,12 +13,7 @@ namespace {
 
 // The vertices that triangles use.
 std::vector<Index> order_of_vertices(const TriangleMesh& mesh) {
-  std::vector<char> used(mesh.vertices.size(), 0);
-  for (const Triangle& t : mesh.triangles)
-    for (const Index v : t) used[v] = 1;
-  std::vector<Index> vertices;
-  for (Index v = 0; v < used.size(); ++v)
-    if (used[v]) vertices.push_back(v);
+  const std::vector<Index> vertices = used_vertices(mesh.triangles, mesh.vertices.size());
   std::vector<Vec3> points(vertices.size());
   parallel_each(points.size(), [&](std::size_t k) { points[k] = mesh.vertices[vertices[k]]; });
   std::vector<Index> order = hilbert_order(points);

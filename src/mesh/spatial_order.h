@@ -9,8 +9,8 @@ namespace bisector {
 
 struct OrderedMesh {
   TriangleMesh mesh;
-  std::vector<Index>
-      vertex_of;  // of each of the given mesh's vertices, the one it has become; kNone: no triangle uses it
+  // Of each of the given mesh's vertices, the one it has become; kNone: no triangle uses it.
+  std::vector<Index> vertex_of;
 };
 
 // The same mesh with its vertices along a Hilbert curve, and its triangles by their lowest vertex, with which each

@@ -9,6 +9,7 @@
 #include "mesh/attribute_sizes.h"
 #include "mesh/tet_adjacency.h"
 #include "mesh/topology.h"
+#include "mesh/used_vertices.h"
 
 namespace bisector {
 
@@ -42,13 +43,8 @@ std::vector<Triangle> boundary_of(const std::vector<Tetrahedron>& tets, const st
 }
 
 void check_vertices(const TetMesh& mesh, TetTopology& topology) {
-  std::vector<char> used(mesh.vertices.size(), 0);
-  for (const Tetrahedron& t : mesh.tets)
-    for (const Index v : t) used[v] = 1;
-  std::vector<Index> order;
-  for (Index v = 0; v < used.size(); ++v)
-    if (used[v]) order.push_back(v);
-  topology.unused_vertices = used.size() - order.size();
+  std::vector<Index> order = used_vertices(mesh.tets, mesh.vertices.size());
+  topology.unused_vertices = mesh.vertices.size() - order.size();
   const auto key = [&](Index v) {
     const Vec3& p = mesh.vertices[v];
     return std::tuple(p.x, p.y, p.z);

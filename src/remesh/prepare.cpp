@@ -18,6 +18,7 @@
 #include "mesh/spatial_order.h"
 #include "mesh/topology.h"
 #include "mesh/touching.h"
+#include "mesh/used_vertices.h"
 #include "remesh/detail.h"
 #include "remesh/sizing.h"
 #include "spatial/kd_tree.h"
@@ -154,9 +155,7 @@ void check_edges(const TriangleMesh& mesh, const std::vector<std::array<Index, 2
 }
 
 void check_kept(const TriangleMesh& mesh, const RemeshOptions& options) {
-  std::vector<char> used(mesh.vertices.size(), 0);
-  for (const Triangle& t : mesh.triangles)
-    for (const Index v : t) used[v] = 1;
+  const std::vector<char> used = mark_used_vertices(mesh.triangles, mesh.vertices.size());
   for (const Index v : options.keep_vertices)
     if (v >= used.size() || !used[v])
       throw Error(fmt::format("vertex {}, which is to be kept, is {}; leave it out", v,

@@ -18,6 +18,7 @@
 #include "core/parallel.h"
 #include "features/size_field.h"
 #include "mesh/locate.h"
+#include "mesh/used_vertices.h"
 
 namespace bisector {
 namespace {
@@ -162,11 +163,7 @@ SizeSamples samples_of(const TetMesh& mesh, const TriangleMesh& boundary, const 
   SizingOptions field = options.field;
   field.min_edge = field.max_edge = 0;
   const SizedMesh sized = refine_for_density(boundary, field, target);
-  std::vector<char> used(sized.mesh.vertices.size(), 0);
-  for (const Triangle& t : sized.mesh.triangles)
-    for (Index v : t) used[v] = 1;
-  for (Index v = 0; v < used.size(); ++v) {
-    if (!used[v]) continue;
+  for (const Index v : used_vertices(sized.mesh.triangles, sized.mesh.vertices.size())) {
     samples.points.push_back(sized.mesh.vertices[v]);
     samples.lengths.push_back(target_edge_length(sized.sizing, v));
   }

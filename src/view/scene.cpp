@@ -11,6 +11,7 @@
 #include "mesh/tet_quality.h"
 #include "mesh/topology.h"
 #include "mesh/triangle_quality.h"
+#include "mesh/used_vertices.h"
 #include "spatial/nearest.h"
 
 namespace bisector::view {
@@ -64,12 +65,7 @@ void measure_tets(Model& model) {
 TriangleMesh surface_of(const Model& model) { return {model.vertices, model.triangles}; }
 
 // Vertices inside of a solid are of no surface.
-std::vector<char> on_surface(const Model& model) {
-  std::vector<char> used(model.vertices.size(), 0);
-  for (const Triangle& t : model.triangles)
-    for (const Index v : t) used[v] = 1;
-  return used;
-}
+std::vector<char> on_surface(const Model& model) { return mark_used_vertices(model.triangles, model.vertices.size()); }
 
 Values distances(const Model& from, const Model& to, double percent) {
   const NearestOnMesh nearest(surface_of(to));
