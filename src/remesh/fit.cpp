@@ -143,6 +143,7 @@ Shape shape_of(const Corners& p, const Vec3& upright) {
 class Fit {
  public:
   Fit(const TriangleMesh& reference, TriangleMesh& mesh, const FitOptions& options);
+  bool has_area() const { return total_area_ > 0; }
   FitReport run(const Context& context);
 
  private:
@@ -204,7 +205,7 @@ Fit::Fit(const TriangleMesh& reference, TriangleMesh& mesh, const FitOptions& op
     areas_[t] = triangle_area(p[0], p[1], p[2]);
   });
   total_area_ = fixed_sum(areas_.size(), [&](std::size_t t) { return areas_[t]; });
-  if (!(total_area_ > 0)) throw Error("fit: the mesh has no area; check the mesh");
+  if (!has_area()) return;
   int split = kSplit;
   while (mesh.triangles.size() * static_cast<std::size_t>(split * split) < kFewSamples) ++split;
   parts_ = divide(split);
@@ -515,7 +516,9 @@ FitReport fit_to_surface(const TriangleMesh& reference, TriangleMesh& mesh, cons
     throw Error("fit: " + std::to_string(options.fixed.size()) + " marks for " + std::to_string(mesh.vertices.size()) +
                 " vertices; give one per vertex or none");
   TriangleMesh fitted = mesh;
-  const FitReport report = Fit(reference, fitted, options).run(context);
+  Fit fit(reference, fitted, options);
+  if (!fit.has_area()) return {};
+  const FitReport report = fit.run(context);
   mesh.vertices = std::move(fitted.vertices);
   return report;
 }

@@ -33,8 +33,9 @@ struct FitOptions {
 // `options` or turn over, and what would make triangles intersect that did not before is taken back. Pairs whose
 // normals point away from each other, as those with the other sheet of a thin part, pull nowhere.
 //
-// Topology, order and triangles stay. The result is the same for any number of threads. Throws Error if a mesh has no
-// area or `options.fixed` has another length, and Cancelled; the mesh is then as it was.
+// Topology, order and triangles stay, and a mesh without area as a whole, as the dual of too few seeds may be. The
+// result is the same for any number of threads. Throws Error if the reference has no area or `options.fixed` has
+// another length, and Cancelled; the mesh is then as it was.
 FitReport fit_to_surface(const TriangleMesh& reference, TriangleMesh& mesh, const FitOptions& options = {},
                          const Context& context = {});
 

@@ -15,7 +15,6 @@
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "compute/compute.h"
-#include "core/degenerate.h"
 #include "core/magnitude.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
@@ -161,7 +160,7 @@ class Pipeline {
   double cost(std::size_t seeds) const { return static_cast<double>(surface_.facets.size() + 3 * seeds); }
   std::vector<std::size_t> choose_levels() const;
   void place_on_features(std::size_t count);
-  bool place_on_short_curves();
+  void place_on_short_curves();
   void to_next_level(std::size_t count);
   void make_stand_ins(const std::vector<std::size_t>& counts);
   bool begin_on_stand_in(std::size_t level);
@@ -480,14 +479,8 @@ void Pipeline::extract() {
   result_.seconds.extract += watch.seconds() - mending;
 }
 
-// What has no area, as the dual of too few seeds may have none, stays as it is.
 void Pipeline::fit() {
   const Stopwatch watch;
-  const TriangleMesh& mesh = result_.mesh;
-  const auto has_area = [&](const Triangle& t) {
-    return triangle_area(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]) > 0;
-  };
-  if (std::none_of(mesh.triangles.begin(), mesh.triangles.end(), has_area)) return;
   FitOptions fit;
   fit.fixed.assign(result_.mesh.vertices.size(), 0);
   for (const auto& edge : result_.mesh.feature_edges)
@@ -543,12 +536,10 @@ bool Pipeline::place_around(const PlacedSeeds& earlier) {
   run_.localise(localises_);
   run_.seeds = earlier;
   const SeedsBefore before = seeds_before(run_);
-  bool changed = place_on_short_curves();
+  place_on_short_curves();
   meet_count(run_, std::max(wanted_, earlier.size()));
   follow_density(run_);
-  changed |= !std::equal(before.positions.begin(), before.positions.end(), run_.seeds.positions().begin(),
-                         run_.seeds.positions().end());
-  if (!changed) {
+  if (run_.seeds.positions() == before.positions) {
     run_.localise(false);
     return false;
   }
@@ -563,14 +554,13 @@ bool Pipeline::place_around(const PlacedSeeds& earlier) {
   return true;
 }
 
-// Curves that have fewer seeds than they should get theirs anew. True if there are any.
-bool Pipeline::place_on_short_curves() {
+// Curves that have fewer seeds than they should get theirs anew.
+void Pipeline::place_on_short_curves() {
   const double scale = measure_.scale(wanted_);
   std::vector<std::size_t> missing(curves_.size());
   for (Index c = 0; c < curves_.size(); ++c) missing[c] = measure_.edges(c, scale) - (curves_.closed(c) ? 0 : 1);
   for (const SeedPlace& place : run_.seeds.places())
     if (place.curve != kNone && missing[place.curve] > 0) --missing[place.curve];
-  if (std::all_of(missing.begin(), missing.end(), [](std::size_t n) { return n == 0; })) return false;
   const PlacedSeeds fresh = seeds_on_features(curves_, measure_, scale, run_.seeds.places());
   const auto is_on_short = [&](const SeedPlace& place) { return place.curve != kNone && missing[place.curve] > 0; };
   std::vector<char> removed(run_.seeds.size());
@@ -578,7 +568,6 @@ bool Pipeline::place_on_short_curves() {
   run_.seeds.remove(removed);
   for (std::size_t i = 0; i < fresh.size(); ++i)
     if (is_on_short(fresh.place(i))) run_.seeds.add(fresh.position(i), fresh.place(i));
-  return true;
 }
 
 SizeBounds Pipeline::crowded() {
