@@ -59,10 +59,6 @@ class Crowd {
   bool leave_ = false;
 };
 
-}  // namespace
-
-namespace {
-
 void start() {
   // Of more than cores TBB makes no use.
   const unsigned threads = std::min(thread_count(), static_cast<unsigned>(tbb::info::default_concurrency()));

@@ -17,7 +17,7 @@
 namespace bisector {
 
 // Degrees. A smaller angle is bad, unless curves impose it.
-constexpr double kBadAngle = 30;
+inline constexpr double kBadAngle = 30;
 
 // The angles that triangles should stay between, in degrees, and the cosines from which on they cost more.
 struct ShapeGoal {
