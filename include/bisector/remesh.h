@@ -84,7 +84,7 @@ struct RemeshOptions {
   bool fit = false;       // move the result's vertices off the surface, nearer to it on both sides (fit.h)
   // Length within which borders are joined (weld()). Without a value 0, 1e-7, 1e-6 and 1e-5 of the bounding box's
   // diagonal are tried, for files round their coordinates: the first that leaves fewest border and non-manifold edges
-  // is taken, if it leaves more of neither.
+  // together is taken, if it leaves no more border edges, nor, beyond 0, more non-manifold ones.
   std::optional<double> weld;
   // If positive: the Hausdorff distance of result and input, in the mesh's unit, is to be no more. Where it may be,
   // edges become shorter, in several runs, while the vertices asked for are fewer than `most_vertices` (0: ten times

@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "bisector/error.h"
 #include "core/geometry.h"
 #include "core/grouping.h"
+#include "mesh/double_triangles.h"
 #include "mesh/topology.h"
 #include "spatial/hilbert.h"
 #include "spatial/seed_tree.h"
@@ -23,6 +26,12 @@ namespace {
 using Edge = std::array<Index, 2>;
 
 bool has_repeated_corner(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+std::vector<Index> own_names(std::size_t vertices) {
+  std::vector<Index> names(vertices);
+  std::iota(names.begin(), names.end(), Index{0});
+  return names;
+}
 
 // For each point the first of those equal to it.
 std::vector<Index> first_equal(const std::vector<Vec3>& points) {
@@ -42,8 +51,14 @@ std::vector<Index> first_equal(const std::vector<Vec3>& points) {
 // The mesh under work: its triangles and where each came from.
 struct Work {
   const std::vector<Vec3>& points;
+  const std::vector<std::int32_t>& labels;  // of the triangles of the input, or none
   std::vector<Triangle> triangles;
   std::vector<Index> origin;
+
+  explicit Work(const TriangleMesh& mesh)
+      : points(mesh.vertices), labels(mesh.labels), triangles(mesh.triangles), origin(mesh.triangles.size()) {
+    std::iota(origin.begin(), origin.end(), Index{0});
+  }
 
   // Returns how many were removed.
   std::size_t remove(const std::vector<char>& unwanted) {
@@ -65,16 +80,25 @@ struct Work {
     return remove(unwanted);
   }
 
+  // Of triangles with different labels those of the lowest stay: the sides of a sheet often have a label each, and one
+  // of them is to be all over it.
   std::size_t remove_duplicates() {
-    std::vector<std::pair<Triangle, std::size_t>> keys(triangles.size());
+    struct Key {
+      Triangle corners;
+      std::int32_t label;
+      std::size_t triangle;
+    };
+    std::vector<Key> keys(triangles.size());
     for (std::size_t t = 0; t < triangles.size(); ++t) {
-      keys[t] = {triangles[t], t};
-      std::sort(keys[t].first.begin(), keys[t].first.end());
+      keys[t] = {triangles[t], labels.empty() ? 0 : labels[origin[t]], t};
+      std::sort(keys[t].corners.begin(), keys[t].corners.end());
     }
-    std::sort(keys.begin(), keys.end());
+    std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+      return std::tie(a.corners, a.label, a.triangle) < std::tie(b.corners, b.label, b.triangle);
+    });
     std::vector<char> unwanted(triangles.size(), 0);
     for (std::size_t k = 1; k < keys.size(); ++k)
-      if (keys[k].first == keys[k - 1].first) unwanted[keys[k].second] = 1;
+      if (keys[k].corners == keys[k - 1].corners) unwanted[keys[k].triangle] = 1;
     return remove(unwanted);
   }
 
@@ -173,8 +197,7 @@ class Borders {
 // For each vertex the one that it becomes.
 std::vector<Index> merge_borders(const Work& work, double tolerance) {
   Borders borders(work, tolerance);
-  std::vector<Index> name(work.points.size()), next_member(work.points.size(), kNone);
-  std::iota(name.begin(), name.end(), Index{0});
+  std::vector<Index> name = own_names(work.points.size()), next_member(work.points.size(), kNone);
   std::vector<std::pair<double, Index>> choices;
   for (const Index v : borders.vertices) {
     const Vec3& p = work.points[v];
@@ -372,12 +395,24 @@ TriangleMesh collect(const TriangleMesh& mesh, Work work, std::vector<Edge> feat
 
 }  // namespace
 
+WeldResult remove_double_triangles(const TriangleMesh& mesh) {
+  WeldResult result;
+  Work work(mesh);
+  result.border_before = count_border(edge_table(work.triangles, work.points.size()));
+  result.duplicate_triangles = work.remove_duplicates();
+  result.border_after = result.duplicate_triangles == 0
+                            ? result.border_before
+                            : count_border(edge_table(work.triangles, work.points.size()));
+  result.vertex_of = own_names(mesh.vertices.size());
+  result.mesh = collect(mesh, std::move(work), mesh.feature_edges, result.vertex_of);
+  return result;
+}
+
 WeldResult weld(const TriangleMesh& mesh, double tolerance) {
   if (!(tolerance >= 0 && std::isfinite(tolerance)))
     throw Error(fmt::format("welding tolerance {}: give a length, 0 or more", tolerance));
   WeldResult result;
-  Work work{mesh.vertices, mesh.triangles, std::vector<Index>(mesh.triangles.size())};
-  std::iota(work.origin.begin(), work.origin.end(), Index{0});
+  Work work(mesh);
   result.degenerate_triangles = work.remove_degenerate();
   result.border_before = count_border(edge_table(work.triangles, work.points.size()));
 

@@ -15,6 +15,7 @@
 #include "core/geometry.h"
 #include "features/normals.h"
 #include "features/wedges.h"
+#include "mesh/double_triangles.h"
 #include "mesh/spatial_order.h"
 #include "mesh/topology.h"
 #include "mesh/touching.h"
@@ -37,15 +38,6 @@ constexpr double kRoundings[] = {0, 1e-7, 1e-6, 1e-5};
 
 std::size_t non_manifold_edges(const TriangleMesh& mesh) {
   return analyse_topology(mesh.triangles, mesh.vertices.size()).non_manifold_edges;
-}
-
-WeldResult keep_apart(const TriangleMesh& input, std::size_t borders) {
-  WeldResult result;
-  result.mesh = input;
-  result.vertex_of.resize(input.vertices.size());
-  for (Index v = 0; v < result.vertex_of.size(); ++v) result.vertex_of[v] = v;
-  result.border_before = result.border_after = borders;
-  return result;
 }
 
 std::string plural(std::size_t count, const char* word) {
@@ -196,18 +188,17 @@ OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given
 
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
   if (tolerance) return weld(input, *tolerance);
-  const MeshTopology topology = analyse_topology(input.triangles, input.vertices.size());
-  if (topology.boundary_edges + topology.non_manifold_edges == 0) return keep_apart(input, 0);
-  WeldResult best = keep_apart(input, topology.boundary_edges);
-  std::size_t borders = topology.boundary_edges, non_manifold = topology.non_manifold_edges;
+  WeldResult best = remove_double_triangles(input);
+  std::size_t borders = best.border_after, non_manifold = non_manifold_edges(best.mesh);
   const double diagonal = bounding_box(input).diagonal();
   for (const double rounding : kRoundings) {
     if (borders + non_manifold == 0) break;
     WeldResult welded = weld(input, rounding * diagonal);
     const std::size_t borders_now = welded.border_after, non_manifold_now = non_manifold_edges(welded.mesh);
-    if (borders_now > borders || non_manifold_now > non_manifold ||
-        borders_now + non_manifold_now == borders + non_manifold)
-      continue;
+    if (borders_now > borders || borders_now + non_manifold_now >= borders + non_manifold) continue;
+    // Sheets that share points exactly were made to meet there, three or more of them as well as two; what a tolerance
+    // joins so may only be near.
+    if (rounding > 0 && non_manifold_now > non_manifold) continue;
     best = std::move(welded);
     borders = borders_now;
     non_manifold = non_manifold_now;

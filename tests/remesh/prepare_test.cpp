@@ -26,6 +26,25 @@ TEST(JoinBorders, ClosesWhatRoundingOpens) {
   EXPECT_GT(join_borders(torn(sphere, 1e-3), {}).border_after, 1000u);
 }
 
+// As programs write faces that have normals or texture coordinates of their own.
+TEST(JoinBorders, JoinsFacesWhereThreeAndMoreMeet) {
+  const TriangleMesh boxes = weld(joined(box(4), box(4), {1, 1, 0}), 0).mesh;
+  ASSERT_EQ(topology_of(boxes).non_manifold_edges, 4u);
+  const WeldResult joined = join_borders(torn(boxes, 0), {});
+  EXPECT_EQ(joined.border_after, 0u);
+  EXPECT_EQ(joined.mesh.vertices.size(), boxes.vertices.size());
+  EXPECT_EQ(topology_of(joined.mesh).non_manifold_edges, 4u);
+}
+
+// Nothing is gained where a closed box stands on a box that is open elsewhere: what both share stays apart.
+TEST(JoinBorders, KeepsApartWhatHasNoBorderThere) {
+  TriangleMesh boxes = joined(box(4), box(4), {1, 1, 0});
+  boxes.triangles.erase(boxes.triangles.begin());
+  const WeldResult joined = join_borders(boxes, {});
+  EXPECT_EQ(joined.merged_vertices, 0u);
+  EXPECT_EQ(joined.mesh.triangles, boxes.triangles);
+}
+
 TEST(JoinBorders, MovesNothingOfAClosedSurface) {
   TriangleMesh sphere = icosphere(3);
   for (Vec3& p : sphere.vertices) p.z *= 1e-6;
