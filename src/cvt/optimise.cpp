@@ -276,11 +276,13 @@ void Descent::minimise() {
 void optimise(CvtRun& run, const OptimiseOptions& options) {
   const Stopwatch watch;
   const DiagramSeconds before = run.totals.seconds;
+  const int iterations = run.totals.iterations;
   SavedStep saved(run, options.iterations, options.tolerance, options.constrained);
   if (!saved.restore()) {
     Descent(run, options, saved).minimise();
     saved.keep();
   }
+  run.add_work(run.totals.iterations - iterations);
   const DiagramSeconds& after = run.totals.seconds;
   run.totals.seconds_lbfgs += watch.seconds() - (after.delaunay - before.delaunay) -
                               (after.neighbours - before.neighbours) - (after.pairs - before.pairs) -

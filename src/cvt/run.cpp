@@ -9,6 +9,9 @@
 namespace bisector {
 namespace {
 
+// How many times the work of a diagram that of one without stray parts is.
+constexpr double kLocalisedWork = 3;
+
 void add_dual(Diagram& diagram) {
   diagram.dual = extract_dual(diagram.polygons);
   diagram.has = diagram.has | Want::dual;
@@ -19,6 +22,7 @@ void add_dual(Diagram& diagram) {
 RunTotals& operator+=(RunTotals& a, const RunTotals& b) {
   a.iterations += b.iterations;
   a.evaluations += b.evaluations;
+  a.work += b.work;
   a.seconds += b.seconds;
   a.device_work += b.device_work;
   a.seconds_lbfgs += b.seconds_lbfgs;
@@ -95,6 +99,11 @@ void CvtRun::adopt(PlacedSeeds placed, DiagramOfSeeds known) {
   diagram_ = std::move(known);
   // It may be from before sheets turned out to cross.
   if (!localised_ && diagram_.strays > 0) diagram_ = {};
+}
+
+void CvtRun::add_work(int steps) {
+  const auto size = static_cast<double>(surface().facets.size() + 3 * seeds.size());
+  totals.work += steps * (localised_ ? kLocalisedWork : 1) * size;
 }
 
 bool CvtRun::covers(double mass) const {

@@ -15,6 +15,7 @@ namespace bisector {
 struct RunTotals {
   int iterations = 0;   // accepted steps of the optimiser
   int evaluations = 0;  // diagrams computed
+  double work = 0;      // see CvtRun::add_work()
   DiagramSeconds seconds;
   DeviceWork device_work;
   double seconds_lbfgs = 0;  // of the optimiser outside the diagrams
@@ -69,6 +70,9 @@ class CvtRun {
   void adopt(PlacedSeeds placed, DiagramOfSeeds diagram);
   // Brings a diagram kept elsewhere up to date, and counts the evaluation if that takes one.
   void evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& diagram);
+  // Adds, for each of so many steps, the facets and three times the seeds, and three times that where stray parts are
+  // left out: about what their diagrams take. Unlike evaluations it is the same in a run that a checkpoint goes on.
+  void add_work(int steps);
   // Whether a diagram covers the domain: the masses of its cells sum, to `mass`, to the domain's. One that does not is
   // never used.
   bool covers(double mass) const;

@@ -277,6 +277,7 @@ class Control {
   // Checks the diagram of the seeds, with the cells of sheets that touch divided.
   void check() {
     run_.context().check();
+    run_.add_work(1);
     cuts_ = find_cuts();
     outcome_.ball = check_ball_property(run_.surface(), run_.diagram(parts_).polygons);
     // Only what has to be mended is asked where it is.
@@ -451,7 +452,10 @@ class Control {
       check();
       if (holds()) return true;
       const std::vector<char> failing = failing_neighbourhood();
+      const auto held_before = std::count(held.begin(), held.end(), 1);
       for (std::size_t i = 0; i < held.size(); ++i) held[i] |= failing[i];
+      // The same seeds would be held once more.
+      if (std::count(held.begin(), held.end(), 1) == held_before) break;
     }
     run_.seeds = before;
     check();

@@ -29,11 +29,10 @@ void Clipper::reset(const SortedSeeds& seeds) {
   screens_.reset(seeds);
 }
 
-void Clipper::begin(const Surface& surface, std::size_t index, const SlotFilter* among) {
+void Clipper::begin(const Surface& surface, std::size_t index) {
   const Facet& facet = surface.facets[index];
   facet_ = &facet;
   density_ = surface.density_of(index);
-  among_ = among;
   for (unsigned k = 0; k < 3; ++k) {
     Line& line = lines_[k];
     const unsigned from = facet.origin[k], to = from == k ? (k + 1) % 3 : k;
@@ -91,6 +90,13 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
   }
 }
 
+bool Clipper::clip(std::span<const Index> others, Index slot) {
+  start(slot);
+  place_lines();
+  bounded_ = false;
+  return std::all_of(others.begin(), others.end(), [&](Index other) { return other == slot || visit(other); });
+}
+
 void Clipper::place_lines() {
   height_ = dot(facet_->normal, local_[facet_->anchor]);
   foot_ = height_ * facet_->normal;
@@ -142,7 +148,6 @@ unsigned Clipper::lines_that_may_cut(const ScreenBlock& block) const {
 }
 
 bool Clipper::visit(Index other) {
-  if (among_ && !among_->admits(other)) return true;
   const Vec3 d = seeds_->x[other] - seeds_->x[slot_];
   if (wider_ && bounded_by(other)) return true;
   cut(other, d, norm2(d));

@@ -1,6 +1,7 @@
 // Clipping one triangle to one restricted Voronoi cell: labels first, coordinates from labels (thesis 4.3.2, 4.3.4).
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "core/geometry.h"
@@ -12,13 +13,6 @@
 
 namespace bisector {
 
-// Some of the seeds.
-class SlotFilter {
- public:
-  virtual ~SlotFilter() = default;
-  virtual bool admits(Index slot) const = 0;
-};
-
 // Clips facets to cells and integrates over the result. One object per thread; memory is kept between calls.
 class Clipper {
  public:
@@ -26,11 +20,12 @@ class Clipper {
 
   // Forgets what is kept about the seeds; to be called whenever they or their neighbours change.
   void reset(const SortedSeeds& seeds);
-  // The facet that the following calls are about, and the seeds that clip() takes to be there, all if there is no
-  // filter; they must outlive these calls.
-  void begin(const Surface& surface, std::size_t facet, const SlotFilter* among = nullptr);
+  // The facet that the following calls are about; it must outlive them.
+  void begin(const Surface& surface, std::size_t facet);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
+  // The same as if no other seeds than these were there.
+  bool clip(std::span<const Index> others, Index slot);
   // Takes the whole facet, which the caller knows to lie in the cell.
   void take(Index slot);
   // Takes the polygon bounded by the lines with these labels in this cyclic order, which the caller knows to be the
@@ -112,7 +107,6 @@ class Clipper {
   const SortedSeeds* seeds_ = nullptr;
   const Facet* facet_ = nullptr;
   const FacetDensity* density_ = nullptr;
-  const SlotFilter* among_ = nullptr;
   Index slot_ = 0;
   Vec3 local_[3];             // the facet's corners relative to the seed
   double largest_ = 0;        // absolute coordinate of local_

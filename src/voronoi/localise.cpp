@@ -1,8 +1,8 @@
 #include "voronoi/localise.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -30,6 +30,8 @@ namespace {
 constexpr std::size_t kDivisions = 16;
 // Distances from a seed that differ by less, in diagonals of the seeds' box, are the same.
 constexpr double kSamePoint = 1e-9;
+// Relative; more than rounding makes of squared distances.
+constexpr double kRounding = 1e-12;
 constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 16;  // of a parallel loop
 
 using Triangles = std::vector<Index>;  // ascending
@@ -119,21 +121,11 @@ class Regions {
   std::vector<Link> links_;
 };
 
-class Admitted : public SlotFilter {
- public:
-  Admitted(const Regions& regions, const Among& among) : regions_(regions), among_(among) {}
-  bool admits(Index slot) const override { return regions_.admits(among_, slot); }
-
- private:
-  const Regions& regions_;
-  const Among& among_;
-};
-
 // Memory that loops over triangles or cells use.
 struct Scratch {
   std::vector<Index> place;  // of triangles in the list of one cell; anything for others
-  std::vector<Index> labels, met;
-  std::vector<std::pair<double, Index>> candidates;  // squared distance and index of a seed
+  std::vector<Index> labels, slots;
+  std::vector<std::array<double, 3>> squares;  // of the distances of slots from a triangle's corners
   std::vector<std::size_t> order;
   RestrictedPolygons found;
 };
@@ -179,7 +171,6 @@ struct Localiser::Work {
   std::vector<char> direct;  // of each half-edge: there is no such triangle between
 
   SortedSeeds seeds;
-  Neighbours neighbours{ListLength{}, LongLists::all_seeds};
   ThreadLocal<Clipper> clippers;  // of these seeds
   ThreadLocal<Scratch> scratches;
   const RestrictedPolygons* raw = nullptr;
@@ -237,6 +228,7 @@ struct Localiser::Work {
   Triangles put_back_torn(const Triangles& those);
   Triangles beside(const Triangles& triangles) const;
   std::vector<Index> clip_anew(const Triangles& triangles);
+  void find_candidates(Index triangle, Scratch& scratch) const;
   void clip(Index triangle, Clipper& clipper, RestrictedPolygons& out);
   void change(Index triangle, const Row& before, const Row& after, std::vector<Index>& cells);
   RestrictedPolygons splice() const;
@@ -545,46 +537,51 @@ Triangles Localiser::Work::beside(const Triangles& triangles) const {
   return found;
 }
 
+// Sets the slots of the seeds that are not left out of a triangle and may own a part of it. One that is nearer to all
+// three corners than another leaves that nothing.
+void Localiser::Work::find_candidates(Index triangle, Scratch& scratch) const {
+  const Among& these = *among.find(triangle);
+  const auto& corners = surface.facets[surface.facet_of[triangle]].corners;
+  std::vector<Index>& slots = scratch.slots;
+  slots.clear();
+  const auto append = [&](Index slot) {
+    if (!contains(these.left_out, slot)) slots.push_back(slot);
+  };
+  std::for_each(these.own.begin(), these.own.end(), append);
+  for (const Index region : these.regions)
+    std::for_each(regions.around(region).begin(), regions.around(region).end(), append);
+  sort_unique(slots);
+  std::vector<std::array<double, 3>>& squares = scratch.squares;
+  squares.clear();
+  std::size_t near = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const Vec3& x = seeds.x[slots[k]];
+    squares.push_back({norm2(x - corners[0]), norm2(x - corners[1]), norm2(x - corners[2])});
+    const double farthest = std::max({squares[k][0], squares[k][1], squares[k][2]});
+    if (farthest >= least) continue;
+    least = farthest;
+    near = k;
+  }
+  const auto nearer = [](double a, double b) { return a < b * (1 - kRounding); };
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < slots.size(); ++k)
+    if (!std::equal(squares[near].begin(), squares[near].end(), squares[k].begin(), nearer)) slots[kept++] = slots[k];
+  slots.resize(kept);
+}
+
 // Appends the division of a triangle among the seeds that are not left out.
 void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons& out) {
-  const Among& these = *among.find(triangle);
-  const Admitted filter(regions, these);
-  clipper.begin(surface, surface.facet_of[triangle], &filter);
   Scratch& scratch = scratches.local();
-  std::vector<Index>& met = scratch.met;
-  met.clear();
-  const auto meet = [&](Index slot) {
-    if (!contains(met, slot) && regions.admits(these, slot)) met.push_back(slot);
-  };
-  for (const Index slot : these.own) meet(slot);
-  const bool search = met.empty();
-  if (search) {
-    // The seed nearest to a point of the triangle has a cell on it.
-    const Vec3& q = surface.mesh.vertices[surface.mesh.triangles[triangle][0]];
-    std::vector<std::pair<double, Index>>& candidates = scratch.candidates;
-    candidates.clear();
-    for (const Index region : these.regions)
-      for (const Index slot : regions.around(region))
-        if (!contains(these.left_out, slot)) candidates.push_back({norm2(seeds.x[slot] - q), seeds.id[slot]});
-    std::make_heap(candidates.begin(), candidates.end(), std::greater<>());
-    for (; met.empty() && !candidates.empty(); candidates.pop_back()) {
-      std::pop_heap(candidates.begin(), candidates.end(), std::greater<>());
-      const Index slot = seeds.slot[candidates.back().second];
-      if (clipper.clip(neighbours, slot)) met.push_back(slot);
-    }
-  }
+  find_candidates(triangle, scratch);
+  clipper.begin(surface, surface.facet_of[triangle]);
   RestrictedPolygons& found = scratch.found;
   found.pairs.clear();
   found.offsets.assign(1, 0);
   found.labels.clear();
   found.vertices.clear();
-  for (std::size_t k = 0; k < met.size(); ++k) {
-    const bool clipped_already = search && k == 0;
-    if (!clipped_already && !clipper.clip(neighbours, met[k])) continue;
-    append_polygon(clipper, seeds, triangle, met[k], found);
-    for (std::size_t e = 0; e < clipper.size(); ++e)
-      if (!is_edge(clipper.label(e))) meet(clipper.label(e));
-  }
+  for (const Index slot : scratch.slots)
+    if (clipper.clip(scratch.slots, slot)) append_polygon(clipper, seeds, triangle, slot, found);
   std::vector<std::size_t>& order = scratch.order;
   order.resize(found.pairs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -687,8 +684,12 @@ void Localiser::Work::sum(Diagram& diagram) {
   }
   triangles.values = std::move(values);
   triangles.offsets = std::move(offsets);
-  complete_step_masses(
-      seeds, [&]() -> const Neighbours& { return neighbours; }, moments);
+  Neighbours neighbours;
+  const auto around_seeds = [&]() -> const Neighbours& {
+    neighbours.build(seeds, NeighbourSource::nearest);
+    return neighbours;
+  };
+  complete_step_masses(seeds, around_seeds, moments);
   set_totals(moments);
 }
 
@@ -714,7 +715,6 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
 std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& diagram) {
   const std::size_t count = find_all_strays(given, diagram);
   if (count == 0) return 0;
-  neighbours.build(seeds, NeighbourSource::nearest);
   std::size_t divided = 0;
   for (;;) {
     const Triangles triangles = leave_out();

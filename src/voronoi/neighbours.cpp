@@ -122,7 +122,7 @@ struct Neighbours::LastRung {
   std::atomic<std::size_t> entries_without_it = 0;  // of lists
 };
 
-Neighbours::Neighbours(ListLength length, LongLists long_lists) : length_(length), long_lists_(long_lists) {}
+Neighbours::Neighbours(ListLength length) : length_(length) {}
 Neighbours::~Neighbours() { drop_grown(); }
 
 void Neighbours::drop_grown() {
@@ -342,7 +342,7 @@ std::unique_ptr<Neighbours::Grown> Neighbours::grow(Index slot, int level, doubl
 
 const Neighbours::LastRung& Neighbours::last_rung() const {
   std::call_once(last_rung_->once, [&] {
-    if (long_lists_ == LongLists::rings) last_rung_->rings = delaunay_neighbours(seeds_->x);
+    last_rung_->rings = delaunay_neighbours(seeds_->x);
     if (!last_rung_->rings) return;
     // A parallel loop in here could run a body that waits for this very call.
     auto& rings = *last_rung_->rings;

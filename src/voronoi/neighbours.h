@@ -42,13 +42,9 @@ struct ListLength {
 };
 inline constexpr ListLength kListsInSpace{88, 72, 1.0 / 3, 3};
 
-// What lists become that have grown often: Delaunay rings, which are certificates for the diagram of all seeds only, or
-// all seeds, where cells are clipped as if some seeds were not there.
-enum class LongLists { rings, all_seeds };
-
 class Neighbours {
  public:
-  explicit Neighbours(ListLength length = {}, LongLists long_lists = LongLists::rings);
+  explicit Neighbours(ListLength length = {});
   ~Neighbours();
 
   // Builds the lists of all slots. `seeds` must outlive their use.
@@ -84,7 +80,6 @@ class Neighbours {
   const SortedSeeds* seeds_ = nullptr;
   SeedTree tree_;
   ListLength length_;
-  LongLists long_lists_;
   std::vector<Index> first_;          // room for length_.most per slot
   std::vector<unsigned char> count_;  // of the lists of first_
   std::vector<double> radius_;
