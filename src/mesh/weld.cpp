@@ -14,7 +14,7 @@
 #include "bisector/error.h"
 #include "core/geometry.h"
 #include "core/grouping.h"
-#include "mesh/double_triangles.h"
+#include "mesh/joining.h"
 #include "mesh/topology.h"
 #include "spatial/hilbert.h"
 #include "spatial/seed_tree.h"
@@ -400,12 +400,32 @@ WeldResult remove_double_triangles(const TriangleMesh& mesh) {
   Work work(mesh);
   result.border_before = count_border(edge_table(work.triangles, work.points.size()));
   result.duplicate_triangles = work.remove_duplicates();
-  result.border_after = result.duplicate_triangles == 0
-                            ? result.border_before
-                            : count_border(edge_table(work.triangles, work.points.size()));
+  result.border_after = result.duplicate_triangles == 0 ? result.border_before
+                                                        : count_border(edge_table(work.triangles, work.points.size()));
   result.vertex_of = own_names(mesh.vertices.size());
   result.mesh = collect(mesh, std::move(work), mesh.feature_edges, result.vertex_of);
   return result;
+}
+
+bool joins_borders(std::size_t borders, std::size_t non_manifold, std::size_t borders_before,
+                   std::size_t non_manifold_before) {
+  return borders <= borders_before && borders + non_manifold < borders_before + non_manifold_before;
+}
+
+std::vector<Triangle> join_equal_points(const TriangleMesh& mesh) {
+  const auto topology_of = [&](const std::vector<Triangle>& triangles) {
+    return analyse_topology(triangles, mesh.vertices.size());
+  };
+  const MeshTopology before = topology_of(mesh.triangles);
+  if (before.boundary_edges == 0) return mesh.triangles;
+  const std::vector<Index> first = first_equal(mesh.vertices);
+  std::vector<Triangle> joined = mesh.triangles;
+  for (Triangle& t : joined)
+    if (const Triangle named{first[t[0]], first[t[1]], first[t[2]]}; !has_repeated_corner(named)) t = named;
+  const MeshTopology after = topology_of(joined);
+  const bool joins =
+      joins_borders(after.boundary_edges, after.non_manifold_edges, before.boundary_edges, before.non_manifold_edges);
+  return joins ? joined : mesh.triangles;
 }
 
 WeldResult weld(const TriangleMesh& mesh, double tolerance) {

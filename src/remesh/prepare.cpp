@@ -15,7 +15,7 @@
 #include "core/geometry.h"
 #include "features/normals.h"
 #include "features/wedges.h"
-#include "mesh/double_triangles.h"
+#include "mesh/joining.h"
 #include "mesh/spatial_order.h"
 #include "mesh/topology.h"
 #include "mesh/touching.h"
@@ -195,7 +195,7 @@ WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& 
     if (borders + non_manifold == 0) break;
     WeldResult welded = weld(input, rounding * diagonal);
     const std::size_t borders_now = welded.border_after, non_manifold_now = non_manifold_edges(welded.mesh);
-    if (borders_now > borders || borders_now + non_manifold_now >= borders + non_manifold) continue;
+    if (!joins_borders(borders_now, non_manifold_now, borders, non_manifold)) continue;
     // Sheets that share points exactly were made to meet there, three or more of them as well as two; what a tolerance
     // joins so may only be near.
     if (rounding > 0 && non_manifold_now > non_manifold) continue;

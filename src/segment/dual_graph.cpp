@@ -5,6 +5,7 @@
 
 #include "core/geometry.h"
 #include "core/grouping.h"
+#include "mesh/joining.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -28,7 +29,7 @@ struct Neighbour {
 }  // namespace
 
 DualGraph dual_graph(const TriangleMesh& mesh) {
-  const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
+  const EdgeTable table = edge_table(join_equal_points(mesh), mesh.vertices.size());
   const std::size_t n = mesh.triangles.size(), edges = table.edges.size();
   DualGraph graph;
   std::vector<double> length(edges);

@@ -11,6 +11,7 @@
 #include "core/geometry.h"
 #include "core/grouping.h"
 #include "mesh/half_edges.h"
+#include "mesh/joining.h"
 #include "segment/border_loops.h"
 #include "segment/surface_normal.h"
 
@@ -143,7 +144,7 @@ const char* name_of(ChainKind kind) {
 
 RegionBorders region_borders(const TriangleMesh& mesh, const SegmentResult& segmentation) {
   check_labels(mesh, segmentation);
-  std::vector<Triangle> triangles = mesh.triangles;
+  std::vector<Triangle> triangles = join_equal_points(mesh);
   orient(triangles, mesh.vertices.size());
   FollowedBorders followed =
       follow_borders(triangles, mesh.vertices.size(), segmentation.labels, segmentation.regions.size());

@@ -342,6 +342,11 @@ std::vector<Vec3> projected_vertices(const TriangleMesh& mesh, const SegmentDoma
     }
     result[v] = domain.origin + (domain.scale / static_cast<double>(regions[v].size())) * sum;
   });
+  // Those that were joined with another vertex go with it.
+  for (std::size_t t = 0; t < labels.size(); ++t)
+    for (const Index v : mesh.triangles[t])
+      for (const Index w : domain.triangles[t])
+        if (v != w && mesh.vertices[v] == mesh.vertices[w] && regions[v].empty()) result[v] = result[w];
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include "bisector/repair.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
+#include "mesh/joining.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -26,7 +27,7 @@ SegmentDomain make_segment_domain(const TriangleMesh& mesh) {
     domain.vertices[v] = (1 / domain.scale) * (mesh.vertices[v] - domain.origin);
 
   const std::size_t n = mesh.triangles.size();
-  domain.triangles = mesh.triangles;
+  domain.triangles = join_equal_points(mesh);
   orient(domain.triangles, domain.vertices.size());
   domain.normals.resize(n);
   domain.barycentres.resize(n);

@@ -9,9 +9,11 @@
 #include <vector>
 
 #include "bisector/error.h"
+#include "bisector/region_borders.h"
 #include "core/parallel.h"
 #include "segment/dual_graph.h"
 #include "support/csg.h"
+#include "support/models.h"
 
 namespace bisector {
 namespace {
@@ -176,6 +178,21 @@ TEST(Segment, EachComponentHasItsOwnRegions) {
   expect_sound(mesh, fewest);
   EXPECT_EQ(fewest.regions.size(), 2u);
   EXPECT_EQ(warnings.size(), 1u);
+}
+
+// As programs write faces that have normals or texture coordinates of their own.
+TEST(Segment, FacesWithVerticesOfTheirOwnAreNeighbours) {
+  const TriangleMesh whole = test::box(4), apart = test::torn(whole);
+  SegmentOptions options;
+  options.proxies = 6;
+  options.project = true;
+  const SegmentResult expected = segment(whole, options), result = segment(apart, options);
+  EXPECT_EQ(result.labels, expected.labels);
+  ASSERT_EQ(result.projected.size(), apart.vertices.size());
+  for (std::size_t t = 0; t < whole.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_EQ(result.projected[apart.triangles[t][k]], expected.projected[whole.triangles[t][k]]);
+  EXPECT_EQ(region_borders(apart, result).chains.size(), region_borders(whole, expected).chains.size());
 }
 
 TEST(Segment, AsksForNoMoreRegionsThanThereAreTriangles) {

@@ -1,0 +1,25 @@
+// What files write more than once, taken once: triangles, and vertices at the same point.
+#pragma once
+
+#include <vector>
+
+#include "bisector/repair.h"
+
+namespace bisector {
+
+// Of triangles with the same three vertices, either way round, keeps the first of the lowest label. No vertices are
+// merged. Faces that are to be seen from both sides are often written twice; seeds cannot tell the same sheet from
+// itself.
+WeldResult remove_double_triangles(const TriangleMesh& mesh);
+
+// Whether vertices are to be one that were not: there are no more border edges then, and fewer border and non-manifold
+// edges together.
+bool joins_borders(std::size_t borders, std::size_t non_manifold, std::size_t borders_before,
+                   std::size_t non_manifold_before);
+
+// The triangles, all of them and in their order, with the first of the vertices at a point in the place of each other
+// one, if that joins borders: files give faces vertices of their own where normals or texture coordinates differ. A
+// triangle with two corners at a point stays as it is.
+std::vector<Triangle> join_equal_points(const TriangleMesh& mesh);
+
+}  // namespace bisector
