@@ -364,7 +364,7 @@ void Pipeline::mend_features_and_topology() {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
-    topology_ = enforce_topology(run_, trace_, input_topology_, step_, plan_.branches);
+    topology_ = enforce_topology(run_, trace_, step_);
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
       step_.iterations = kFreedSteps;
       optimise(run_, step_);
@@ -572,9 +572,7 @@ void Pipeline::place_on_short_curves() {
 
 SizeBounds Pipeline::crowded() {
   SizeBounds found;
-  const MeshTopology& input = input_topology_;
-  const bool controlled = plan_.branches || (input.manifold && input.oriented);
-  if (plan_.topology != TopologyControl::enforce || !asks_for_disks(plan_) || !controlled) return found;
+  if (plan_.topology != TopologyControl::enforce || !asks_for_disks(plan_)) return found;
   run_.localise(localises_);
   const BallReport report = check_ball_property(surface_, run_.diagram(Want::labels).polygons);
   if (report.cells.empty() || report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
@@ -718,8 +716,7 @@ namespace {
 class Runs {
  public:
   Runs(const TriangleMesh& input, const RemeshOptions& options, bool branches, const Context& context)
-      : input_(input), options_(options), branches_(branches), context_(context), compute_(options.compute, context),
-        progress_(context) {
+      : input_(input), options_(options), context_(context), compute_(options.compute, context), progress_(context) {
     OrderedInput ordered(input, options);
     vertex_of_ = std::move(ordered.vertex_of);
     input_of_.resize(ordered.mesh.vertices.size());
@@ -752,7 +749,6 @@ class Runs {
   const Stopwatch watch_;
   const TriangleMesh& input_;
   const RemeshOptions& options_;
-  const bool branches_;
   const Context& context_;
   Compute compute_;
   RunProgress progress_;
@@ -773,7 +769,6 @@ Runs::Run Runs::make_run(bool last) {
     PreparedInput prepared = preparation_->lay_down();
     RemeshPlan plan = plan_of(options_);
     plan.vertices = prepared.vertices;
-    plan.branches = branches_;
     plan.noisy = prepared.noisy;
     for (Index& v : prepared.kept.corners) {
       plan.held.push_back(v != kNone);

@@ -562,10 +562,8 @@ std::vector<TopologyFault> topology_faults(const BallReport& report, const std::
   return faults;
 }
 
-TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
-                                 OptimiseOptions options, bool branches) {
-  if (branches || (input.manifold && input.oriented)) return Control(run, trace, std::move(options)).run();
-  return {check_ball_property(run.surface(), run.diagram(Want::labels).polygons), 0, 0, 0, {}, 0};
+TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, OptimiseOptions options) {
+  return Control(run, trace, std::move(options)).run();
 }
 
 }  // namespace bisector

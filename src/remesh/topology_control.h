@@ -48,8 +48,7 @@ struct TopologyOutcome {
 //
 // Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to
 // the seeds with the fewest failures, which topology_faults lists, or to those given if an eighth of the cells fail
-// with any. Surfaces that are not manifold and oriented are only checked, unless they are known to branch.
-TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
-                                 OptimiseOptions options, bool branches = false);
+// with any.
+TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, OptimiseOptions options);
 
 }  // namespace bisector
