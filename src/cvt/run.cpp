@@ -9,7 +9,7 @@
 namespace bisector {
 namespace {
 
-// How many times the work of a diagram that of one without stray parts is.
+// How many times the work of a diagram that one without stray parts takes.
 constexpr double kLocalisedWork = 3;
 
 void add_dual(Diagram& diagram) {
@@ -101,9 +101,8 @@ void CvtRun::adopt(PlacedSeeds placed, DiagramOfSeeds known) {
   if (!localised_ && diagram_.strays > 0) diagram_ = {};
 }
 
-void CvtRun::add_work(int steps) {
-  const auto size = static_cast<double>(surface().facets.size() + 3 * seeds.size());
-  totals.work += steps * (localised_ ? kLocalisedWork : 1) * size;
+double CvtRun::step_work() const {
+  return (localised_ ? kLocalisedWork : 1) * static_cast<double>(surface().facets.size() + 3 * seeds.size());
 }
 
 bool CvtRun::covers(double mass) const {

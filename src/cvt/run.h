@@ -15,7 +15,7 @@ namespace bisector {
 struct RunTotals {
   int iterations = 0;   // accepted steps of the optimiser
   int evaluations = 0;  // diagrams computed
-  double work = 0;      // see CvtRun::add_work()
+  double work = 0;      // of steps, see CvtRun::step_work()
   DiagramSeconds seconds;
   DeviceWork device_work;
   double seconds_lbfgs = 0;  // of the optimiser outside the diagrams
@@ -70,9 +70,11 @@ class CvtRun {
   void adopt(PlacedSeeds placed, DiagramOfSeeds diagram);
   // Brings a diagram kept elsewhere up to date, and counts the evaluation if that takes one.
   void evaluate(const std::vector<Vec3>& positions, Want want, DiagramOfSeeds& diagram);
-  // Adds, for each of so many steps, the facets and three times the seeds, and three times that where stray parts are
-  // left out: about what their diagrams take. Unlike evaluations it is the same in a run that a checkpoint goes on.
-  void add_work(int steps);
+  // Of one step: the facets and three times the seeds, and three times that where stray parts are left out, about what
+  // its diagram takes.
+  double step_work() const;
+  // Counts so many steps. Unlike evaluations work is the same in a run that goes on from a checkpoint.
+  void add_work(int steps) { totals.work += steps * step_work(); }
   // Whether a diagram covers the domain: the masses of its cells sum, to `mass`, to the domain's. One that does not is
   // never used.
   bool covers(double mass) const;

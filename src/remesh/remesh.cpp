@@ -61,7 +61,9 @@ constexpr std::size_t kTooManyFailures = 4;
 // Of the seeds wanted, by how many those of an earlier run may be off. Where topology took many more, it has to be
 // found anew for other edge lengths.
 constexpr double kMostOff = 0.01;
-constexpr int kRefinements = 3;  // of a result, while that makes it better
+// Of a result, while that makes it better, and while all took no more than so many times the work of placing seeds.
+constexpr int kRefinements = 3;
+constexpr double kMostWork = 5;
 // Runs for a distance to the input, how many times the vertices they may take, and the gap between bounds of it.
 constexpr int kNearings = 8;
 constexpr std::size_t kMostTimes = 10;
@@ -364,7 +366,7 @@ void Pipeline::mend_features_and_topology() {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
-    topology_ = enforce_topology(run_, trace_, step_);
+    topology_ = enforce_topology(run_, trace_, input_topology_, step_, plan_.branches);
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
       step_.iterations = kFreedSteps;
       optimise(run_, step_);
@@ -572,7 +574,9 @@ void Pipeline::place_on_short_curves() {
 
 SizeBounds Pipeline::crowded() {
   SizeBounds found;
-  if (plan_.topology != TopologyControl::enforce || !asks_for_disks(plan_)) return found;
+  // Else cells at edges of several sheets are no disks, whatever their size.
+  const bool controlled = plan_.branches || (input_topology_.manifold && input_topology_.oriented);
+  if (plan_.topology != TopologyControl::enforce || !asks_for_disks(plan_) || !controlled) return found;
   run_.localise(localises_);
   const BallReport report = check_ball_property(surface_, run_.diagram(Want::labels).polygons);
   if (report.cells.empty() || report.cells.size() * kTooManyFailures > run_.seeds.size()) return found;
@@ -716,7 +720,8 @@ namespace {
 class Runs {
  public:
   Runs(const TriangleMesh& input, const RemeshOptions& options, bool branches, const Context& context)
-      : input_(input), options_(options), context_(context), compute_(options.compute, context), progress_(context) {
+      : input_(input), options_(options), branches_(branches), context_(context), compute_(options.compute, context),
+        progress_(context) {
     OrderedInput ordered(input, options);
     vertex_of_ = std::move(ordered.vertex_of);
     input_of_.resize(ordered.mesh.vertices.size());
@@ -749,6 +754,7 @@ class Runs {
   const Stopwatch watch_;
   const TriangleMesh& input_;
   const RemeshOptions& options_;
+  const bool branches_;
   const Context& context_;
   Compute compute_;
   RunProgress progress_;
@@ -757,6 +763,7 @@ class Runs {
   std::optional<NewCrossings> new_crossings_;
   bool may_shorten_ = false;  // once, where cells are no disks
   double preparing_ = 0;
+  double placing_ = 0;  // work until seeds are placed for the first time, those of a run for sizes among them
   Spent spent_;
   std::optional<PlacedSeeds> earlier_;
   std::optional<JudgedResult> best_;
@@ -769,6 +776,7 @@ Runs::Run Runs::make_run(bool last) {
     PreparedInput prepared = preparation_->lay_down();
     RemeshPlan plan = plan_of(options_);
     plan.vertices = prepared.vertices;
+    plan.branches = branches_;
     plan.noisy = prepared.noisy;
     for (Index& v : prepared.kept.corners) {
       plan.held.push_back(v != kNone);
@@ -791,6 +799,7 @@ Runs::Run Runs::make_run(bool last) {
         continue;
       }
     }
+    if (placing_ == 0) placing_ = pipeline.spent().totals.work;
     RemeshResult result = pipeline.finish();
     if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
     result.edge_length = prepared.unit_edge;
@@ -813,7 +822,7 @@ void Runs::settle() {
     Run run = make_run(left == 0);
     if (best_ && !is_better(run.judged, *best_)) return;
     best_ = std::move(run.judged);
-    if (left == 0 || !run.next.why) return;
+    if (left == 0 || !run.next.why || spent_.totals.work > kMostWork * placing_) return;
     preparation_->bound(run.next.bounds);
     progress_.start_again(run.next.why);
   }

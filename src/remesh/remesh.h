@@ -25,6 +25,7 @@ struct RemeshPlan {
   bool constrained = true;  // seeds end on the surface (CCVT)
   bool noisy = false;       // its normals say nothing: the result is fitted
   TopologyControl topology = TopologyControl::enforce;
+  bool branches = false;  // sheets are meant to meet in edges: topology is controlled there, too
   double min_angle = 40;
   bool fit = false;
 };

@@ -39,6 +39,9 @@ constexpr int kPolishingSteps = 20, kSmoothingSteps = 20, kRetreats = 12;
 constexpr std::size_t kMostAdded = 100, kGrown = 300, kAnyway = 5000;
 // Of a cell's radius: sheets nearer to each other get a vertex each. More of them if fewer do not help.
 constexpr double kCrossing = 0.01, kTouching = 0.1;
+// How many times the work of the run so far control may take, and so many steps of it anyway; as much again where the
+// input is not manifold.
+constexpr double kMostWork = 2, kLeastSteps = 300;
 // Squared distance of points inserted together, over that to the seeds there are.
 constexpr double kApart = 2;
 // Cosine of the angle at which a surface faces away.
@@ -215,9 +218,12 @@ std::vector<char> failing_seeds(const BallReport& report, std::size_t count) {
 
 class Control {
  public:
-  Control(CvtRun& run, const FeatureTrace& trace, OptimiseOptions options)
-      : run_(run), trace_(trace), options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_),
-        most_(std::max(budget(), kGrown)), lost_(run.curves().size(), 0) {
+  Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, OptimiseOptions options)
+      : run_(run), trace_(trace), is_sound_(is_sound),
+        most_work_(run.totals.work +
+                   (is_sound ? std::max(kMostWork * run.totals.work, kLeastSteps * run.step_work()) : run.totals.work)),
+        options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_), most_(std::max(budget(), kGrown)),
+        lost_(run.curves().size(), 0) {
     options_.done = 1;
     options_.share = 0;
   }
@@ -238,15 +244,15 @@ class Control {
         if (gap == kInfinity) most_ = std::max(budget(), kAnyway);
         check();
         keep_best();
-        if (refine()) break;
+        if (refine() || has_worked_enough()) break;
       }
       if (holds()) {
         trim();
         polish();
         smooth();
       } else {
-        // More seeds are worth nothing where too many cells fail in any case.
-        restore(best_has_too_few_ ? given : best_);
+        // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show.
+        restore(best_has_too_few_ || !is_sound_ ? given : best_);
       }
       finish();
     }
@@ -296,6 +302,8 @@ class Control {
     polygons_ = &divided_;
     outcome_.ball = check_ball_property(run_.surface(), divided_);
   }
+
+  bool has_worked_enough() const { return run_.totals.work > most_work_; }
 
   // Whether so many cells fail that they are not to be mended one by one.
   bool too_few_seeds() const { return kTooFew * outcome_.ball.cells.size() > run_.seeds.size(); }
@@ -350,7 +358,7 @@ class Control {
   }
 
   void grow() {
-    for (int round = 0; round < kGrowingRounds && too_few_seeds() && insert(false); ++round) {
+    for (int round = 0; round < kGrowingRounds && too_few_seeds() && !has_worked_enough() && insert(false); ++round) {
       given_ = wanted_ = run_.seeds.size();
       optimise_again(kGrowingSteps);
       keep_best();
@@ -362,7 +370,7 @@ class Control {
     std::size_t least = failures();
     const std::size_t hopeless = kDivergence * least + kMostAdded;
     for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !holds(); ++round, ++idle) {
-      if (failures() > hopeless || !insert(round % kFarRounds == kFarRounds - 1)) break;
+      if (failures() > hopeless || has_worked_enough() || !insert(round % kFarRounds == kFarRounds - 1)) break;
       check();
       keep_best();
       if (failures() >= least) continue;
@@ -502,6 +510,8 @@ class Control {
 
   CvtRun& run_;
   const FeatureTrace& trace_;
+  const bool is_sound_;     // the input is a manifold and oriented, or branches on purpose
+  const double most_work_;  // of the run
   OptimiseOptions options_;
   std::size_t wanted_;      // vertices
   std::size_t given_;       // seeds before those inserted by refining
@@ -562,8 +572,9 @@ std::vector<TopologyFault> topology_faults(const BallReport& report, const std::
   return faults;
 }
 
-TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, OptimiseOptions options) {
-  return Control(run, trace, std::move(options)).run();
+TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
+                                 OptimiseOptions options, bool branches) {
+  return Control(run, trace, branches || (input.manifold && input.oriented), std::move(options)).run();
 }
 
 }  // namespace bisector

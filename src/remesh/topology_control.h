@@ -48,7 +48,9 @@ struct TopologyOutcome {
 //
 // Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to
 // the seeds with the fewest failures, which topology_faults lists, or to those given if an eighth of the cells fail
-// with any.
-TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, OptimiseOptions options);
+// with any. Where the input is not manifold and oriented, and does not branch on purpose, it may take as much work as
+// the run has until then, and seeds are as given if that does not do.
+TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
+                                 OptimiseOptions options, bool branches = false);
 
 }  // namespace bisector

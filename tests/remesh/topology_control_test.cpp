@@ -560,7 +560,8 @@ TEST(TopologyControlTest, SeedsThatAreNotFreeStay) {
     run.seeds.edit_places()[i] = {i % 3 ? SeedPlace::Kind::surface : SeedPlace::Kind::fixed, kNone, i, 0};
     if (i % 3 == 0) fixed[i] = run.seeds.position(i);
   }
-  const TopologyOutcome outcome = enforce_topology(run, FeatureTrace(surface, run.curves()), options);
+  const TopologyOutcome outcome =
+      enforce_topology(run, FeatureTrace(surface, run.curves()), topology_of(lens), options);
   EXPECT_TRUE(outcome.ball.holds);
   EXPECT_GT(outcome.inserted, 0u);
   // The energy is that of the seeds.
@@ -612,7 +613,7 @@ TEST(TopologyControlTest, CurvesStay) {
       options.iterations = 30;
       optimise(run, options);
       ASSERT_TRUE(recover_features(run, trace, measure, scale, options).broken.empty());
-      const TopologyOutcome outcome = enforce_topology(run, trace, options);
+      const TopologyOutcome outcome = enforce_topology(run, trace, topology_of(mesh), options);
       EXPECT_TRUE(outcome.ball.holds) << height << ' ' << count;
       EXPECT_GT(outcome.inserted, 0u) << height << ' ' << count;
       const Diagram& diagram = run.diagram(Want::polygons | Want::dual);
@@ -643,7 +644,8 @@ TEST(TopologyControlTest, ADenseSoupGetsNoSeedsInVain) {
   options.constrained = true;
   options.iterations = 10;
   optimise(free.run, options);
-  const TopologyOutcome outcome = enforce_topology(free.run, FeatureTrace(surface, free.curves), options);
+  const TopologyOutcome outcome =
+      enforce_topology(free.run, FeatureTrace(surface, free.curves), topology_of(mesh), options);
   EXPECT_GT(outcome.rounds, 0);
   EXPECT_FALSE(outcome.ball.holds);
   EXPECT_GT(outcome.ball.cells.size(), 100u);
