@@ -24,8 +24,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Rounds of inserting seeds: with an optimisation of so many steps after each (thesis 4.4.4), while more than one cell
 // in kTooFew fails; then without. Every kFarRounds-th round of the latter inserts far points.
 constexpr int kGrowingRounds = 12, kGrowingSteps = 30, kRefiningRounds = 80, kFarRounds = 3;
-// Refining ends if so many rounds in a row have not led to fewer failures.
-constexpr int kPatience = 12;
+// Refining ends if so many rounds in a row have not led to fewer failures; on inputs that are no oriented manifolds
+// there is little hope then.
+constexpr int kPatience = 12, kPatienceUnsound = 4;
 constexpr std::size_t kTooFew = 8;
 // Refining has no end if there are so many times the failures of the beginning, and kMostAdded more.
 constexpr std::size_t kDivergence = 2;
@@ -244,7 +245,7 @@ class Control {
         if (gap == kInfinity) most_ = std::max(budget(), kAnyway);
         check();
         keep_best();
-        if (refine() || has_worked_enough()) break;
+        if (refine() || has_worked_enough() || !is_sound_) break;
       }
       if (holds()) {
         trim();
@@ -369,7 +370,8 @@ class Control {
   bool refine() {
     std::size_t least = failures();
     const std::size_t hopeless = kDivergence * least + kMostAdded;
-    for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !holds(); ++round, ++idle) {
+    const int patience = is_sound_ ? kPatience : kPatienceUnsound;
+    for (int round = 0, idle = 0; round < kRefiningRounds && idle < patience && !holds(); ++round, ++idle) {
       if (failures() > hopeless || has_worked_enough() || !insert(round % kFarRounds == kFarRounds - 1)) break;
       check();
       keep_best();
