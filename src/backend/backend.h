@@ -29,6 +29,8 @@ class Backend {
 
   // The surface, or the boundary of the solid. A backend whose surface is in no one place has none: std::logic_error.
   const Surface& surface() const;
+  // Of that surface; 0 if there is none.
+  std::size_t facet_count() const { return surface_ ? surface_->facets.size() : 0; }
   // Integral of the density over the domain.
   double mass() const { return mass_; }
   virtual BackendDescription description() const = 0;

@@ -102,7 +102,7 @@ void CvtRun::adopt(PlacedSeeds placed, DiagramOfSeeds known) {
 }
 
 double CvtRun::step_work() const {
-  return (localised_ ? kLocalisedWork : 1) * static_cast<double>(surface().facets.size() + 3 * seeds.size());
+  return (localised_ ? kLocalisedWork : 1) * static_cast<double>(backend_->facet_count() + 3 * seeds.size());
 }
 
 bool CvtRun::covers(double mass) const {

@@ -40,9 +40,6 @@ constexpr int kPolishingSteps = 20, kSmoothingSteps = 20, kRetreats = 12;
 constexpr std::size_t kMostAdded = 100, kGrown = 300, kAnyway = 5000;
 // Of a cell's radius: sheets nearer to each other get a vertex each. More of them if fewer do not help.
 constexpr double kCrossing = 0.01, kTouching = 0.1;
-// How many times the work of the run so far control may take, and so many steps of it anyway; as much again where the
-// input is not manifold.
-constexpr double kMostWork = 2, kLeastSteps = 300;
 // Squared distance of points inserted together, over that to the seeds there are.
 constexpr double kApart = 2;
 // Cosine of the angle at which a surface faces away.
@@ -220,9 +217,7 @@ std::vector<char> failing_seeds(const BallReport& report, std::size_t count) {
 class Control {
  public:
   Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, OptimiseOptions options)
-      : run_(run), trace_(trace), is_sound_(is_sound),
-        most_work_(run.totals.work +
-                   (is_sound ? std::max(kMostWork * run.totals.work, kLeastSteps * run.step_work()) : run.totals.work)),
+      : run_(run), trace_(trace), is_sound_(is_sound), most_work_(is_sound ? kInfinity : 2 * run.totals.work),
         options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_), most_(std::max(budget(), kGrown)),
         lost_(run.curves().size(), 0) {
     options_.done = 1;
