@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bisector/quality.h"
@@ -43,6 +46,25 @@ TEST(JoinBorders, KeepsApartWhatHasNoBorderThere) {
   const WeldResult joined = join_borders(boxes, {});
   EXPECT_EQ(joined.merged_vertices, 0u);
   EXPECT_EQ(joined.mesh.triangles, boxes.triangles);
+}
+
+// Sides of a sheet with a label each, in any order.
+TEST(JoinBorders, TakesDoubleTrianglesOnceWithTheLowerLabel) {
+  const TriangleMesh sheet = wavy_patch(6);
+  TriangleMesh both;
+  both.vertices = sheet.vertices;
+  for (std::size_t t = 0; t < sheet.triangles.size(); ++t) {
+    const auto [a, b, c] = sheet.triangles[t];
+    const std::array<std::pair<Triangle, std::int32_t>, 2> sides{{{{a, b, c}, 3}, {{c, b, a}, 7}}};
+    for (const std::size_t side : {t % 2, 1 - t % 2}) {
+      both.triangles.push_back(sides[side].first);
+      both.labels.push_back(sides[side].second);
+    }
+  }
+  const WeldResult joined = join_borders(both, {});
+  EXPECT_EQ(joined.mesh.triangles, sheet.triangles);
+  EXPECT_EQ(joined.mesh.labels, std::vector<std::int32_t>(sheet.triangles.size(), 3));
+  EXPECT_EQ(joined.duplicate_triangles, sheet.triangles.size());
 }
 
 TEST(JoinBorders, MovesNothingOfAClosedSurface) {

@@ -227,6 +227,21 @@ TEST(RemeshHard, NonManifoldInputRunsAndReports) {
 }
 
 // Boxes that touch in a corner are remeshed as two, both with that corner.
+// A thin limb beside three sheets that share an edge: what mends it on a manifold does so here.
+TEST(RemeshHard, TopologyIsMendedBesideEdgesOfThreeSheets) {
+  TriangleMesh limb = icosphere(4);
+  for (Vec3& p : limb.vertices) p = {p.x, 0.03 * p.y, 0.03 * p.z};
+  const TriangleMesh mesh = joined(pages(), limb, {0, 10, 0});
+  for (const std::size_t vertices : {60, 100}) {
+    SCOPED_TRACE(vertices);
+    RemeshOptions options = options_for(vertices);
+    options.topology = TopologyControl::check;
+    EXPECT_FALSE(remesh(mesh, options).topology_matches);
+    options.topology = TopologyControl::enforce;
+    EXPECT_TRUE(remesh(mesh, options).topology_matches);
+  }
+}
+
 TEST(RemeshHard, WhatTouchesInAPointIsSeveralSurfaces) {
   const TriangleMesh one = box(4);
   const auto index_of = [](const std::vector<Vec3>& points, const Vec3& p) {
