@@ -4,6 +4,13 @@
 
 namespace bisector {
 
+namespace {
+
+// Of one curve, however long it is in steps.
+constexpr double kMostSamples = 1e5;
+
+}  // namespace
+
 bool is_loop(const FeatureCurve& curve) { return curve.closed || curve.vertices.front() == curve.vertices.back(); }
 
 std::vector<Index> reversed_vertices(std::vector<Index> vertices) {
@@ -39,6 +46,7 @@ std::vector<std::vector<Index>> divided(const std::vector<Index>& chain, const s
 std::vector<Sample> samples_of(const Candidate& candidate, const std::vector<Vec3>& vertices, double step) {
   const std::vector<Index>& chain = candidate.curve.vertices;
   const std::size_t segments = chain.size() - (candidate.curve.closed ? 0 : 1);
+  step = std::max(step, length_of(chain, candidate.curve.closed, vertices) / kMostSamples);
   std::vector<Sample> samples;
   double at = 0, next = 0.5 * step;
   for (std::size_t k = 0; k < segments; ++k) {
