@@ -226,7 +226,6 @@ TEST(RemeshHard, NonManifoldInputRunsAndReports) {
     }
 }
 
-// Boxes that touch in a corner are remeshed as two, both with that corner.
 // A thin limb beside three sheets that share an edge: what mends it on a manifold does so here.
 TEST(RemeshHard, TopologyIsMendedBesideEdgesOfThreeSheets) {
   TriangleMesh limb = icosphere(4);
@@ -242,6 +241,7 @@ TEST(RemeshHard, TopologyIsMendedBesideEdgesOfThreeSheets) {
   }
 }
 
+// Boxes that touch in a corner are remeshed as two, both with that corner.
 TEST(RemeshHard, WhatTouchesInAPointIsSeveralSurfaces) {
   const TriangleMesh one = box(4);
   const auto index_of = [](const std::vector<Vec3>& points, const Vec3& p) {
