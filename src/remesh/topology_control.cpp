@@ -24,9 +24,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Rounds of inserting seeds: with an optimisation of so many steps after each (thesis 4.4.4), while more than one cell
 // in kTooFew fails; then without. Every kFarRounds-th round of the latter inserts far points.
 constexpr int kGrowingRounds = 12, kGrowingSteps = 30, kRefiningRounds = 80, kFarRounds = 3;
-// Refining ends if so many rounds in a row have not led to fewer failures; on inputs that are no oriented manifolds
-// there is little hope then.
-constexpr int kPatience = 12, kPatienceUnsound = 4;
+// Refining ends if so many rounds in a row have not led to fewer failures.
+constexpr int kPatience = 12;
 constexpr std::size_t kTooFew = 8;
 // Refining has no end if there are so many times the failures of the beginning, and kMostAdded more.
 constexpr std::size_t kDivergence = 2;
@@ -365,8 +364,7 @@ class Control {
   bool refine() {
     std::size_t least = failures();
     const std::size_t hopeless = kDivergence * least + kMostAdded;
-    const int patience = is_sound_ ? kPatience : kPatienceUnsound;
-    for (int round = 0, idle = 0; round < kRefiningRounds && idle < patience && !holds(); ++round, ++idle) {
+    for (int round = 0, idle = 0; round < kRefiningRounds && idle < kPatience && !holds(); ++round, ++idle) {
       if (failures() > hopeless || has_worked_enough() || !insert(round % kFarRounds == kFarRounds - 1)) break;
       check();
       keep_best();
@@ -457,10 +455,10 @@ class Control {
       check();
       if (holds()) return true;
       const std::vector<char> failing = failing_neighbourhood();
-      const auto held_before = std::count(held.begin(), held.end(), 1);
-      for (std::size_t i = 0; i < held.size(); ++i) held[i] |= failing[i];
-      // The same seeds would be held once more.
-      if (std::count(held.begin(), held.end(), 1) == held_before) break;
+      bool holds_more = false;
+      for (std::size_t i = 0; i < held.size(); ++i)
+        if (failing[i] && !std::exchange(held[i], 1)) holds_more = true;
+      if (!holds_more) break;
     }
     run_.seeds = before;
     check();

@@ -93,7 +93,6 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
 bool Clipper::clip(std::span<const Index> others, Index slot) {
   start(slot);
   place_lines();
-  bounded_ = false;
   return std::all_of(others.begin(), others.end(), [&](Index other) { return other == slot || visit(other); });
 }
 
