@@ -17,6 +17,7 @@
 #include "job/outputs.h"
 #include "job/region_json.h"
 #include "job/words.h"
+#include "mesh/joining.h"
 #include "segment/dual_graph.h"
 #include "segment/polygonise.h"
 
@@ -35,7 +36,7 @@ TriangleMesh labelled_mesh(const TriangleMesh& input, const SegmentResult& resul
 }
 
 std::vector<Colour> region_colours(const TriangleMesh& mesh, const SegmentResult& result) {
-  const DualGraph graph = dual_graph(mesh);
+  const DualGraph graph = dual_graph(join_equal_points(mesh), mesh.vertices);
   std::vector<std::array<Index, 2>> meeting;
   for (std::size_t t = 0; t < result.labels.size(); ++t)
     for (const Index* u = graph.neighbours.begin(t); u != graph.neighbours.end(t); ++u)

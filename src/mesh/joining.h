@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "bisector/quality.h"
 #include "bisector/repair.h"
 
 namespace bisector {
@@ -14,8 +15,7 @@ WeldResult remove_double_triangles(const TriangleMesh& mesh);
 
 // Whether vertices are to be one that were not: there are no more border edges then, and fewer border and non-manifold
 // edges together.
-bool joins_borders(std::size_t borders, std::size_t non_manifold, std::size_t borders_before,
-                   std::size_t non_manifold_before);
+bool joins_borders(const MeshTopology& now, const MeshTopology& before);
 
 // The triangles, all of them and in their order, with the first of the vertices at a point in the place of each other
 // one, if that joins borders: files give faces vertices of their own where normals or texture coordinates differ. A

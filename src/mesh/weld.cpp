@@ -407,9 +407,9 @@ WeldResult remove_double_triangles(const TriangleMesh& mesh) {
   return result;
 }
 
-bool joins_borders(std::size_t borders, std::size_t non_manifold, std::size_t borders_before,
-                   std::size_t non_manifold_before) {
-  return borders <= borders_before && borders + non_manifold < borders_before + non_manifold_before;
+bool joins_borders(const MeshTopology& now, const MeshTopology& before) {
+  return now.boundary_edges <= before.boundary_edges &&
+         now.boundary_edges + now.non_manifold_edges < before.boundary_edges + before.non_manifold_edges;
 }
 
 std::vector<Triangle> join_equal_points(const TriangleMesh& mesh) {
@@ -422,10 +422,7 @@ std::vector<Triangle> join_equal_points(const TriangleMesh& mesh) {
   std::vector<Triangle> joined = mesh.triangles;
   for (Triangle& t : joined)
     if (const Triangle named{first[t[0]], first[t[1]], first[t[2]]}; !has_repeated_corner(named)) t = named;
-  const MeshTopology after = topology_of(joined);
-  const bool joins =
-      joins_borders(after.boundary_edges, after.non_manifold_edges, before.boundary_edges, before.non_manifold_edges);
-  return joins ? joined : mesh.triangles;
+  return joins_borders(topology_of(joined), before) ? joined : mesh.triangles;
 }
 
 WeldResult weld(const TriangleMesh& mesh, double tolerance) {

@@ -36,9 +36,7 @@ constexpr double kApart = 1e-7;
 // Of the diagonal: how far apart rounding leaves points that were one, from none to files of six digits.
 constexpr double kRoundings[] = {0, 1e-7, 1e-6, 1e-5};
 
-std::size_t non_manifold_edges(const TriangleMesh& mesh) {
-  return analyse_topology(mesh.triangles, mesh.vertices.size()).non_manifold_edges;
-}
+MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
 
 std::string plural(std::size_t count, const char* word) {
   return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
@@ -96,14 +94,14 @@ class Separation {
   Separation(TriangleMesh& mesh, bool branches, const Context& context)
       : given_(mesh.vertices.size()), vertices_(given_) {
     if (branches) return;
-    const MeshTopology touching = analyse_topology(mesh.triangles, given_);
+    const MeshTopology touching = topology_of(mesh);
     if (touching.manifold) return;
     halved_ = halve_touching_edges(mesh);
     vertices_ = mesh.vertices.size();
     original_ = separate_touching(mesh);
     if (original_.size() == vertices_) return;
     part_fans(mesh, original_);
-    const std::size_t edges = touching.non_manifold_edges - non_manifold_edges(mesh);
+    const std::size_t edges = touching.non_manifold_edges - topology_of(mesh).non_manifold_edges;
     std::vector<std::string> where;
     if (touching.non_manifold_vertices > 0) where.push_back("in " + plural(touching.non_manifold_vertices, "point"));
     if (edges > 0) where.push_back("along " + plural(edges, "edge"));
@@ -189,19 +187,18 @@ OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
   if (tolerance) return weld(input, *tolerance);
   WeldResult best = remove_double_triangles(input);
-  std::size_t borders = best.border_after, non_manifold = non_manifold_edges(best.mesh);
+  MeshTopology before = topology_of(best.mesh);
   const double diagonal = bounding_box(input).diagonal();
   for (const double rounding : kRoundings) {
-    if (borders + non_manifold == 0) break;
+    if (before.boundary_edges + before.non_manifold_edges == 0) break;
     WeldResult welded = weld(input, rounding * diagonal);
-    const std::size_t borders_now = welded.border_after, non_manifold_now = non_manifold_edges(welded.mesh);
-    if (!joins_borders(borders_now, non_manifold_now, borders, non_manifold)) continue;
+    const MeshTopology now = topology_of(welded.mesh);
+    if (!joins_borders(now, before)) continue;
     // Sheets that share points exactly were made to meet there, three or more of them as well as two; what a tolerance
     // joins so may only be near.
-    if (rounding > 0 && non_manifold_now > non_manifold) continue;
+    if (rounding > 0 && now.non_manifold_edges > before.non_manifold_edges) continue;
     best = std::move(welded);
-    borders = borders_now;
-    non_manifold = non_manifold_now;
+    before = now;
   }
   return best;
 }

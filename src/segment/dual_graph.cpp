@@ -5,7 +5,6 @@
 
 #include "core/geometry.h"
 #include "core/grouping.h"
-#include "mesh/joining.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -28,15 +27,15 @@ struct Neighbour {
 
 }  // namespace
 
-DualGraph dual_graph(const TriangleMesh& mesh) {
-  const EdgeTable table = edge_table(join_equal_points(mesh), mesh.vertices.size());
-  const std::size_t n = mesh.triangles.size(), edges = table.edges.size();
+DualGraph dual_graph(const std::vector<Triangle>& triangles, const std::vector<Vec3>& vertices) {
+  const EdgeTable table = edge_table(triangles, vertices.size());
+  const std::size_t n = triangles.size(), edges = table.edges.size();
   DualGraph graph;
   std::vector<double> length(edges);
   double sum = 0;
   for (std::size_t e = 0; e < edges; ++e) {
     const auto [a, b] = table.edges[e];
-    length[e] = norm(mesh.vertices[b] - mesh.vertices[a]);
+    length[e] = norm(vertices[b] - vertices[a]);
     sum += length[e];
   }
   graph.mean_edge_length = edges ? sum / static_cast<double>(edges) : 0;

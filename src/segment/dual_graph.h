@@ -15,8 +15,7 @@ struct DualGraph {
   double mean_edge_length = 0;  // over the mesh's edges
 };
 
-// Vertices at the same point are one where that joins borders (mesh/joining.h).
-DualGraph dual_graph(const TriangleMesh& mesh);
+DualGraph dual_graph(const std::vector<Triangle>& triangles, const std::vector<Vec3>& vertices);
 
 // Components connected through the graph within equal labels (or at all, if there are none), numbered from 0 by lowest
 // triangle.

@@ -28,6 +28,7 @@ SegmentDomain make_segment_domain(const TriangleMesh& mesh) {
 
   const std::size_t n = mesh.triangles.size();
   domain.triangles = join_equal_points(mesh);
+  domain.graph = dual_graph(domain.triangles, mesh.vertices);
   orient(domain.triangles, domain.vertices.size());
   domain.normals.resize(n);
   domain.barycentres.resize(n);
@@ -46,7 +47,6 @@ SegmentDomain make_segment_domain(const TriangleMesh& mesh) {
   });
   domain.area = fixed_sum(n, [&](std::size_t t) { return domain.areas[t]; });
   if (!(domain.area > 0)) throw Error("the mesh has no area: all its triangles are degenerate; check the export");
-  domain.graph = dual_graph(mesh);
   domain.components = connected_parts(domain.graph);
   domain.component_count = 1 + *std::max_element(domain.components.begin(), domain.components.end());
   return domain;

@@ -21,7 +21,7 @@ namespace {
 // Every label in use, one connected part each, and what is reported about regions and borders is what the labels say.
 void expect_sound(const TriangleMesh& mesh, const SegmentResult& result) {
   ASSERT_EQ(result.labels.size(), mesh.triangles.size());
-  const DualGraph graph = dual_graph(mesh);
+  const DualGraph graph = dual_graph(mesh.triangles, mesh.vertices);
   std::vector<std::size_t> triangles(result.regions.size(), 0);
   for (const Index l : result.labels) {
     ASSERT_LT(l, result.regions.size());
@@ -149,7 +149,7 @@ TEST(Segment, DoesNotDependOnUnitsOrPlace) {
   options.proxies = 13;
   const SegmentResult here = segment(model.mesh, options), there = segment(moved, options);
   // Regions of nearly equal area may swap their numbers.
-  const auto neighbours = dual_graph(model.mesh).neighbours;
+  const auto neighbours = dual_graph(model.mesh.triangles, model.mesh.vertices).neighbours;
   std::size_t same = 0;
   for (std::size_t t = 0; t < here.labels.size(); ++t)
     for (const Index* n = neighbours.begin(t); n != neighbours.end(t); ++n)

@@ -27,7 +27,8 @@ struct Problem {
   Distances distances;
 
   Problem(TriangleMesh m, std::vector<Index> l, Distances d)
-      : mesh(std::move(m)), graph(dual_graph(mesh)), labels(std::move(l)), distances(std::move(d)) {}
+      : mesh(std::move(m)), graph(dual_graph(mesh.triangles, mesh.vertices)), labels(std::move(l)),
+        distances(std::move(d)) {}
 
   // With the same weight for all regions.
   SmoothBordersResult smooth(double weight, int rings = 0, int sweeps = 10) {
@@ -130,7 +131,7 @@ Topology topology(const TriangleMesh& mesh, const std::vector<Index>& labels, In
 
 // Regions that grow triangle by triangle from random ones, so that they are connected and their borders ragged.
 std::vector<Index> random_regions(const TriangleMesh& mesh, Index count, std::uint64_t seed) {
-  const DualGraph graph = dual_graph(mesh);
+  const DualGraph graph = dual_graph(mesh.triangles, mesh.vertices);
   const std::vector<Index> part = connected_parts(graph);
   const std::size_t n = mesh.triangles.size();
   std::vector<Index> labels(n, kNone), front;
@@ -200,7 +201,7 @@ TEST(RegionTopology, FollowsChanges) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE(seed);
     const TriangleMesh mesh = all_kinds_of_meshes(seed)[seed % 10];
-    const DualGraph graph = dual_graph(mesh);
+    const DualGraph graph = dual_graph(mesh.triangles, mesh.vertices);
     SplitMix64 random(seed);
     std::vector<Index> labels(mesh.triangles.size());
     for (std::size_t t = 0; t < labels.size(); ++t) labels[t] = static_cast<Index>(t % 2 == 0 ? 0 : random.below(3));
@@ -243,7 +244,7 @@ TEST(RegionTopology, FindsCrumbs) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE(seed);
     const TriangleMesh mesh = seed % 2 ? icosphere(2) : grid_patch(12, 9);
-    const DualGraph graph = dual_graph(mesh);
+    const DualGraph graph = dual_graph(mesh.triangles, mesh.vertices);
     std::vector<Index> labels = random_regions(mesh, 2, seed);
     RegionTopology tracked(graph, mesh.triangles, labels);
     SplitMix64 random(seed);
