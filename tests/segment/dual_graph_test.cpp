@@ -42,7 +42,7 @@ std::vector<Named> meshes() {
 TEST(DualGraph, IsThePairsOfTrianglesWithCommonEdges) {
   for (const auto& [name, mesh] : meshes()) {
     SCOPED_TRACE(name);
-    const DualGraph graph = dual_graph(mesh);
+    const DualGraph graph = dual_graph(mesh.triangles, mesh.vertices);
     ASSERT_EQ(graph.neighbours.rows(), mesh.triangles.size());
     ASSERT_EQ(graph.edge_length.size(), graph.neighbours.values.size());
     std::set<Edge> all;
@@ -68,7 +68,7 @@ TEST(DualGraph, IsThePairsOfTrianglesWithCommonEdges) {
 }
 
 TEST(DualGraph, OfNothingIsEmpty) {
-  const DualGraph graph = dual_graph({});
+  const DualGraph graph = dual_graph({}, {});
   EXPECT_EQ(graph.neighbours.rows(), 0u);
   EXPECT_EQ(graph.mean_edge_length, 0);
   EXPECT_TRUE(connected_parts(graph).empty());
@@ -77,7 +77,7 @@ TEST(DualGraph, OfNothingIsEmpty) {
 TEST(ConnectedParts, AreNumberedByTheirLowestTriangle) {
   for (const auto& [name, mesh] : meshes()) {
     SCOPED_TRACE(name);
-    const DualGraph graph = dual_graph(mesh);
+    const DualGraph graph = dual_graph(mesh.triangles, mesh.vertices);
     SplitMix64 random(5);
     std::vector<Index> labels(mesh.triangles.size());
     for (Index& label : labels) label = static_cast<Index>(random.below(2));
@@ -107,7 +107,7 @@ TEST(ConnectedParts, AreNumberedByTheirLowestTriangle) {
 
 TEST(BorderLength, IsThatOfTheEdgesBetweenLabels) {
   const TriangleMesh mesh = grid_patch(6, 4);
-  const DualGraph graph = dual_graph(mesh);
+  const DualGraph graph = dual_graph(mesh.triangles, mesh.vertices);
   std::vector<Index> labels(mesh.triangles.size(), 0);
   EXPECT_EQ(border_length(graph, labels), 0);
   for (std::size_t t = 0; t < labels.size(); ++t) {
