@@ -16,7 +16,7 @@ struct WeldResult {
   std::size_t merged_vertices = 0;       // fewer than in the input
   std::size_t split_edges = 0;           // border edges that got vertices of another border
   std::size_t degenerate_triangles = 0;  // removed: two corners are the same vertex
-  std::size_t duplicate_triangles = 0;   // removed: of the same three vertices as one kept, either way round
+  std::size_t duplicate_triangles = 0;   // removed: of the same three vertices as another, either way round
   std::size_t border_before = 0;         // edges of one triangle in the input
   std::size_t border_after = 0;
 };
@@ -29,7 +29,8 @@ struct WeldResult {
 // border edge is split at vertices of other borders that lie within the tolerance of its inside, if a border runs along
 // it there and no triangle turns over.
 //
-// Of triangles that then have the same three vertices the first of the lowest label is kept.
+// Of triangles that then have the same three vertices the first of the lowest label is kept; none of two that a surface
+// folded onto itself there, out of which they stick, so that it is closed without them.
 //
 // Vertices and triangles keep their order; labels, face_of_triangle and feature_edges follow, attributes do not. Throws
 // Error if the tolerance is negative or not finite.

@@ -97,7 +97,7 @@ PlyHeader read_ply_header(TextReader& in) {
     } else if (keyword == "property") {
       if (header.elements.empty()) in.fail(std::string("a property comes before all elements; ") + kExportAgain);
       header.elements.back().properties.push_back(read_ply_property(in));
-    } else {
+    } else if (!header.elements.empty()) {  // before these, what else programs tell of themselves
       in.fail("unknown header line '" + printable(keyword) + "'; " + kExportAgain);
     }
   }

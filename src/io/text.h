@@ -1,6 +1,7 @@
 // The text reader that the formats share.
 #pragma once
 
+#include <algorithm>
 #include <fmt/format.h>
 
 #include <array>
@@ -47,12 +48,22 @@ std::int64_t parse_integer(std::string_view text, const Fail& fail) {
   return n;
 }
 
-// Words of a text, line by line, with '\n' or "\r\n" at the ends of lines.
+// What ends the lines of a text: '\n', after a '\r' or not, or '\r' alone, as programs that are older than Mac OS X,
+// or follow these, write it. Of a header with binary data behind it, only the header counts.
+inline char end_of_lines(std::string_view bytes) {
+  constexpr std::size_t kEnough = 4096;  // a line ends within so many bytes
+  std::string_view head = bytes.substr(0, std::min(kEnough, bytes.find("end_header")));
+  if (head.ends_with('\r')) head.remove_suffix(1);  // what follows it is not in sight
+  return head.find('\n') == head.npos && head.find('\r') != head.npos ? '\r' : '\n';
+}
+
+// Words of a text, line by line.
 class TextReader {
  public:
   // `comment` starts a comment anywhere in a line (0: none); with `joins`, a backslash joins a line with the next one.
   TextReader(const std::string& path, std::string_view bytes, char comment, bool joins = false)
-      : path_(path), at_(bytes.data()), end_(bytes.data() + bytes.size()), comment_(comment), joins_(joins) {
+      : path_(path), at_(bytes.data()), end_(bytes.data() + bytes.size()), end_of_line_(end_of_lines(bytes)),
+        comment_(comment), joins_(joins) {
     if (bytes.starts_with("\xef\xbb\xbf")) at_ += 3;
   }
 
@@ -72,7 +83,7 @@ class TextReader {
     for (; at_ != end_; ++at_) {
       if (is_blank(*at_)) continue;
       const std::size_t joint = joint_length();
-      if (joint == 0) return *at_ != '\n' && !(comment_ && *at_ == comment_);
+      if (joint == 0) return *at_ != end_of_line_ && !(comment_ && *at_ == comment_);
       at_ += joint - 1;
       ++line_;
     }
@@ -141,20 +152,22 @@ class TextReader {
   }
 
  private:
-  static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
+  bool is_blank(char c) const {
+    return c == ' ' || c == '\t' || c == '\v' || c == '\f' || (c == '\r' && c != end_of_line_);
+  }
   bool ends_word() const {
-    return is_blank(*at_) || *at_ == '\n' || (comment_ && *at_ == comment_) || joint_length() > 0;
+    return is_blank(*at_) || *at_ == end_of_line_ || (comment_ && *at_ == comment_) || joint_length() > 0;
   }
   // Of a backslash and the line's end after it.
   std::size_t joint_length() const {
     if (!joins_ || *at_ != '\\') return 0;
-    if (end_ - at_ > 1 && at_[1] == '\n') return 2;
+    if (end_ - at_ > 1 && at_[1] == end_of_line_) return 2;
     return end_ - at_ > 2 && at_[1] == '\r' && at_[2] == '\n' ? 3 : 0;
   }
   void skip_line() {
     bool commented = false;
     for (; at_ != end_; ++at_) {
-      if (*at_ == '\n') {
+      if (*at_ == end_of_line_) {
         ++at_;
         ++line_;
         return;
@@ -172,6 +185,7 @@ class TextReader {
   const char* at_;
   const char* end_;
   std::size_t line_ = 0;
+  char end_of_line_;
   char comment_;
   bool joins_;
 };

@@ -25,6 +25,13 @@ namespace {
 
 using Edge = std::array<Index, 2>;
 
+// Whether two triangles of the same corners go the same way round.
+bool is_even_turn(const Triangle& a, const Triangle& b) {
+  for (std::size_t k = 0; k < 3; ++k)
+    if (a[0] == b[k]) return a[1] == b[(k + 1) % 3];
+  return false;
+}
+
 bool has_repeated_corner(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
 std::vector<Index> own_names(std::size_t vertices) {
@@ -81,7 +88,7 @@ struct Work {
   }
 
   // Of triangles with different labels those of the lowest stay: the sides of a sheet often have a label each, and one
-  // of them is to be all over it.
+  // of them is to be all over it. Of a fold nothing stays.
   std::size_t remove_duplicates() {
     struct Key {
       Triangle corners;
@@ -97,9 +104,37 @@ struct Work {
       return std::tie(a.corners, a.label, a.triangle) < std::tie(b.corners, b.label, b.triangle);
     });
     std::vector<char> unwanted(triangles.size(), 0);
-    for (std::size_t k = 1; k < keys.size(); ++k)
-      if (keys[k].corners == keys[k - 1].corners) unwanted[keys[k].triangle] = 1;
+    std::vector<std::array<std::size_t, 2>> pairs;
+    for (std::size_t k = 1; k < keys.size(); ++k) {
+      if (keys[k].corners != keys[k - 1].corners) continue;
+      unwanted[keys[k].triangle] = 1;
+      if (keys[k].label == keys[k - 1].label) pairs.push_back({keys[k - 1].triangle, keys[k].triangle});
+    }
+    if (!pairs.empty()) find_folds(pairs, unwanted);
     return remove(unwanted);
+  }
+
+  // Where a surface is folded onto itself along an edge of a triangle, a triangle of no thickness sticks out of it:
+  // there it is closed without either side, and has border and non-manifold edges with one. A sheet that is written for
+  // both sides is larger, or hangs together with one side of others.
+  void find_folds(const std::vector<std::array<std::size_t, 2>>& pairs, std::vector<char>& unwanted) const {
+    const EdgeTable table = edge_table(triangles, points.size());
+    std::vector<char> is_double = unwanted;
+    for (const auto& [first, second] : pairs) is_double[first] = 1;
+    for (const auto& [first, second] : pairs) {
+      if (is_even_turn(triangles[first], triangles[second])) continue;
+      std::size_t folded = 0, closed = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Edge edge = sorted_edge(triangles[first][k], triangles[first][(k + 1) % 3]);
+        const auto e = static_cast<std::size_t>(
+            std::lower_bound(table.edges.begin(), table.edges.end(), edge) - table.edges.begin());
+        const std::size_t uses = table.half_edges.size(e);
+        folded += uses == 2;
+        closed += uses == 4 && std::count_if(table.half_edges.begin(e), table.half_edges.end(e),
+                                             [&](std::size_t h) { return is_double[h / 3]; }) == 2;
+      }
+      if (folded > 0 && closed > 0 && folded + closed == 3) unwanted[first] = 1;
+    }
   }
 
   void rename(const std::vector<Index>& name) {
@@ -403,7 +438,9 @@ WeldResult remove_double_triangles(const TriangleMesh& mesh) {
   result.border_after = result.duplicate_triangles == 0 ? result.border_before
                                                         : count_border(edge_table(work.triangles, work.points.size()));
   result.vertex_of = own_names(mesh.vertices.size());
-  result.mesh = collect(mesh, std::move(work), mesh.feature_edges, result.vertex_of);
+  std::vector<Edge> feature_edges = mesh.feature_edges;
+  if (result.duplicate_triangles > 0) keep_edges_of(work, feature_edges);
+  result.mesh = collect(mesh, std::move(work), std::move(feature_edges), result.vertex_of);
   return result;
 }
 

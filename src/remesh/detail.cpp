@@ -44,6 +44,8 @@ constexpr std::size_t kMostPoints = 100'000;  // of the curves
 // Triangles are halved until they are no longer than so many edges, for integrals.
 constexpr double kPiece = 1;
 constexpr int kDepth = 24;
+// Vertices that a piece may take at most for its middle to stand for all of it: needles would take thousands of pieces.
+constexpr double kFewVertices = 0.01;
 // Vertices, in those wanted, beyond which nobody needs to know how many it would be.
 constexpr double kFarTooMany = 50;
 // Of the vertices wanted, what the corners of curves that stay may take at most for details to be planned.
@@ -190,10 +192,13 @@ class Planner {
   double count(const Trial& t, double coarsening, double most) const {
     std::optional<SizeField> field;
     if (!t.points.empty()) field.emplace(t.points, t.lengths, kDetailGradation);
+    double shortest = kInfinity;
+    for (const double length : t.lengths) shortest = std::min(shortest, length);
+    for (const double length : edge_length_) shortest = std::min(shortest, coarsening * length);
     constexpr std::size_t kChunk = 256;
     std::vector<double> sums((mesh_.triangles.size() + kChunk - 1) / kChunk, 0);
     parallel_chunks(mesh_.triangles.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-      Counter counter{field, most};
+      Counter counter{field, shortest, most};
       for (std::size_t k = begin; k < end; ++k) {
         const Triangle& v = mesh_.triangles[k];
         const double plain = coarsening * (edge_length_[v[0]] + edge_length_[v[1]] + edge_length_[v[2]]) / 3;
@@ -209,6 +214,7 @@ class Planner {
   // Sums up vertices over pieces of triangles in which the lengths wanted change little.
   struct Counter {
     const std::optional<SizeField>& field;
+    double shortest;  // length wanted
     double most;
     double sum = 0;
     Index near = 0;
@@ -222,13 +228,15 @@ class Planner {
       const Vec3 middle = (1.0 / 3) * (p[0] + p[1] + p[2]);
       const double bound = field ? field->at_most(middle, plain_all_over, near) : kInfinity;
       const double h = std::min(plain, bound);
-      if (depth < kDepth && longest > kPiece * h && bound < plain_all_over) {
+      const double share = 2 / std::sqrt(3.0) * triangle_area(p[0], p[1], p[2]),
+                   least = std::max(h - kDetailGradation * longest, shortest);
+      if (depth < kDepth && longest > kPiece * h && bound < plain_all_over && share > kFewVertices * least * least) {
         const Vec3 &a = p[opposite], &b = p[(opposite + 1) % 3], &c = p[(opposite + 2) % 3], m = 0.5 * (b + c);
         add({a, b, m}, plain, depth + 1);
         add({a, m, c}, plain, depth + 1);
         return;
       }
-      sum += 2 / std::sqrt(3.0) * triangle_area(p[0], p[1], p[2]) / (h * h);
+      sum += share / (h * h);
     }
   };
 

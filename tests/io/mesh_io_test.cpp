@@ -219,7 +219,7 @@ TEST_F(Io, ToleratesHowTextIsLaidOut) {
   for (const auto& [name, text] : {std::pair{"a.off", kOff}, {"a.obj", kObj}, {"a.ply", kPly}, {"a.stl", kStl}}) {
     const std::string plain = text;
     for (const std::string& variant :
-         {replaced(plain, "\n", "\r\n"), plain.substr(0, plain.size() - 1), "\xef\xbb\xbf" + plain, plain + "\n \n\t\n",
+         {replaced(plain, "\n", "\r\n"), replaced(plain, "\n", "\r"), plain.substr(0, plain.size() - 1), "\xef\xbb\xbf" + plain, plain + "\n \n\t\n",
           replaced(replaced(plain, " ", "\t"), "\t\t", "\t"), replaced(plain, "1 1 0", "+1 +1.0e0 0.00"),
           replaced(plain, "1 1 0", "1. 10e-1 1e-999"), replaced(plain, "\n", " \n")})
       expect_same(read(name, variant), kSquare);
@@ -251,6 +251,10 @@ TEST_F(Io, ReadsPlyOfAnyTypeAndOrder) {
   const TriangleMesh expected{
       {{0, 0, 0}, {-3, 0, 0}, {0, 1.5, 0}, {0, 0, 0.1}}, {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}, {}};
   expect_same(little, expected);
+  const std::string binary = rich_ply(false);
+  const std::size_t body = binary.find("end_header\n") + 11;
+  expect_same(read("a.ply", replaced(binary.substr(0, body), "\n", "\r") + binary.substr(body)), little);
+  expect_same(read("a.ply", replaced(kPly, "element vertex", "Created by hand, of: nothing\nelement vertex")), kSquare);
   // Faces before vertices.
   expect_same(read("a.ply",
                    "ply\nformat ascii 1.0\nelement face 2\nproperty list int int vertex_indices\n"

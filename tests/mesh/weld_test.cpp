@@ -198,6 +198,42 @@ TEST(Weld, CountsWhatItRemovesAndKeepsTrackOfTheRest) {
   EXPECT_EQ(result.mesh.feature_edges, (std::vector<std::array<Index, 2>>{{0, 1}, {1, 2}}));
 }
 
+// A pair of triangles, one each way round, on an edge of a closed surface, as of a corner that is folded down.
+TEST(Weld, RemovesWhatIsFoldedOntoItself) {
+  TriangleMesh mesh = icosphere(1);
+  const std::vector<Triangle> sphere = mesh.triangles;
+  const Index a = sphere[7][0], b = sphere[7][1], c = sphere[7][2], tip = static_cast<Index>(mesh.vertices.size());
+  mesh.vertices.push_back(1.2 * mesh.vertices[a] + 0.1 * mesh.vertices[c]);
+  mesh.triangles.insert(mesh.triangles.end(), {{a, b, tip}, {tip, b, a}});
+  mesh.feature_edges = {{a, b}, {a, tip}};
+  const WeldResult result = weld(mesh, 0);
+  EXPECT_EQ(result.duplicate_triangles, 2u);
+  EXPECT_EQ(result.mesh.triangles, sphere);
+  EXPECT_EQ(result.mesh.feature_edges, (std::vector<std::array<Index, 2>>{{std::min(a, b), std::max(a, b)}}));
+}
+
+TEST(Weld, KeepsOneSideOfWhatIsNotFolded) {
+  // A sheet of one triangle, written for both sides.
+  TriangleMesh sheet;
+  sheet.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  sheet.triangles = {{0, 1, 2}, {2, 1, 0}};
+  EXPECT_EQ(weld(sheet, 0).mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+
+  // A sheet of two on an edge of a closed surface, and the wall between two solids.
+  TriangleMesh fin = icosphere(1);
+  const std::size_t sphere = fin.triangles.size();
+  const auto [a, b, c] = fin.triangles[7];
+  const auto tip = static_cast<Index>(fin.vertices.size());
+  fin.vertices.insert(fin.vertices.end(), {2.0 * fin.vertices[a], 2.0 * fin.vertices[b]});
+  fin.triangles.insert(fin.triangles.end(), {{a, b, tip}, {tip, b, a}, {b, tip + 1, tip}, {tip, tip + 1, b}});
+  EXPECT_EQ(weld(fin, 0).mesh.triangles.size(), sphere + 2);
+
+  TriangleMesh solids;
+  solids.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, -1}};
+  solids.triangles = {{0, 1, 2}, {0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {1, 0, 4}, {2, 1, 4}, {0, 2, 4}};
+  EXPECT_EQ(weld(solids, 0).mesh.triangles.size(), 7u);
+}
+
 TEST(Weld, FeatureEdgesAreSplitWithTheirEdges) {
   TriangleMesh mesh = two_patches(1, 4, 1e-4);
   for (const Triangle& t : mesh.triangles)
