@@ -1,8 +1,8 @@
 // The text reader that the formats share.
 #pragma once
 
-#include <algorithm>
 #include <fmt/format.h>
+#include <algorithm>
 
 #include <array>
 #include <charconv>

@@ -126,8 +126,8 @@ struct Work {
       std::size_t folded = 0, closed = 0;
       for (std::size_t k = 0; k < 3; ++k) {
         const Edge edge = sorted_edge(triangles[first][k], triangles[first][(k + 1) % 3]);
-        const auto e = static_cast<std::size_t>(
-            std::lower_bound(table.edges.begin(), table.edges.end(), edge) - table.edges.begin());
+        const auto e = static_cast<std::size_t>(std::lower_bound(table.edges.begin(), table.edges.end(), edge) -
+                                                table.edges.begin());
         const std::size_t uses = table.half_edges.size(e);
         folded += uses == 2;
         closed += uses == 4 && std::count_if(table.half_edges.begin(e), table.half_edges.end(e),

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -197,12 +199,22 @@ class Planner {
     for (const double length : edge_length_) shortest = std::min(shortest, coarsening * length);
     constexpr std::size_t kChunk = 256;
     std::vector<double> sums((mesh_.triangles.size() + kChunk - 1) / kChunk, 0);
+    // All chunks end once they have too many together: whether they do does not depend on who is first.
+    constexpr double kParts = 1024;  // of a vertex, counted down to
+    const double enough = std::min(1e18, kParts * (most + 1));
+    std::atomic<std::uint64_t> parts{0};
     parallel_chunks(mesh_.triangles.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
       Counter counter{field, shortest, most};
       for (std::size_t k = begin; k < end; ++k) {
         const Triangle& v = mesh_.triangles[k];
         const double plain = coarsening * (edge_length_[v[0]] + edge_length_[v[1]] + edge_length_[v[2]]) / 3;
+        const double before = counter.sum;
         counter.add({mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]}, plain);
+        const auto more = static_cast<std::uint64_t>(kParts * std::min(counter.sum - before, most + 1));
+        if (static_cast<double>(parts.fetch_add(more, std::memory_order_relaxed) + more) > enough) {
+          counter.sum = kInfinity;
+          break;
+        }
       }
       sums[chunk] = counter.sum;
     });

@@ -219,9 +219,10 @@ TEST_F(Io, ToleratesHowTextIsLaidOut) {
   for (const auto& [name, text] : {std::pair{"a.off", kOff}, {"a.obj", kObj}, {"a.ply", kPly}, {"a.stl", kStl}}) {
     const std::string plain = text;
     for (const std::string& variant :
-         {replaced(plain, "\n", "\r\n"), replaced(plain, "\n", "\r"), plain.substr(0, plain.size() - 1), "\xef\xbb\xbf" + plain, plain + "\n \n\t\n",
-          replaced(replaced(plain, " ", "\t"), "\t\t", "\t"), replaced(plain, "1 1 0", "+1 +1.0e0 0.00"),
-          replaced(plain, "1 1 0", "1. 10e-1 1e-999"), replaced(plain, "\n", " \n")})
+         {replaced(plain, "\n", "\r\n"), replaced(plain, "\n", "\r"), plain.substr(0, plain.size() - 1),
+          "\xef\xbb\xbf" + plain, plain + "\n \n\t\n", replaced(replaced(plain, " ", "\t"), "\t\t", "\t"),
+          replaced(plain, "1 1 0", "+1 +1.0e0 0.00"), replaced(plain, "1 1 0", "1. 10e-1 1e-999"),
+          replaced(plain, "\n", " \n")})
       expect_same(read(name, variant), kSquare);
   }
   expect_same(read("a.off",
