@@ -442,6 +442,29 @@ TEST(SimplifiedFeatures, GoWhereTheyRunBesideOthers) {
   }
 }
 
+// Two creases leave a corner at less than two degrees for less than what goes by itself: one ends where they part.
+TEST(SimplifiedFeatures, PartWhereTheyNoLongerRunTogether) {
+  for (const bool swapped : {false, true}) {
+    Chains net;
+    const Index corner = net.corner({0, 0, 0}), far = net.corner({12, 0, 0}), up = net.corner({2, 14, 0});
+    net.points.insert(net.points.end(), {{2, 0, 0}, {2, 0.05, 0}});
+    const Index on = up + 1, beside = up + 2;
+    net.graph.curves = {{{corner, on, far}, false, FeatureKind::crease},
+                        {{up, beside, corner}, false, FeatureKind::crease}};
+    net.graph.edges = edges_of(net.graph.curves);
+    const Csr<Index> neighbours = vertex_neighbours({{corner, on, beside}, {on, far, up}, {on, up, beside}}, 5);
+    const std::vector<double> weights = swapped ? std::vector<double>{1, 2} : std::vector<double>{2, 1};
+    const SimplifiedFeatures left = simplify_features(net.graph, net.points, weights, 3, {}, neighbours);
+    EXPECT_EQ(left.graph.curves.size(), 3u);
+    EXPECT_EQ(left.graph.edges.size(), 4u);  // one of those at the corner is gone, and one joins the two curves
+    const auto has = [&](Index a, Index b) {
+      return std::binary_search(left.graph.edges.begin(), left.graph.edges.end(), sorted_edge(a, b));
+    };
+    EXPECT_TRUE(has(on, beside));
+    EXPECT_NE(has(corner, on), has(corner, beside));
+  }
+}
+
 // A crease along both sides of a strip and around a field at its end becomes one line to a loop.
 TEST(SimplifiedFeatures, GoWhereTheyRunBesideThemselves) {
   CreasesOnAGrid grid;
