@@ -229,8 +229,8 @@ Vec3 arm_of(const std::vector<Index>& chain, std::size_t from, bool onwards, con
   return at(k) - vertices[chain[from]];
 }
 
-// Curves that leave a corner run together as long as they are nearer to each other than this part of the way from it:
-// at less than 9 degrees.
+// Curves that leave a corner run together as long as they are nearer to each other than this part of the way from it,
+// at less than 9 degrees, and than kShared.
 constexpr double kTogether = 0.15;
 
 // Sets curves that leave the same corner apart: where one runs beside another from there on, it ends on that one where
@@ -295,10 +295,11 @@ class Parting {
     const std::vector<Index> chain = chain_from(corner, goes), other = chain_from(corner, stays);
     if (chain.empty() || other.empty()) return false;
     const std::vector<double> at = arc_lengths(chain, vertices_), at_other = arc_lengths(other, vertices_);
+    const auto is_beside = [&](const Vec3& q) {
+      return distance_to(other, q) < std::min(limit_, kTogether * norm(q - vertices_[corner]));
+    };
     std::size_t last = 0;
-    while (last + 1 < chain.size() && distance_to(other, vertices_[chain[last + 1]]) <
-                                          kTogether * norm(vertices_[chain[last + 1]] - vertices_[corner]))
-      ++last;
+    while (last + 1 < chain.size() && is_beside(vertices_[chain[last + 1]])) ++last;
     if (last == 0 || at[last] < limit_) return false;
     const Vec3& p = vertices_[chain[last]];
     std::size_t nearest = 1;
