@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
-#include "core/shortest_ways.h"
 #include "features/curve_network.h"
+#include "features/edge_ways.h"
 #include "spatial/kd_tree.h"
 
 namespace bisector {
@@ -270,30 +270,13 @@ class Selection {
   // From an end of a curve along edges to a vertex of another, or to a far one of its own; empty if there is none near.
   std::vector<Index> way_to_kept(Index from, std::size_t curve, bool from_start) const {
     if (neighbours_.rows() == 0) return {};
-    std::map<Index, Index> before;
-    std::vector<Index> found;
-    const auto links = [&](Index v, const auto& visit) {
-      for (const Index* other = neighbours_.begin(v); other != neighbours_.end(v); ++other)
-        visit(*other, norm(vertices_[*other] - vertices_[v]), kNone);
-    };
-    const auto way_back = [&](Index v) {
-      std::vector<Index> way;
-      for (; v != kNone; v = before.at(v)) way.push_back(v);
-      return reversed_vertices(std::move(way));
-    };
-    shortest_ways(from, kLoopWidths * width_, links, [&](Index v, double length, Index previous, Index) {
-      if (!found.empty() || !before.try_emplace(v, previous).second) return false;
-      if (v == from) return true;
+    return shortest_edge_way(from, kLoopWidths * width_, vertices_, neighbours_, [&](Index v, double length) {
       const auto uses = at_.find(v);
-      if (uses == at_.end() || uses->second.empty()) return true;
-      for (const Where& where : uses->second)
-        if (is_target(where, curve, from_start, length)) {
-          found = way_back(v);
-          break;
-        }
-      return false;
+      if (v == from || uses == at_.end() || uses->second.empty()) return EdgeWay::goes_on;
+      const bool arrives = std::any_of(uses->second.begin(), uses->second.end(),
+                                       [&](const Where& where) { return is_target(where, curve, from_start, length); });
+      return arrives ? EdgeWay::arrives : EdgeWay::ends;
     });
-    return found;
   }
 
   // Not so near to a corner that what is left in between is shorter than the width.

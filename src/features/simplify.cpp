@@ -14,6 +14,7 @@
 #include "core/shortest_ways.h"
 #include "features/candidates.h"
 #include "features/curves.h"
+#include "features/edge_ways.h"
 #include "features/select_creases.h"
 #include "mesh/topology.h"
 
@@ -242,16 +243,19 @@ class Parting {
           const Csr<Index>& neighbours)
       : curves_(curves), vertices_(vertices), limit_(limit), neighbours_(neighbours) {}
 
-  void part() {
+  // Returns whether there were any.
+  bool part() {
     std::map<Index, std::vector<std::size_t>> at;
     for (std::size_t c = 0; c < curves_.size(); ++c)
-      if (!curves_[c].closed && !is_loop(curves_[c]))
+      if (!is_loop(curves_[c]))
         for (const Index v : {curves_[c].vertices.front(), curves_[c].vertices.back()}) at[v].push_back(c);
+    bool any = false;
     for (const auto& [corner, ends] : at)
       for (std::size_t i = 1; i < ends.size(); ++i)
         for (std::size_t j = 0; j < i; ++j)
-          if (!part(corner, ends[i], ends[j])) part(corner, ends[j], ends[i]);
+          if (part(corner, ends[i], ends[j]) || part(corner, ends[j], ends[i])) any = true;
     std::erase_if(curves_, [](const FeatureCurve& curve) { return curve.vertices.size() < 2; });
+    return any;
   }
 
  private:
@@ -265,49 +269,34 @@ class Parting {
 
   double distance_to(const std::vector<Index>& chain, const Vec3& p) const {
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 1; k < chain.size(); ++k) {
-      const Vec3 &a = vertices_[chain[k - 1]], d = vertices_[chain[k]] - a;
-      const double t = norm2(d) > 0 ? std::clamp(dot(p - a, d) / norm2(d), 0.0, 1.0) : 0;
-      least = std::min(least, norm(p - (a + t * d)));
-    }
+    for (std::size_t k = 1; k < chain.size(); ++k)
+      least = std::min(least, norm(p - nearest_on_segment(p, vertices_[chain[k - 1]], vertices_[chain[k]])));
     return least;
-  }
-
-  // Edges of the mesh from one vertex to another; empty if they are longer than `most`.
-  std::vector<Index> way(Index from, Index to, double most) const {
-    std::map<Index, Index> before;
-    const auto links = [&](Index v, const auto& visit) {
-      for (const Index* other = neighbours_.begin(v); other != neighbours_.end(v); ++other)
-        visit(*other, norm(vertices_[*other] - vertices_[v]), kNone);
-    };
-    shortest_ways(from, most, links, [&](Index v, double length, Index previous, Index) {
-      return length <= most && !before.contains(to) && before.try_emplace(v, previous).second;
-    });
-    std::vector<Index> found;
-    if (before.contains(to))
-      for (Index v = to; v != kNone; v = before.at(v)) found.push_back(v);
-    return reversed_vertices(std::move(found));
   }
 
   // Lets `goes` end on `stays`, if it runs beside that one.
   bool part(Index corner, std::size_t goes, std::size_t stays) {
-    if (goes == stays || !is_crease(curves_[goes])) return false;
+    if (!is_crease(curves_[goes])) return false;
     const std::vector<Index> chain = chain_from(corner, goes), other = chain_from(corner, stays);
     if (chain.empty() || other.empty()) return false;
-    const std::vector<double> at = arc_lengths(chain, vertices_), at_other = arc_lengths(other, vertices_);
     const auto is_beside = [&](const Vec3& q) {
       return distance_to(other, q) < std::min(limit_, kTogether * norm(q - vertices_[corner]));
     };
     std::size_t last = 0;
     while (last + 1 < chain.size() && is_beside(vertices_[chain[last + 1]])) ++last;
-    if (last == 0 || at[last] < limit_) return false;
+    if (last == 0) return false;
+    const double beside = arc_lengths(chain, vertices_)[last];
+    if (beside < limit_) return false;
     const Vec3& p = vertices_[chain[last]];
     std::size_t nearest = 1;
     for (std::size_t k = 2; k < other.size(); ++k)
       if (norm2(vertices_[other[k]] - p) < norm2(vertices_[other[nearest]] - p)) nearest = k;
-    if (at_other.back() - at_other[nearest] <= limit_) nearest = other.size() - 1;
-    if (at_other[nearest] < limit_) return false;
-    std::vector<Index> rest = way(other[nearest], chain[last], 2 * kTogether * at[last]);
+    const std::vector<double> at = arc_lengths(other, vertices_);
+    if (at.back() - at[nearest] <= limit_) nearest = other.size() - 1;
+    if (at[nearest] < limit_) return false;
+    std::vector<Index> rest =
+        shortest_edge_way(other[nearest], 2 * kTogether * beside, vertices_, neighbours_,
+                          [&](Index v, double) { return v == chain[last] ? EdgeWay::arrives : EdgeWay::goes_on; });
     if (rest.empty() || std::find(rest.begin(), rest.end(), corner) != rest.end()) return false;
     rest.insert(rest.end(), chain.begin() + static_cast<std::ptrdiff_t>(last) + 1, chain.end());
     curves_[goes].vertices = std::move(rest);
@@ -481,11 +470,11 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
 
   // Ways to the same corner may run along the same edges: more of them than the corner's cell can hold no seeds mend.
   const double limit = kShared * width;
-  left = divided_where_they_meet(without_shared_edges(left, vertices, limit), vertices, limit);
-  if (neighbours.rows() > 0) {
-    Parting(left, vertices, limit, neighbours).part();
+  const auto separate = [&] {
     left = divided_where_they_meet(without_shared_edges(left, vertices, limit), vertices, limit);
-  }
+  };
+  separate();
+  if (neighbours.rows() > 0 && Parting(left, vertices, limit, neighbours).part()) separate();
   join_straight(left, vertices, width);
   divide_where_they_turn_back(left, vertices, width);
   for (const FeatureCurve& curve : left)

@@ -97,7 +97,7 @@ PlyHeader read_ply_header(TextReader& in) {
     } else if (keyword == "property") {
       if (header.elements.empty()) in.fail(std::string("a property comes before all elements; ") + kExportAgain);
       header.elements.back().properties.push_back(read_ply_property(in));
-    } else if (!header.elements.empty()) {  // before these, what else programs tell of themselves
+    } else if (!header.elements.empty()) {  // some programs name themselves above without "comment"
       in.fail("unknown header line '" + printable(keyword) + "'; " + kExportAgain);
     }
   }

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <fmt/format.h>
-#include <algorithm>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -48,8 +48,8 @@ std::int64_t parse_integer(std::string_view text, const Fail& fail) {
   return n;
 }
 
-// What ends the lines of a text: '\n', after a '\r' or not, or '\r' alone, as programs that are older than Mac OS X,
-// or follow these, write it. Of a header with binary data behind it, only the header counts.
+// What ends the lines of a text: '\n', which may follow a '\r', or '\r' alone, as on the Macintosh before OS X. Of a
+// PLY file with binary data only the header is looked at.
 inline char end_of_lines(std::string_view bytes) {
   constexpr std::size_t kEnough = 4096;  // a line ends within so many bytes
   std::string_view head = bytes.substr(0, std::min(kEnough, bytes.find("end_header")));

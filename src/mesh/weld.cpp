@@ -25,8 +25,8 @@ namespace {
 
 using Edge = std::array<Index, 2>;
 
-// Whether two triangles of the same corners go the same way round.
-bool is_even_turn(const Triangle& a, const Triangle& b) {
+// For triangles of the same corners.
+bool goes_the_same_way_round(const Triangle& a, const Triangle& b) {
   for (std::size_t k = 0; k < 3; ++k)
     if (a[0] == b[k]) return a[1] == b[(k + 1) % 3];
   return false;
@@ -110,19 +110,19 @@ struct Work {
       unwanted[keys[k].triangle] = 1;
       if (keys[k].label == keys[k - 1].label) pairs.push_back({keys[k - 1].triangle, keys[k].triangle});
     }
-    if (!pairs.empty()) find_folds(pairs, unwanted);
+    if (!pairs.empty()) mark_folds(pairs, unwanted);
     return remove(unwanted);
   }
 
   // Where a surface is folded onto itself along an edge of a triangle, a triangle of no thickness sticks out of it:
   // there it is closed without either side, and has border and non-manifold edges with one. A sheet that is written for
   // both sides is larger, or hangs together with one side of others.
-  void find_folds(const std::vector<std::array<std::size_t, 2>>& pairs, std::vector<char>& unwanted) const {
+  void mark_folds(const std::vector<std::array<std::size_t, 2>>& pairs, std::vector<char>& unwanted) const {
     const EdgeTable table = edge_table(triangles, points.size());
     std::vector<char> is_double = unwanted;
     for (const auto& [first, second] : pairs) is_double[first] = 1;
     for (const auto& [first, second] : pairs) {
-      if (is_even_turn(triangles[first], triangles[second])) continue;
+      if (goes_the_same_way_round(triangles[first], triangles[second])) continue;
       std::size_t folded = 0, closed = 0;
       for (std::size_t k = 0; k < 3; ++k) {
         const Edge edge = sorted_edge(triangles[first][k], triangles[first][(k + 1) % 3]);

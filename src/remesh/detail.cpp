@@ -201,7 +201,7 @@ class Planner {
     std::vector<double> sums((mesh_.triangles.size() + kChunk - 1) / kChunk, 0);
     // All chunks end once they have too many together: whether they do does not depend on who is first.
     constexpr double kParts = 1024;  // of a vertex, counted down to
-    const double enough = std::min(1e18, kParts * (most + 1));
+    const double enough = kParts * (most + 1);
     std::atomic<std::uint64_t> parts{0};
     parallel_chunks(mesh_.triangles.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
       Counter counter{field, shortest, most};

@@ -52,6 +52,33 @@ TEST(Detail, MoreVerticesResolveMore) {
   EXPECT_EQ(curves, sharp_graph(mesh).curves.size());
 }
 
+// Each triangle is divided into needles from one edge to the corner opposite, which leaves all edges as they are.
+TriangleMesh in_needles(const TriangleMesh& mesh, int layers) {
+  TriangleMesh needles;
+  needles.vertices = mesh.vertices;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 middle = 0.5 * (mesh.vertices[a] + mesh.vertices[b]);
+    Index last = kNone;
+    for (int k = 1; k < layers; ++k) {
+      const auto next = static_cast<Index>(needles.vertices.size());
+      needles.vertices.push_back(middle + (static_cast<double>(k) / layers) * (mesh.vertices[c] - middle));
+      if (last == kNone) needles.triangles.push_back({a, b, next});
+      else needles.triangles.insert(needles.triangles.end(), {{a, last, next}, {last, b, next}});
+      last = next;
+    }
+    needles.triangles.insert(needles.triangles.end(), {{a, last, c}, {last, b, c}});
+  }
+  return needles;
+}
+
+TEST(Detail, TakesAsManyVerticesInNeedles) {
+  const TriangleMesh mesh = chamfered(0.05);
+  const DetailPlan plain = plan_for(mesh, 400), needles = plan_for(in_needles(mesh, 400), 400);
+  ASSERT_FALSE(plain.points.empty());
+  EXPECT_NEAR(static_cast<double>(needles.result.vertices), static_cast<double>(plain.result.vertices),
+              0.03 * static_cast<double>(plain.result.vertices));
+}
+
 TEST(Detail, LengthsAreThoseOfTheGaps) {
   const double width = 0.2;
   const TriangleMesh mesh = chamfered(width);
