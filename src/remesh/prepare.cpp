@@ -241,7 +241,12 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
     sizing_.attribute = separation.values(std::move(values));
   }
   sizing_.sharp = features_.edges;
-  if (given_seeds_ == 0 && options.detail != DetailMode::off) plan(options);
+  if (given_seeds_ > 0 || (branches && options.detail == DetailMode::off)) return;
+  std::vector<double> lengths = lay_down_plain();
+  if (!branches) apart_ = SetApart(mesh_, lengths, unbounded_->sizing.vertices);
+  if (options.detail == DetailMode::off) return;
+  add_wedges(lengths);
+  plan(lengths, options.detail == DetailMode::all);
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
@@ -315,24 +320,29 @@ std::vector<double> Preparation::lay_down_plain() {
   return lengths;
 }
 
-void Preparation::plan(const RemeshOptions& options) {
-  std::vector<double> lengths = lay_down_plain();
+// `lengths` are those of lay_down_plain(), before and after.
+void Preparation::add_wedges(std::vector<double>& lengths) {
   const std::size_t vertices = mesh_.vertices.size();
   const std::vector<EdgePoint> added = link_wedges(mesh_, features_, lengths);
-  if (!added.empty()) {
-    features_ = split_features(features_, splits_of(added, vertices));
-    sizing_.sharp = features_.edges;
-    std::vector<double>& values = sizing_.attribute;
-    for (const auto& [a, b, t] : added)
-      if (!values.empty()) values.push_back(values[a] + t * (values[b] - values[a]));
-    lengths = lay_down_plain();
-  }
+  if (added.empty()) return;
+  features_ = split_features(features_, splits_of(added, vertices));
+  sizing_.sharp = features_.edges;
+  std::vector<double>& values = sizing_.attribute;
+  for (const auto& [a, b, t] : added)
+    if (!values.empty()) values.push_back(values[a] + t * (values[b] - values[a]));
+  lengths = lay_down_plain();
+}
+
+// `lengths` are those of lay_down_plain(). What lies between components that are set apart is no detail.
+void Preparation::plan(const std::vector<double>& lengths, bool all) {
   const Sizing& plain = unbounded_->sizing;
-  DetailPlan plan = plan_details(mesh_, features_, lengths, plain.vertices, options.detail == DetailMode::all);
+  std::optional<TriangleMesh> moved;
+  if (!apart_.empty()) apart_.move(moved.emplace(mesh_));
+  DetailPlan plan = plan_details(moved ? *moved : mesh_, features_, lengths, plain.vertices, all);
   features_ = std::move(plan.features);
   add_corners(features_, keep_vertices_);
   detail_ = plan.result;
-  if (options.detail == DetailMode::all && detail_.vertices > plain.vertices) {
+  if (all && detail_.vertices > plain.vertices) {
     target_ = {detail_.vertices, 0};
     unbounded_.reset();
   }
@@ -346,7 +356,9 @@ void SizeBounds::add(const SizeBounds& others) {
 
 void Preparation::bound(const SizeBounds& bounds) {
   if (!bounds.points.empty()) unbounded_.reset();
+  const std::size_t before = bounds_.points.size();
   bounds_.add(bounds);
+  for (std::size_t k = before; k < bounds_.points.size(); ++k) bounds_.points[k] = apart_.back(bounds_.points[k]);
 }
 
 void Preparation::ask_for(std::size_t vertices) {
@@ -373,6 +385,8 @@ PreparedInput Preparation::lay_down() {
   prepared.mesh = std::move(sized.mesh);
   prepared.mesh.feature_edges.clear();
   prepared.mesh.labels.clear();
+  for (const Index v : prepared.features.corners) prepared.corners.push_back(prepared.mesh.vertices[v]);
+  apart_.move(prepared.mesh);
   if (!mesh_.labels.empty())
     for (Index t : sized.parent) prepared.mesh.labels.push_back(mesh_.labels[t]);
   prepared.density = std::move(sized.sizing.density);

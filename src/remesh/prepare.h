@@ -7,17 +7,19 @@
 
 #include "remesh/kept.h"
 #include "remesh/remesh.h"
+#include "remesh/set_apart.h"
 #include "remesh/sizing.h"
 
 namespace bisector {
 
 struct PreparedInput {
-  TriangleMesh mesh;            // the input's surface; edges are bisected where the density asks for it
+  TriangleMesh mesh;            // the input's surface, set apart; edges are bisected where the density asks for it
   FeatureGraph features;        // of `mesh`
   std::vector<double> density;  // for Surface
   double unit_edge = 0;         // edge length where the density is 1
   std::size_t vertices = 0;     // wanted of the result
   KeptFeatures kept;
+  std::vector<Vec3> corners;  // of the features, before they were set apart
   DetailResult detail;
   bool noisy = false;  // normals are noise, and Energy::automatic means restricted
 };
@@ -52,10 +54,10 @@ struct OrderedInput {
 class Preparation {
  public:
   // Welds and orients the input, finds its features and plans their details. Where it branches on purpose, parts that
-  // touch are not separated. Throws Error as remesh does.
+  // touch are neither separated nor set apart. Throws Error as remesh does.
   Preparation(OrderedInput input, const Context& context, bool branches = false);
 
-  // Beside the bounds that there are already.
+  // Beside the bounds that there are already. Points may be those of what was set apart.
   void bound(const SizeBounds& bounds);
   // So many vertices, whatever was asked for.
   void ask_for(std::size_t vertices);
@@ -64,6 +66,7 @@ class Preparation {
   const WeldResult& welded() const { return welded_; }
   // The input, welded and oriented.
   const TriangleMesh& mesh() const { return mesh_; }
+  const SetApart& apart() const { return apart_; }
 
  private:
   void find_noise(FeatureOptions& features);
@@ -71,7 +74,8 @@ class Preparation {
   void keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
             const std::vector<Index>& original);
   std::vector<double> lay_down_plain();
-  void plan(const RemeshOptions& options);
+  void add_wedges(std::vector<double>& lengths);
+  void plan(const std::vector<double>& lengths, bool all);
   KeptFeatures kept_features(const FeatureGraph& features) const;
 
   WeldResult welded_;  // without its mesh
@@ -84,6 +88,7 @@ class Preparation {
   bool noisy_ = false;
   std::optional<SizedMesh> unbounded_;  // laid down already, and still good
   SizeBounds bounds_;
+  SetApart apart_;
   std::vector<Index> keep_vertices_;              // of mesh_, ascending
   std::vector<Index> kept_as_;                    // of each of mesh_'s vertices before its details, the input's
   std::vector<std::array<Index, 2>> keep_edges_;  // of mesh_, sorted, lower vertex first

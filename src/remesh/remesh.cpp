@@ -801,6 +801,7 @@ Runs::Run Runs::make_run(bool last) {
     }
     if (placing_ == 0) placing_ = pipeline.spent().totals.work;
     RemeshResult result = pipeline.finish();
+    preparation_->apart().move_back(prepared.corners, result);
     if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;

@@ -44,21 +44,23 @@ constexpr double kApart = 2;
 // Cosine of the angle at which a surface faces away.
 constexpr double kTurned = -0.2;
 
-// A point to insert, and the square of its distance to the nearest seed.
+// A point to insert, and the square of its distance to the nearest seed. Where its cell would reach a feature curve,
+// the other point may be better.
 struct Candidate {
   Vec3 point;
   double squared;
+  Vec3 other;
 };
 
 // Nearest and farthest points of some part of a cell from its seed.
 struct Extremes {
-  Candidate nearest{{}, kInfinity}, farthest{{}, -1};
+  Candidate nearest{{}, kInfinity, {}}, farthest{{}, -1, {}};
 
   void near(const Vec3& p, const Vec3& seed) {
-    if (const double d = norm2(p - seed); d < nearest.squared) nearest = {p, d};
+    if (const double d = norm2(p - seed); d < nearest.squared) nearest = {p, d, p};
   }
   void far(const Vec3& p, const Vec3& seed) {
-    if (const double d = norm2(p - seed); d > farthest.squared) farthest = {p, d};
+    if (const double d = norm2(p - seed); d > farthest.squared) farthest = {p, d, p};
   }
 };
 
@@ -70,7 +72,7 @@ class Repair {
   Repair(const Surface& surface, const RestrictedPolygons& polygons, const std::vector<Vec3>& seeds, bool far)
       : surface_(surface), polygons_(polygons), seeds_(seeds), far_(far) {}
 
-  std::vector<Vec3> points(const BallReport& report) {
+  std::vector<Candidate> points(const BallReport& report) {
     for (const BallReport::Cell& c : report.cells) split_parts(c);
     for (const BallReport::Cell& c : report.cells) open_up(c);
     for (const BallReport::Edge& e : report.edges) cut(e);
@@ -123,7 +125,10 @@ class Repair {
   void add(const Candidate& c) {
     if (c.squared > 0 && c.squared < kInfinity) candidates_.push_back(c);
   }
-  void add(const Extremes& x) { add(far_ ? x.farthest : x.nearest); }
+  void add(const Extremes& x) {
+    const Candidate &chosen = far_ ? x.farthest : x.nearest, &other = far_ ? x.nearest : x.farthest;
+    add(Candidate{chosen.point, chosen.squared, other.point});
+  }
 
   // All of the groups but that nearest to the seed.
   void add_others(const std::vector<Extremes>& groups) {
@@ -187,12 +192,12 @@ class Repair {
   }
 
   // No two nearer to each other than to the seeds there are, as if each were inserted before the next is looked for.
-  std::vector<Vec3> thinned() const {
-    std::vector<Vec3> kept;
+  std::vector<Candidate> thinned() const {
+    std::vector<Candidate> kept;
     for (const Candidate& c : candidates_)
       if (std::all_of(kept.begin(), kept.end(),
-                      [&](const Vec3& p) { return norm2(p - c.point) >= kApart * c.squared; }))
-        kept.push_back(c.point);
+                      [&](const Candidate& k) { return norm2(k.point - c.point) >= kApart * c.squared; }))
+        kept.push_back(c);
     return kept;
   }
 
@@ -304,21 +309,35 @@ class Control {
   bool too_few_seeds() const { return kTooFew * outcome_.ball.cells.size() > run_.seeds.size(); }
 
   bool insert(bool far) {
-    std::vector<Vec3> points = Repair(run_.surface(), *polygons_, vertices_, far).points(outcome_.ball);
+    const std::vector<Candidate> points = Repair(run_.surface(), *polygons_, vertices_, far).points(outcome_.ball);
     if (points.empty() && cuts_.empty()) return false;
     if (run_.seeds.size() + points.size() + cuts_.size() > most_) return false;
     const std::size_t before = run_.seeds.size();
-    run_.seeds.add(points);
+    for (const Candidate& c : points) run_.seeds.add(c.point);
     for (const Cut& cut : cuts_) {
       run_.seeds.add(Vec3{});
       put_on_curve(run_.seeds.size() - 1, cut);
     }
-    if (run_.has_features())
-      for (const Cut& cut : find_cuts())
-        if (cut.cell >= before) put_on_curve(cut.cell, cut);
+    if (run_.has_features()) keep_off_curves(before, points);
     outcome_.inserted += run_.seeds.size() - before;
     ++outcome_.rounds;
     return true;
+  }
+
+  // Seeds from `first` on are new, at these points. Those whose cells cut a curve go to their other points, or, if they
+  // do so there as well, on the curve. Else the edges of two curves at the tip of a thin plate would be halved again
+  // and again, for the middle between their first seeds is nearer to the curves than to these.
+  void keep_off_curves(std::size_t first, const std::vector<Candidate>& points) {
+    const auto cuts_of_new = [&] {
+      std::vector<Cut> cuts = find_cuts();
+      std::erase_if(cuts, [&](const Cut& cut) { return cut.cell < first; });
+      return cuts;
+    };
+    const std::vector<Cut> cuts = cuts_of_new();
+    if (cuts.empty()) return;
+    const std::span<Vec3> positions = run_.seeds.edit_positions();
+    for (const Cut& cut : cuts) positions[cut.cell] = points[cut.cell - first].other;
+    for (const Cut& cut : cuts_of_new()) put_on_curve(cut.cell, cut);
   }
 
   void put_on_curve(std::size_t seed, const Cut& cut) {

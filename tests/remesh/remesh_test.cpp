@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -179,6 +180,36 @@ TEST(RemeshThin, APlateKeepsItsTwoSides) {
     EXPECT_EQ(result.topology.euler, 2);
     EXPECT_TRUE(result.topology.manifold && result.topology.closed);
     EXPECT_EQ(result.untiled, 0u);
+  }
+}
+
+// The sides of a plate have the first edges of both curves at a corner in common: a triangle of these, and the third
+// edge, would be the same on both. One side gets a vertex there, and no curve is halved ever again.
+TEST(RemeshThin, AnAngularPlateHasGoodTrianglesAtItsCorners) {
+  const std::vector<std::array<double, 2>> outline{{0, 0},     {3, 0},     {3, 1},     {1.7, 1}, {1.7, 2.1},
+                                                   {1.1, 2.1}, {1.1, 1.4}, {0.4, 1.6}, {0.4, 1}, {0, 1}};
+  const std::vector<std::array<Index, 3>> faces{{0, 1, 2}, {0, 2, 3}, {0, 3, 8}, {0, 8, 9},
+                                                {3, 4, 6}, {4, 5, 6}, {3, 6, 8}, {6, 7, 8}};
+  const auto count = static_cast<Index>(outline.size());
+  TriangleMesh plate;
+  for (const double z : {0.0, 0.002})
+    for (const auto& [x, y] : outline) plate.vertices.push_back({x, y, z});
+  for (const auto& [a, b, c] : faces) {
+    plate.triangles.push_back({a, c, b});
+    plate.triangles.push_back({count + a, count + b, count + c});
+  }
+  for (Index v = 0; v < count; ++v) {
+    const Index next = (v + 1) % count;
+    plate.triangles.push_back({v, next, count + next});
+    plate.triangles.push_back({v, count + next, count + v});
+  }
+  ASSERT_TRUE(topology_of(plate).manifold && topology_of(plate).closed && topology_of(plate).oriented);
+  for (const std::size_t vertices : {150, 300}) {
+    const RemeshResult result = remesh(plate, options_for(vertices));
+    EXPECT_TRUE(result.topology_matches);
+    EXPECT_EQ(result.features.broken, 0u);
+    EXPECT_LE(result.mesh.vertices.size(), vertices + vertices / 50);
+    EXPECT_GE(measure_quality(result.mesh).theta_min, 30) << vertices;
   }
 }
 
