@@ -23,7 +23,8 @@ namespace {
 
 // Edges that a closed curve has at least, so that it looks round.
 constexpr double kLoopEdges = 4;
-// What two curves may share at a corner, in widths: edges are at least twice as long.
+// What two curves may share at a corner, and how near to each other they may be, in widths: edges are at least twice as
+// long.
 constexpr double kShared = 0.25;
 // Two curves at a corner where no other ends are one if they turn by less than this, in radians.
 constexpr double kStraight = 50 * kRadiansPerDegree;
@@ -455,8 +456,11 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   const CornerGraph::Forest forest = CornerGraph(curves, weights).merge(width);
   std::vector<Candidate> candidates =
       led_to_representatives(curves, graph.curves.size(), vertices, weights, forest, width, result);
-  const SelectedCreases selected = select_creases(std::move(candidates), vertices, width, neighbours);
-  result.merged += selected.gone;
+  SelectedCreases apart = select_creases(std::move(candidates), vertices, width, neighbours);
+  // What runs beside others for less than two widths is still there, however near it is; and the nearer it is, the
+  // shorter is what goes.
+  const SelectedCreases selected = select_creases(std::move(apart.curves), vertices, kShared * width, neighbours);
+  result.merged += apart.gone + selected.gone;
   std::vector<FeatureCurve> left;
   for (const Candidate& candidate : selected.curves) left.push_back(candidate.curve);
   // Corners on no curve, such as the tips of cones.
@@ -465,7 +469,7 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
     if (!curves.closed(c))
       for (const Index end : curves.ends(c)) on_curve[end] = 1;
   for (Index k = 0; k < graph.corners.size(); ++k)
-    if (!on_curve[k] && !selected.points.is_near(vertices[graph.corners[k]]))
+    if (!on_curve[k] && !apart.points.is_near(vertices[graph.corners[k]]))
       result.graph.corners.push_back(graph.corners[k]);
 
   // Ways to the same corner may run along the same edges: more of them than the corner's cell can hold no seeds mend.

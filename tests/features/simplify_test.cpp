@@ -442,6 +442,19 @@ TEST(SimplifiedFeatures, GoWhereTheyRunBesideOthers) {
   }
 }
 
+// The nearer two creases are, the shorter are the stretches that go: less than a width where they are a fifth apart.
+TEST(SimplifiedFeatures, GoForShorterStretchesWhereTheyAreNearer) {
+  for (const int apart : {2, 4}) {
+    CreasesOnAGrid grid;
+    grid.crease({{0, 0}, {80, 0}}, 10);
+    grid.crease({{0, 0}, {0, apart}, {7, apart}, {7, 40}}, 1);
+    const SimplifiedFeatures left = grid.at_width(1);
+    const bool stays = apart == 4;
+    EXPECT_NEAR(grid.length(left.graph), 8 + 0.1 * (40 - apart) + (stays ? 0.7 + 0.1 * apart : 0), 0.35);
+    EXPECT_EQ(count_loose_ends(left, {}), stays ? 2 : 3);
+  }
+}
+
 // Two creases leave a corner at less than two degrees for less than what goes by itself: one ends where they part.
 TEST(SimplifiedFeatures, PartWhereTheyNoLongerRunTogether) {
   for (const bool swapped : {false, true}) {
