@@ -27,6 +27,10 @@ constexpr double kLeastGain = 0.05;  // of what is missing of the angles
 // many.
 constexpr std::size_t kMostSearches = 500, kVerticesPerSearch = 200;
 constexpr long long kDrift = 200;
+// Rounds over the pairs of triangles that cross, one pair at most for so many vertices, and the best changes of a part
+// that are looked at for whether they cross.
+constexpr int kUncrossingRounds = 4;
+constexpr std::size_t kVerticesPerCrossing = 20, kMostUncrossed = 64;
 
 std::array<Index, 2> key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 
@@ -72,10 +76,13 @@ class Mender {
   bool may_grow(long long by) const;
   // What is near a part that is to change, with that as it is or as `changed`.
   TriangleMesh surroundings(const Part& part, const std::vector<Index>& near, const ImprovePatch* changed) const;
-  // Whether topology is as before, and no more triangles intersect.
-  bool fits(const Part& part, const ImprovePatch& changed) const;
+  // Whether topology is as before, and no more triangles intersect, or, if so wanted, fewer.
+  bool fits(const Part& part, const ImprovePatch& changed, bool fewer = false) const;
   std::vector<Part> choose_parts();
   void mend_angles(const Context& context);
+  std::vector<std::array<Index, 2>> find_crossing_pairs() const;
+  std::optional<ImprovePatch> search_uncrossed(const Part& part) const;
+  void mend_crossings(const Context& context);
   bool has_edge(Index a, Index b) const;
   std::vector<Index> vertices_along(Index curve) const;
   bool recover(Index curve);
@@ -256,7 +263,7 @@ TriangleMesh Mender::surroundings(const Part& part, const std::vector<Index>& ne
   return mesh;
 }
 
-bool Mender::fits(const Part& part, const ImprovePatch& changed) const {
+bool Mender::fits(const Part& part, const ImprovePatch& changed, bool fewer) const {
   std::vector<Vec3> points;
   for (const PatchVertex& v : changed.vertices()) points.push_back(v.x);
   for (const Index v : part.vertices) points.push_back(vertices_[v].x);
@@ -278,7 +285,9 @@ bool Mender::fits(const Part& part, const ImprovePatch& changed) const {
       is.non_manifold_vertices != was.non_manifold_vertices)
     return false;
   const std::size_t crossings = count_self_intersections(after);
-  return crossings == 0 || crossings <= count_self_intersections(before);
+  if (crossings == 0 && !fewer) return true;
+  const std::size_t more_than = count_self_intersections(before);
+  return fewer ? crossings < more_than : crossings <= more_than;
 }
 
 void Mender::take(const Part& part, const ImprovePatch& changed) {
@@ -448,10 +457,71 @@ void Mender::mend_angles(const Context& context) {
   }
 }
 
+std::vector<std::array<Index, 2>> Mender::find_crossing_pairs() const {
+  TriangleMesh mesh;
+  std::vector<Index> number;
+  for (const PatchVertex& v : vertices_) mesh.vertices.push_back(v.x);
+  for (Index t = 0; t < triangles_.size(); ++t) {
+    if (!alive_[t]) continue;
+    mesh.triangles.push_back(triangles_[t]);
+    number.push_back(t);
+  }
+  std::vector<std::array<Index, 2>> pairs = find_self_intersections(mesh);
+  for (std::array<Index, 2>& pair : pairs) pair = {number[pair[0]], number[pair[1]]};
+  return pairs;
+}
+
+// With as good angles, and fewer pairs of triangles that cross.
+std::optional<ImprovePatch> Mender::search_uncrossed(const Part& part) const {
+  const ImprovePatch::Lack before = part.patch.lack(kBadAngle);
+  const auto is_good = [&](const ImprovePatch& patch) {
+    const ImprovePatch::Lack lack = patch.lack(kBadAngle);
+    return may_grow(growth(patch)) && !patch.is_folded() && lack.most <= before.most && lack.squares <= before.squares;
+  };
+  std::vector<std::pair<double, ImprovePatch>> found;
+  search_changes(
+      part.patch, {kSteps, kWidth, kSweeps, average_},
+      [&](const ImprovePatch& patch) { return patch.shape_cost_sum(average_, kIrregular * average_); },
+      [&](const ImprovePatch& patch, double cost, bool) {
+        if (is_good(patch)) found.push_back({cost, patch});
+      });
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  if (found.size() > kMostUncrossed) found.erase(found.begin() + kMostUncrossed, found.end());
+  for (auto& [cost, patch] : found) {
+    if (fits(part, patch, true)) return std::move(patch);
+    patch.relax_all(kMoreSweeps);
+    if (is_good(patch) && fits(part, patch, true)) return std::move(patch);
+  }
+  return std::nullopt;
+}
+
+// Two sheets that are nearer to each other than triangles are off them cross in few places: other triangles there do
+// not.
+void Mender::mend_crossings(const Context& context) {
+  for (int round = 0; round < kUncrossingRounds; ++round) {
+    const std::vector<std::array<Index, 2>> pairs = find_crossing_pairs();
+    if (pairs.empty() || pairs.size() > count_ / kVerticesPerCrossing) return;
+    context.report({"mending crossings", round + 1, 0, 0, 0, 1});
+    bool any = false;
+    for (const std::array<Index, 2>& pair : pairs)
+      for (const Index t : pair) {
+        context.check();
+        if (!alive_[pair[0]] || !alive_[pair[1]]) break;
+        const Part part = part_around({triangles_[t].begin(), triangles_[t].end()});
+        if (const std::optional<ImprovePatch> changed = search_uncrossed(part)) {
+          take(part, *changed);
+          any = true;
+        }
+      }
+    if (!any) return;
+  }
+}
+
 MendReport Mender::run(const Context& context) {
   report_.bad = find_bad().size();
   std::erase_if(result_.broken, [&](Index curve) { return recover(curve); });
   mend_angles(context);
+  if (result_.crosses) mend_crossings(context);
   if (report_.made > 0) write_back();
   return report_;
 }
@@ -460,7 +530,7 @@ MendReport Mender::run(const Context& context) {
 
 MendReport mend_angles(const CellMap& map, const FeatureCurves& curves, const FeatureTrace& trace,
                        const ImproveOptions& options, MendMesh& result, const Context& context) {
-  if (result.broken.empty() && find_slivers(result.mesh).bounds.points.empty()) return {};
+  if (result.broken.empty() && !result.crosses && find_slivers(result.mesh).bounds.points.empty()) return {};
   return Mender(map, curves, trace, options, result).run(context);
 }
 

@@ -291,6 +291,8 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     if (may_localise) run_.localise(true);
     if (may_localise && run_.strays() == 0) run_.localise(false);
     if (many || run_.localises()) {
+      // What is around both sides of a bent wall is nearer to the inner one, so too many seeds are there.
+      follow_density(run_);
       step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
       optimise(run_, step_);
     }
@@ -417,11 +419,15 @@ void Pipeline::analyse_result() {
   result_.topology_matches = same_topology(result_.topology, input_topology_);
 }
 
+// Broken curves have edges that no triangle has, and cells that were divided leave others without one.
 void Pipeline::extract_features(const std::vector<Index>& vertex_of) {
   TriangleMesh& mesh = result_.mesh;
+  if (features_.edges.empty()) return;
+  const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
   for (const auto& [a, b] : features_.edges) {
     if (vertex_of[a] == kNone || vertex_of[b] == kNone) continue;
-    mesh.feature_edges.push_back({std::min(vertex_of[a], vertex_of[b]), std::max(vertex_of[a], vertex_of[b])});
+    const std::array<Index, 2> edge = sorted_edge(vertex_of[a], vertex_of[b]);
+    if (std::binary_search(table.edges.begin(), table.edges.end(), edge)) mesh.feature_edges.push_back(edge);
   }
   std::sort(mesh.feature_edges.begin(), mesh.feature_edges.end());
 }
@@ -432,9 +438,10 @@ double Pipeline::mend(const Diagram& diagram, std::vector<Index>& vertex_of) {
   const Csr<Index> rings = vertex_neighbours(diagram.dual.triangles, run_.seeds.size());
   const CellMap map(surface_, run_.seeds.positions(), diagram.moments.triangles, rings);
   MendMesh mended{
-      result_.mesh, result_.places, std::vector<Index>(result_.mesh.vertices.size(), kNone), features_.broken, {}};
+      result_.mesh, result_.places, std::vector<Index>(result_.mesh.vertices.size(), kNone), features_.broken};
   for (Index i = 0; i < run_.seeds.size(); ++i)
     if (vertex_of[i] != kNone) mended.owners[vertex_of[i]] = i;
+  mended.crosses = count_self_intersections(result_.mesh) > 0 && count_self_intersections(surface_.mesh) == 0;
   const ImproveOptions options{plan_.min_angle, kMaxAngle, wanted_};
   result_.mended = mend_angles(map, curves_, trace_, options, mended, run_.context());
   if (!mended.number.empty())

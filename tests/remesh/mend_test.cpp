@@ -62,7 +62,8 @@ struct Remeshed {
     const CellMap map(surface, run.seeds.positions(), diagram.moments.triangles, rings);
     std::vector<Index> owners(mesh.vertices.size());
     for (Index v = 0; v < owners.size(); ++v) owners[v] = v;
-    MendMesh result{mesh, places, owners, broken, {}};
+    MendMesh result{mesh, places, owners, broken};
+    result.crosses = count_self_intersections(mesh) > 0;
     const MendReport report = mend_angles(map, curves, trace, {40, 91, run.seeds.size()}, result, context);
     number = result.number;
     return report;
@@ -122,6 +123,26 @@ TEST(Mend, LeavesGoodMeshesAlone) {
   EXPECT_EQ(good.mesh.triangles, before.triangles);
   EXPECT_EQ(good.mesh.vertices, before.vertices);
   EXPECT_TRUE(good.number.empty());
+}
+
+// Vertices of the outer one of two spheres that went through the inner one.
+TEST(Mend, TakesTrianglesThatDoNotCross) {
+  TriangleMesh inner = icosphere(4);
+  for (Vec3& p : inner.vertices) p = 0.9 * p;
+  Remeshed crossing(joined(icosphere(4), inner), 1600, 60);
+  ASSERT_GT(smallest_free_angle(crossing.mesh), 30);
+  ASSERT_EQ(count_self_intersections(crossing.mesh), 0u);
+  int pushed = 0;
+  for (std::size_t v = 0; v < crossing.mesh.vertices.size() && pushed < 3; v += 7)
+    if (Vec3& p = crossing.mesh.vertices[v]; norm(p) > 0.95) {
+      p = 0.89 * p;
+      ++pushed;
+    }
+  ASSERT_GT(count_self_intersections(crossing.mesh), 0u);
+  const MendReport report = crossing.mend();
+  EXPECT_GT(report.made, 0u);
+  EXPECT_GE(smallest_free_angle(crossing.mesh), 30);
+  EXPECT_EQ(count_self_intersections(crossing.mesh), 0u);
 }
 
 TEST(Mend, MakesBadAnglesGood) {

@@ -229,6 +229,29 @@ TEST(RemeshThin, AShellHasGoodTrianglesOnBothSides) {
   for (const Vec3& p : result.mesh.vertices) EXPECT_TRUE(norm(p) > 0.99 || norm(p) < 0.981) << norm(p);
 }
 
+// The middle of a cell of both sides of a pipe is nearer to the inner side, where too many seeds come to lie so.
+TEST(RemeshThin, APipeHasAsGoodTrianglesOutsideAsInside) {
+  constexpr Index kCount = 96;
+  TriangleMesh pipe;
+  for (const auto& [radius, z] : {std::array{1.0, 0.0}, {1.0, 1.0}, {0.99, 1.0}, {0.99, 0.0}})
+    for (Index k = 0; k < kCount; ++k) {
+      const double angle = 2 * std::numbers::pi * k / kCount;
+      pipe.vertices.push_back({radius * std::cos(angle), radius * std::sin(angle), z});
+    }
+  for (Index side = 0; side < 4; ++side)
+    for (Index k = 0; k < kCount; ++k) {
+      const Index a = side * kCount + k, b = side * kCount + (k + 1) % kCount, up = (side + 1) % 4 * kCount;
+      pipe.triangles.push_back({a, b, up + (k + 1) % kCount});
+      pipe.triangles.push_back({a, up + (k + 1) % kCount, up + k});
+    }
+  for (const std::size_t vertices : {250, 300}) {
+    const RemeshResult result = remesh(pipe, options_for(vertices));
+    EXPECT_TRUE(result.topology_matches);
+    EXPECT_LE(result.mesh.vertices.size(), vertices + vertices / 100);
+    EXPECT_GE(measure_quality(result.mesh).theta_min, 30) << vertices;
+  }
+}
+
 // Whatever the dual is, it is reported for what it is.
 TEST(RemeshHard, NonManifoldInputRunsAndReports) {
   const std::vector<Case> hard{{"pages", pages(), 300, false},
