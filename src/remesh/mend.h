@@ -25,8 +25,9 @@ struct MendMesh {
 // are made in the mesh itself. A change stays if less is missing of the angles around it, and if it makes no triangles
 // intersect and keeps the topology; vertices stay on the surface, and curves chains of edges. New vertices come last,
 // and those that are removed leave no gap. Where the mesh crosses itself and should not, changes around the pairs of
-// triangles stay that make them fewer and no angle worse, unless there is more than one for twenty vertices. Labels are those of the surface's triangles in the middle. There is a bound
-// on the searches, which begin with the worst triangles. Throws Cancelled.
+// triangles stay that make them fewer and no angle worse, unless there is more than one for twenty vertices. Labels are
+// those of the surface's triangles in the middle. There is a bound on the searches, which begin with the worst
+// triangles. Throws Cancelled.
 MendReport mend_angles(const CellMap& map, const FeatureCurves& curves, const FeatureTrace& trace,
                        const ImproveOptions& options, MendMesh& result, const Context& context);
 

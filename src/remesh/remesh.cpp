@@ -437,8 +437,8 @@ double Pipeline::mend(const Diagram& diagram, std::vector<Index>& vertex_of) {
   const Stopwatch watch;
   const Csr<Index> rings = vertex_neighbours(diagram.dual.triangles, run_.seeds.size());
   const CellMap map(surface_, run_.seeds.positions(), diagram.moments.triangles, rings);
-  MendMesh mended{
-      result_.mesh, result_.places, std::vector<Index>(result_.mesh.vertices.size(), kNone), features_.broken};
+  MendMesh mended{result_.mesh, result_.places, std::vector<Index>(result_.mesh.vertices.size(), kNone),
+                  features_.broken};
   for (Index i = 0; i < run_.seeds.size(); ++i)
     if (vertex_of[i] != kNone) mended.owners[vertex_of[i]] = i;
   mended.crosses = count_self_intersections(result_.mesh) > 0 && count_self_intersections(surface_.mesh) == 0;
