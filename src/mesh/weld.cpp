@@ -23,6 +23,9 @@ namespace bisector {
 
 namespace {
 
+// Of the diagonal: files of six digits round coordinates so.
+constexpr double kRounding = 1e-5;
+
 using Edge = std::array<Index, 2>;
 
 // For triangles of the same corners.
@@ -116,13 +119,19 @@ struct Work {
 
   // Where a surface is folded onto itself along an edge of a triangle, a triangle of no thickness sticks out of it:
   // there it is closed without either side, and has border and non-manifold edges with one. A sheet that is written for
-  // both sides is larger, or hangs together with one side of others.
+  // both sides is larger, or hangs together with one side of others. What is lower than coordinates are rounded is no
+  // sheet anywhere.
   void mark_folds(const std::vector<std::array<std::size_t, 2>>& pairs, std::vector<char>& unwanted) const {
     const EdgeTable table = edge_table(triangles, points.size());
     std::vector<char> is_double = unwanted;
     for (const auto& [first, second] : pairs) is_double[first] = 1;
+    const double rounding = kRounding * bounding_box(points, triangles).diagonal();
     for (const auto& [first, second] : pairs) {
       if (goes_the_same_way_round(triangles[first], triangles[second])) continue;
+      if (height_of(triangles[first]) < rounding) {
+        unwanted[first] = 1;
+        continue;
+      }
       std::size_t folded = 0, closed = 0;
       for (std::size_t k = 0; k < 3; ++k) {
         const Edge edge = sorted_edge(triangles[first][k], triangles[first][(k + 1) % 3]);
@@ -135,6 +144,12 @@ struct Work {
       }
       if (folded > 0 && closed > 0 && folded + closed == 3) unwanted[first] = 1;
     }
+  }
+
+  double height_of(const Triangle& t) const {
+    double longest = 0;
+    for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, norm(points[t[(k + 1) % 3]] - points[t[k]]));
+    return longest > 0 ? norm(twice_area_normal(points[t[0]], points[t[1]], points[t[2]])) / longest : 0;
   }
 
   void rename(const std::vector<Index>& name) {

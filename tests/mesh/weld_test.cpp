@@ -212,6 +212,18 @@ TEST(Weld, RemovesWhatIsFoldedOntoItself) {
   EXPECT_EQ(result.mesh.feature_edges, (std::vector<std::array<Index, 2>>{{std::min(a, b), std::max(a, b)}}));
 }
 
+// Of two pairs, where rounding has put a vertex all but on the edge that it was beside.
+TEST(Weld, RemovesFoldsThatAreLowerThanRounding) {
+  TriangleMesh mesh = icosphere(1);
+  const std::vector<Triangle> sphere = mesh.triangles;
+  const Index a = sphere[7][0], b = sphere[7][1], tip = static_cast<Index>(mesh.vertices.size());
+  const auto along = [&](double t) { return mesh.vertices[a] + t * (mesh.vertices[b] - mesh.vertices[a]); };
+  const Vec3 near = (1 + 1e-6) * along(0.4), further = (1 + 2e-6) * along(0.5);
+  mesh.vertices.insert(mesh.vertices.end(), {near, further});
+  mesh.triangles.insert(mesh.triangles.end(), {{a, b, tip}, {tip, b, a}, {b, tip + 1, tip}, {tip, tip + 1, b}});
+  EXPECT_EQ(weld(mesh, 0).mesh.triangles, sphere);
+}
+
 TEST(Weld, KeepsOneSideOfWhatIsNotFolded) {
   // A sheet of one triangle, written for both sides.
   TriangleMesh sheet;
