@@ -242,9 +242,11 @@ class Control {
         restore(start);
         gap_ = gap;
         if (gap == kInfinity) most_ = std::max(budget(), kAnyway);
+        has_parts_ = has_most_ = false;
         check();
         keep_best();
         if (refine() || has_worked_enough() || !is_sound_) break;
+        if (!has_parts_ && !has_most_) break;  // there is nothing to divide, whatever the gap
       }
       if (holds()) {
         trim();
@@ -290,6 +292,7 @@ class Control {
     if (!holds()) parts_ = Want::polygons;
     polygons_ = &run_.diagram(parts_).polygons;
     vertices_ = run_.seeds.positions();
+    for (const BallReport::Cell& cell : outcome_.ball.cells) has_parts_ |= cell.components > 1;
     if (!outcome_.ball.holds && (!too_few_seeds() || gap_ == kInfinity)) divide();
     outcome_.gap = gap_;
     outcome_.sheets.assign(vertices_.begin() + static_cast<std::ptrdiff_t>(run_.seeds.size()), vertices_.end());
@@ -311,7 +314,10 @@ class Control {
   bool insert(bool far) {
     const std::vector<Candidate> points = Repair(run_.surface(), *polygons_, vertices_, far).points(outcome_.ball);
     if (points.empty() && cuts_.empty()) return false;
-    if (run_.seeds.size() + points.size() + cuts_.size() > most_) return false;
+    if (run_.seeds.size() + points.size() + cuts_.size() > most_) {
+      has_most_ = true;
+      return false;
+    }
     const std::size_t before = run_.seeds.size();
     for (const Candidate& c : points) run_.seeds.add(c.point);
     for (const Cut& cut : cuts_) {
@@ -531,6 +537,8 @@ class Control {
   std::size_t given_;       // seeds before those inserted by refining
   std::size_t most_;        // seeds
   double gap_ = kCrossing;  // see divide_cells
+  bool has_parts_ = false;  // a cell that failed had several components
+  bool has_most_ = false;   // as many seeds as may be were not enough
   TopologyOutcome outcome_;
   std::vector<Cut> cuts_;
   std::vector<char> lost_;                        // by curve: cut at the beginning, and so left as it is
