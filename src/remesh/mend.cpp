@@ -500,7 +500,7 @@ std::optional<ImprovePatch> Mender::search_uncrossed(const Part& part) const {
 void Mender::mend_crossings(const Context& context) {
   for (int round = 0; round < kUncrossingRounds; ++round) {
     const std::vector<std::array<Index, 2>> pairs = find_crossing_pairs();
-    if (pairs.empty() || pairs.size() > count_ / kVerticesPerCrossing) return;
+    if (pairs.size() <= result_.may_cross || pairs.size() > count_ / kVerticesPerCrossing) return;
     context.report({"mending crossings", round + 1, 0, 0, 0, 1});
     bool any = false;
     for (const std::array<Index, 2>& pair : pairs)

@@ -441,7 +441,10 @@ double Pipeline::mend(const Diagram& diagram, std::vector<Index>& vertex_of) {
                   features_.broken};
   for (Index i = 0; i < run_.seeds.size(); ++i)
     if (vertex_of[i] != kNone) mended.owners[vertex_of[i]] = i;
-  mended.crosses = count_self_intersections(result_.mesh) > 0 && count_self_intersections(surface_.mesh) == 0;
+  if (const std::size_t crossings = count_self_intersections(result_.mesh); crossings > 0) {
+    mended.may_cross = count_self_intersections(surface_.mesh);
+    mended.crosses = crossings > mended.may_cross;
+  }
   const ImproveOptions options{plan_.min_angle, kMaxAngle, wanted_};
   result_.mended = mend_angles(map, curves_, trace_, options, mended, run_.context());
   if (!mended.number.empty())
