@@ -110,7 +110,7 @@ struct ImproveReport {
   std::size_t missed = 0;                 // triangles that it left with an angle beyond the goal
 };
 
-// What was done in the mesh itself to bad angles and feature curves that no seeds could mend.
+// What was done in the mesh itself to bad angles, feature curves and crossings that no seeds could mend.
 struct MendReport {
   std::size_t bad = 0;                    // triangles with an angle below 30 degrees that no two curves impose, before
   std::size_t made = 0;                   // changes that stayed

@@ -8,10 +8,13 @@
 
 namespace bisector {
 
+// Of the diagonal: how far apart rounding leaves points that were one, in files of six digits.
+inline constexpr double kRounding = 1e-5;
+
 // Of triangles with the same three vertices, either way round, keeps the first of the lowest label, and none where the
 // surface is folded onto itself: two of them, one each way round and of one label, one or two of whose edges are theirs
-// alone and the others those of two more triangles. No vertices are merged. Faces that are to be seen from both sides
-// are often written twice; seeds cannot tell the same sheet from itself.
+// alone and the others those of two more triangles, or which are lower than rounding. No vertices are merged. Faces
+// that are to be seen from both sides are often written twice; seeds cannot tell the same sheet from itself.
 WeldResult remove_double_triangles(const TriangleMesh& mesh);
 
 // Whether vertices are to be one that were not: there are no more border edges then, and fewer border and non-manifold

@@ -1,7 +1,9 @@
 // Shapes of single triangles, and how many neighbours vertices have.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "core/geometry.h"
@@ -16,6 +18,12 @@ struct TriangleShape {
 };
 
 TriangleShape measure_triangle(const Vec3& a, const Vec3& b, const Vec3& c);
+
+// Over the longest edge; 0 of a point.
+inline double triangle_height(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const double longest = std::sqrt(std::max({norm2(b - a), norm2(c - b), norm2(a - c)}));
+  return longest > 0 ? norm(twice_area_normal(a, b, c)) / longest : 0;
+}
 
 struct Valences {
   std::vector<Index> neighbours;  // of each vertex, through edges

@@ -16,15 +16,13 @@
 #include "core/grouping.h"
 #include "mesh/joining.h"
 #include "mesh/topology.h"
+#include "mesh/triangle_quality.h"
 #include "spatial/hilbert.h"
 #include "spatial/seed_tree.h"
 
 namespace bisector {
 
 namespace {
-
-// Of the diagonal: files of six digits round coordinates so.
-constexpr double kRounding = 1e-5;
 
 using Edge = std::array<Index, 2>;
 
@@ -128,7 +126,8 @@ struct Work {
     const double rounding = kRounding * bounding_box(points, triangles).diagonal();
     for (const auto& [first, second] : pairs) {
       if (goes_the_same_way_round(triangles[first], triangles[second])) continue;
-      if (height_of(triangles[first]) < rounding) {
+      const auto [a, b, c] = triangles[first];
+      if (triangle_height(points[a], points[b], points[c]) < rounding) {
         unwanted[first] = 1;
         continue;
       }
@@ -144,12 +143,6 @@ struct Work {
       }
       if (folded > 0 && closed > 0 && folded + closed == 3) unwanted[first] = 1;
     }
-  }
-
-  double height_of(const Triangle& t) const {
-    double longest = 0;
-    for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, norm(points[t[(k + 1) % 3]] - points[t[k]]));
-    return longest > 0 ? norm(twice_area_normal(points[t[0]], points[t[1]], points[t[2]])) / longest : 0;
   }
 
   void rename(const std::vector<Index>& name) {

@@ -500,7 +500,7 @@ std::optional<ImprovePatch> Mender::search_uncrossed(const Part& part) const {
 void Mender::mend_crossings(const Context& context) {
   for (int round = 0; round < kUncrossingRounds; ++round) {
     const std::vector<std::array<Index, 2>> pairs = find_crossing_pairs();
-    if (pairs.size() <= result_.may_cross || pairs.size() > count_ / kVerticesPerCrossing) return;
+    if (pairs.size() <= *result_.may_cross || pairs.size() > count_ / kVerticesPerCrossing) return;
     context.report({"mending crossings", round + 1, 0, 0, 0, 1});
     bool any = false;
     for (const std::array<Index, 2>& pair : pairs)
@@ -521,7 +521,7 @@ MendReport Mender::run(const Context& context) {
   report_.bad = find_bad().size();
   std::erase_if(result_.broken, [&](Index curve) { return recover(curve); });
   mend_angles(context);
-  if (result_.crosses) mend_crossings(context);
+  if (result_.may_cross) mend_crossings(context);
   if (report_.made > 0) write_back();
   return report_;
 }
@@ -530,7 +530,7 @@ MendReport Mender::run(const Context& context) {
 
 MendReport mend_angles(const CellMap& map, const FeatureCurves& curves, const FeatureTrace& trace,
                        const ImproveOptions& options, MendMesh& result, const Context& context) {
-  if (result.broken.empty() && !result.crosses && find_slivers(result.mesh).bounds.points.empty()) return {};
+  if (result.broken.empty() && !result.may_cross && find_slivers(result.mesh).bounds.points.empty()) return {};
   return Mender(map, curves, trace, options, result).run(context);
 }
 

@@ -33,8 +33,8 @@ constexpr std::size_t kLeastForDensity = 3000;
 constexpr std::size_t kMostVertices = 100'000'000;
 // Of the diagonal: how far vertices are moved that would be at the same point.
 constexpr double kApart = 1e-7;
-// Of the diagonal: how far apart rounding leaves points that were one, from none to files of six digits.
-constexpr double kRoundings[] = {0, 1e-7, 1e-6, 1e-5};
+// Of the diagonal, from no rounding to that of six digits.
+constexpr double kRoundings[] = {0, 1e-7, 1e-6, kRounding};
 
 MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
 

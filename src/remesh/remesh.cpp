@@ -441,10 +441,8 @@ double Pipeline::mend(const Diagram& diagram, std::vector<Index>& vertex_of) {
                   features_.broken};
   for (Index i = 0; i < run_.seeds.size(); ++i)
     if (vertex_of[i] != kNone) mended.owners[vertex_of[i]] = i;
-  if (const std::size_t crossings = count_self_intersections(result_.mesh); crossings > 0) {
-    mended.may_cross = count_self_intersections(surface_.mesh);
-    mended.crosses = crossings > mended.may_cross;
-  }
+  if (const std::size_t pairs = plan_.crossings ? count_self_intersections(result_.mesh) : 0; pairs > 0)
+    if (const std::size_t before = plan_.crossings(); pairs > before) mended.may_cross = before;
   const ImproveOptions options{plan_.min_angle, kMaxAngle, wanted_};
   result_.mended = mend_angles(map, curves_, trace_, options, mended, run_.context());
   if (!mended.number.empty())
@@ -668,18 +666,32 @@ class RunProgress {
 // Where triangles cross though the input's do not. Where those do, smaller ones cross in more pairs.
 class NewCrossings {
  public:
-  explicit NewCrossings(const TriangleMesh& input) : input_(input) {}
+  explicit NewCrossings(const Preparation& input) : input_(input) {}
 
   Crossings of(const TriangleMesh& mesh) {
     Crossings found = find_crossings(mesh);
-    if (found.pairs == 0) return found;
-    if (!std::exchange(knows_input_, true)) input_crosses_ = count_self_intersections(input_) > 0;
-    return input_crosses_ ? Crossings{} : found;
+    return found.pairs > 0 && of_input() > 0 ? Crossings{} : found;
+  }
+
+  // Pairs of the input's triangles, but for those of components that are set apart.
+  std::size_t of_input_set_apart() {
+    if (input_.apart().empty()) return of_input();
+    if (!of_input_set_apart_) {
+      TriangleMesh moved = input_.mesh();
+      input_.apart().move(moved);
+      of_input_set_apart_ = count_self_intersections(moved);
+    }
+    return *of_input_set_apart_;
   }
 
  private:
-  const TriangleMesh& input_;
-  bool knows_input_ = false, input_crosses_ = false;
+  std::size_t of_input() {
+    if (!of_input_) of_input_ = count_self_intersections(input_.mesh());
+    return *of_input_;
+  }
+
+  const Preparation& input_;
+  std::optional<std::size_t> of_input_, of_input_set_apart_;
 };
 
 // Why a result is to be made once more, or null, and how long edges should be where it is not good.
@@ -738,7 +750,7 @@ class Runs {
     for (Index v = 0; v < vertex_of_.size(); ++v)
       if (vertex_of_[v] != kNone) input_of_[vertex_of_[v]] = v;
     preparation_.emplace(std::move(ordered), context, branches);
-    new_crossings_.emplace(preparation_->mesh());
+    new_crossings_.emplace(*preparation_);
     may_shorten_ = options.seeds.empty() && options.detail != DetailMode::off;
     preparing_ = watch_.seconds();
   }
@@ -788,6 +800,7 @@ Runs::Run Runs::make_run(bool last) {
     plan.vertices = prepared.vertices;
     plan.branches = branches_;
     plan.noisy = prepared.noisy;
+    plan.crossings = [this] { return new_crossings_->of_input_set_apart(); };
     for (Index& v : prepared.kept.corners) {
       plan.held.push_back(v != kNone);
       if (v != kNone) v = input_of_[v];

@@ -28,6 +28,9 @@ struct RemeshPlan {
   bool branches = false;  // sheets are meant to meet in edges: topology is controlled there, too
   double min_angle = 40;
   bool fit = false;
+  // The pairs of the surface's triangles that cross, asked for where the result's do: more of these are mended. Empty:
+  // none are.
+  std::function<std::size_t()> crossings = {};
 };
 
 // What of the options is left then. Energy::automatic means constrained.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "mesh/topology.h"
 
@@ -47,18 +48,31 @@ std::vector<Extent> extents_of(const TriangleMesh& mesh, const std::vector<doubl
   return extents;
 }
 
-// The first of the places where none is that is near.
-std::vector<std::size_t> places_of(const std::vector<Extent>& extents) {
-  std::vector<std::size_t> place;
+// Of each, the first place where none is that is near, in the order in which they begin along an axis.
+std::vector<std::size_t> places_of(const std::vector<Extent>& extents, double longest_edge) {
+  std::vector<std::size_t> order(extents.size()), near, place(extents.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return extents[a].box.lo.x < extents[b].box.lo.x; });
   std::vector<char> taken;
-  for (std::size_t i = 0; i < extents.size(); ++i) {
+  for (const std::size_t i : order) {
+    std::erase_if(near, [&](std::size_t j) { return extents[i].box.lo.x - extents[j].box.hi.x > longest_edge; });
     std::fill(taken.begin(), taken.end(), char{0});
-    for (std::size_t j = 0; j < i; ++j)
+    for (const std::size_t j : near)
       if (are_near(extents[i], extents[j])) taken[place[j]] = 1;
-    place.push_back(static_cast<std::size_t>(std::find(taken.begin(), taken.end(), 0) - taken.begin()));
-    if (place.back() == taken.size()) taken.push_back(1);
+    place[i] = static_cast<std::size_t>(std::find(taken.begin(), taken.end(), 0) - taken.begin());
+    if (place[i] == taken.size()) taken.push_back(1);
+    near.push_back(i);
   }
   return place;
+}
+
+// Of all components, each with an offset.
+Box box_of(const std::vector<Extent>& extents, const std::vector<Vec3>& offset) {
+  std::vector<Vec3> corners;
+  for (std::size_t c = 0; c < extents.size(); ++c)
+    for (const Vec3& corner : {extents[c].box.lo, extents[c].box.hi}) corners.push_back(corner + offset[c]);
+  return bounding_box(corners);
 }
 
 // So that sums with coordinates of single precision are exact.
@@ -69,17 +83,15 @@ double power_of_two_from(double length) { return std::exp2(std::ceil(std::log2(l
 SetApart::SetApart(const TriangleMesh& mesh, const std::vector<double>& edge_length, std::size_t vertices) {
   const std::vector<Extent> extents = extents_of(mesh, edge_length);
   if (extents.size() < 2 || kVerticesEach * extents.size() > vertices) return;
-  const std::vector<std::size_t> place = places_of(extents);
+  double edge = 0;
+  for (const Extent& e : extents) edge = std::max(edge, e.edge);
+  const std::vector<std::size_t> place = places_of(extents, edge);
   const std::size_t count = *std::max_element(place.begin(), place.end()) + 1;
   if (count < 2) return;
-  Extent all;
-  for (const Extent& e : extents) {
-    all.add(e.box.lo, e.edge);
-    all.add(e.box.hi, e.edge);
-  }
+  const Box all = box_of(extents, std::vector<Vec3>(extents.size()));
   for (int k = 0; k < 3; ++k) {
-    lo_[k] = all.box.lo[k] - all.edge;
-    step_[k] = power_of_two_from(all.box.hi[k] - all.box.lo[k] + 2 * all.edge);
+    lo_[k] = all.lo[k] - edge;
+    step_[k] = power_of_two_from(all.hi[k] - all.lo[k] + 2 * edge);
   }
   // Places are in a cube of boxes, which keeps coordinates small.
   const auto side = static_cast<std::size_t>(std::ceil(std::cbrt(static_cast<double>(count))));
@@ -88,12 +100,7 @@ SetApart::SetApart(const TriangleMesh& mesh, const std::vector<double>& edge_len
     Vec3& offset = offset_.emplace_back();
     for (int k = 0; k < 3; ++k) offset[k] = static_cast<double>(at[static_cast<std::size_t>(k)]) * step_[k];
   }
-  Extent moved;
-  for (std::size_t c = 0; c < extents.size(); ++c) {
-    moved.add(extents[c].box.lo + offset_[c], 0);
-    moved.add(extents[c].box.hi + offset_[c], 0);
-  }
-  longer_ = moved.box.diagonal() / all.box.diagonal();
+  longer_ = box_of(extents, offset_).diagonal() / all.diagonal();
 }
 
 void SetApart::move(TriangleMesh& mesh) const {

@@ -10,6 +10,7 @@
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
+#include "mesh/triangle_quality.h"
 #include "remesh/improve_patch.h"
 
 namespace bisector {
@@ -49,15 +50,11 @@ Slivers find_slivers(const TriangleMesh& mesh) {
       const std::array<Vec3, 3> p = corners(t);
       const double lack = free_angle_lack(p, edges_among(mesh.triangles[t], mesh.feature_edges), kSliver);
       if (lack == 0) continue;
-      double longest = 0, perimeter = 0;
-      for (int k = 0; k < 3; ++k) {
-        const double length = norm(p[(k + 1) % 3] - p[k]);
-        longest = std::max(longest, length);
-        perimeter += length;
-      }
+      double perimeter = 0;
+      for (int k = 0; k < 3; ++k) perimeter += norm(p[(k + 1) % 3] - p[k]);
       ++count;
       has_bad_one |= kSliver - lack < kWorst;
-      const double height = longest > 0 ? norm(twice_area_normal(p[0], p[1], p[2])) / longest : 0;
+      const double height = triangle_height(p[0], p[1], p[2]);
       for (const Vec3& corner : p) {
         found.bounds.points.push_back(corner);
         found.bounds.lengths.push_back(std::max(kPerHeight * height, kLeast * perimeter / 3));

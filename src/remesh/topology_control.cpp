@@ -44,23 +44,27 @@ constexpr double kApart = 2;
 // Cosine of the angle at which a surface faces away.
 constexpr double kTurned = -0.2;
 
-// A point to insert, and the square of its distance to the nearest seed. Where its cell would reach a feature curve,
-// the other point may be better.
-struct Candidate {
+// A point, and the square of its distance to the nearest seed.
+struct Place {
   Vec3 point;
   double squared;
+};
+
+// A place to insert a seed at. Where its cell would reach a feature curve there, the other point may be better.
+struct Candidate {
+  Place place;
   Vec3 other;
 };
 
 // Nearest and farthest points of some part of a cell from its seed.
 struct Extremes {
-  Candidate nearest{{}, kInfinity, {}}, farthest{{}, -1, {}};
+  Place nearest{{}, kInfinity}, farthest{{}, -1};
 
   void near(const Vec3& p, const Vec3& seed) {
-    if (const double d = norm2(p - seed); d < nearest.squared) nearest = {p, d, p};
+    if (const double d = norm2(p - seed); d < nearest.squared) nearest = {p, d};
   }
   void far(const Vec3& p, const Vec3& seed) {
-    if (const double d = norm2(p - seed); d > farthest.squared) farthest = {p, d, p};
+    if (const double d = norm2(p - seed); d > farthest.squared) farthest = {p, d};
   }
 };
 
@@ -122,13 +126,11 @@ class Repair {
     return x;
   }
 
-  void add(const Candidate& c) {
-    if (c.squared > 0 && c.squared < kInfinity) candidates_.push_back(c);
+  void add(const Place& place, const Place& other) {
+    if (place.squared > 0 && place.squared < kInfinity) candidates_.push_back({place, other.point});
   }
-  void add(const Extremes& x) {
-    const Candidate &chosen = far_ ? x.farthest : x.nearest, &other = far_ ? x.nearest : x.farthest;
-    add(Candidate{chosen.point, chosen.squared, other.point});
-  }
+  void add(const Place& place) { add(place, place); }
+  void add(const Extremes& x) { far_ ? add(x.farthest, x.nearest) : add(x.nearest, x.farthest); }
 
   // All of the groups but that nearest to the seed.
   void add_others(const std::vector<Extremes>& groups) {
@@ -195,8 +197,9 @@ class Repair {
   std::vector<Candidate> thinned() const {
     std::vector<Candidate> kept;
     for (const Candidate& c : candidates_)
-      if (std::all_of(kept.begin(), kept.end(),
-                      [&](const Candidate& k) { return norm2(k.point - c.point) >= kApart * c.squared; }))
+      if (std::all_of(kept.begin(), kept.end(), [&, p = c.place](const Candidate& k) {
+            return norm2(k.place.point - p.point) >= kApart * p.squared;
+          }))
         kept.push_back(c);
     return kept;
   }
@@ -319,7 +322,7 @@ class Control {
       return false;
     }
     const std::size_t before = run_.seeds.size();
-    for (const Candidate& c : points) run_.seeds.add(c.point);
+    for (const Candidate& c : points) run_.seeds.add(c.place.point);
     for (const Cut& cut : cuts_) {
       run_.seeds.add(Vec3{});
       put_on_curve(run_.seeds.size() - 1, cut);
@@ -331,7 +334,7 @@ class Control {
   }
 
   // Seeds from `first` on are new, at these points. Those whose cells cut a curve go to their other points, or, if they
-  // do so there as well, on the curve. Else the edges of two curves at the tip of a thin plate would be halved again
+  // do so there as well, on the curve. Else the edges of two curves at a corner of a thin plate would be halved again
   // and again, for the middle between their first seeds is nearer to the curves than to these.
   void keep_off_curves(std::size_t first, const std::vector<Candidate>& points) {
     const auto cuts_of_new = [&] {

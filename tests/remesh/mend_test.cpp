@@ -63,7 +63,7 @@ struct Remeshed {
     std::vector<Index> owners(mesh.vertices.size());
     for (Index v = 0; v < owners.size(); ++v) owners[v] = v;
     MendMesh result{mesh, places, owners, broken};
-    result.crosses = count_self_intersections(mesh) > 0;
+    if (count_self_intersections(mesh) > 0) result.may_cross = 0;
     const MendReport report = mend_angles(map, curves, trace, {40, 91, run.seeds.size()}, result, context);
     number = result.number;
     return report;

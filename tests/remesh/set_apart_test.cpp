@@ -158,5 +158,18 @@ TEST(SetApart, ComesNearTheInput) {
   EXPECT_LE(bound_hausdorff_distance(result.mesh, input, 1e-4, {}).lower, result.distance.upper);
 }
 
+// Measured on what is set apart, whose box is larger.
+TEST(SetApart, ReportsDistancesInPercentOfTheInputsDiagonal) {
+  const TriangleMesh input = joined(icosphere(4), icosphere(4), {2.05, 0, 0});
+  RemeshOptions options;
+  options.vertices = 300;
+  options.fit = true;
+  const RemeshResult result = remesh(input, options);
+  const double reported = result.fitted.after.to_reference,
+               measured = measure_distance(result.mesh, input).rms_to_reference;
+  EXPECT_GT(reported, 0.8 * measured);
+  EXPECT_LT(reported, 1.1 * measured);
+}
+
 }  // namespace
 }  // namespace bisector::test
