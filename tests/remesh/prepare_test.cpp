@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -94,6 +95,25 @@ TEST(Preparation, SolidsThatTouchAlongAnEdgeAreMeshedApart) {
   EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find("along 4 edges"), std::string::npos) << warnings[0];
+}
+
+// Bounds of edge lengths that are found where components are set apart hold there, not where nothing is in the input.
+TEST(Preparation, BoundsFollowWhatIsSetApart) {
+  RemeshOptions options;
+  options.vertices = 600;
+  Preparation preparation(OrderedInput(joined(icosphere(4), icosphere(4), {0.8, 0.3, 0.1}), options), {});
+  ASSERT_FALSE(preparation.apart().empty());
+  const TriangleMesh apart = preparation.lay_down().mesh;
+  Vec3 at;
+  for (const Vec3& p : apart.vertices)
+    if (norm(p - preparation.apart().back(p)) > 1) at = p;
+  ASSERT_GT(norm(at), 1);
+  preparation.bound({{at}, {0.02}});
+  const PreparedInput prepared = preparation.lay_down();
+  const auto densest = std::max_element(prepared.density.begin(), prepared.density.end());
+  ASSERT_NE(densest, prepared.density.end());
+  EXPECT_GT(*densest, 100 * *std::min_element(prepared.density.begin(), prepared.density.end()));
+  EXPECT_LT(norm(prepared.mesh.vertices[static_cast<std::size_t>(densest - prepared.density.begin())] - at), 0.02);
 }
 
 }  // namespace
