@@ -16,7 +16,8 @@ enum class FeatureKind : std::uint8_t {
   border,        // one triangle
   given,         // marked in the mesh or by the caller
   label,         // between different face labels
-  crease         // sharp
+  crease,        // sharp
+  intersection   // where another component meets this one: found by remesh, which cuts both there
 };
 
 // A maximal chain of feature edges without a corner inside.

@@ -87,15 +87,16 @@ struct KeptEdge {
   VertexChain chain;
 };
 
-std::vector<KeptEdge> kept_edges(const KeptFeatures& kept, const FeatureGraph& features,
+// Of the curves that `kept` has a value for.
+std::vector<KeptEdge> kept_edges(const std::vector<char>& kept, const FeatureGraph& features,
                                  const std::vector<Index>& at_corner, const RemeshResult& result) {
   std::vector<std::vector<std::pair<double, Index>>> inside(features.curves.size());
   for (Index v = 0; v < result.places.size(); ++v)
-    if (const SeedPlace& place = result.places[v]; place.curve != kNone && kept.curves[place.curve])
+    if (const SeedPlace& place = result.places[v]; place.curve != kNone && kept[place.curve])
       inside[place.curve].push_back({place.position, v});
   std::vector<KeptEdge> edges;
   for (std::size_t c = 0; c < features.curves.size(); ++c) {
-    if (!kept.curves[c]) continue;
+    if (!kept[c]) continue;
     const auto [from, to] = ends_of(features, features.curves[c]);
     VertexChain chain{at_corner[from]};
     std::sort(inside[c].begin(), inside[c].end());
@@ -135,12 +136,12 @@ void drop_unused(RemeshResult& result) {
     if (index[v] == kNone) continue;
     mesh.vertices[count] = mesh.vertices[v];
     result.places[count] = result.places[v];
-    result.kept[count] = result.kept[v];
+    if (!result.kept.empty()) result.kept[count] = result.kept[v];
     index[v] = count++;
   }
   mesh.vertices.resize(count);
   result.places.resize(count);
-  result.kept.resize(count);
+  if (!result.kept.empty()) result.kept.resize(count);
   for (Triangle& t : mesh.triangles)
     for (Index& v : t) v = index[v];
   for (Edge& e : mesh.feature_edges) e = sorted_edge(index[e[0]], index[e[1]]);
@@ -160,14 +161,23 @@ void take_out_divisions(const std::vector<VertexChain>& chains, const TriangleMe
   options.project = [&](const Vec3& p) { return surface.nearest(p).point; };
   make_whole(mesh, chains, std::move(options));
   result.places.resize(mesh.vertices.size());
-  result.kept.resize(mesh.vertices.size(), kNone);
-  std::vector<Edge> links, edges;
-  for (const VertexChain& chain : chains)
+  if (!result.kept.empty()) result.kept.resize(mesh.vertices.size(), kNone);
+  // Of edges that stay divided the parts are features still.
+  std::vector<Edge> sides, links, whole;
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) sides.push_back(sorted_edge(t[k], t[(k + 1) % 3]));
+  std::sort(sides.begin(), sides.end());
+  for (const VertexChain& chain : chains) {
+    const Edge edge = sorted_edge(chain.front(), chain.back());
+    if (!std::binary_search(sides.begin(), sides.end(), edge)) continue;
+    whole.push_back(edge);
     for (std::size_t k = 0; k + 1 < chain.size(); ++k) links.push_back(sorted_edge(chain[k], chain[k + 1]));
+  }
   std::sort(links.begin(), links.end());
+  std::vector<Edge> edges;
   std::set_difference(mesh.feature_edges.begin(), mesh.feature_edges.end(), links.begin(), links.end(),
                       std::back_inserter(edges));
-  for (const VertexChain& chain : chains) edges.push_back(sorted_edge(chain.front(), chain.back()));
+  edges.insert(edges.end(), whole.begin(), whole.end());
   mesh.feature_edges = std::move(edges);
   drop_unused(result);
   result.topology = analyse_topology(mesh.triangles, mesh.vertices.size());
@@ -215,7 +225,7 @@ void add_corners(FeatureGraph& graph, const std::vector<Index>& vertices) {
 void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const TriangleMesh& input,
                   RemeshResult& result) {
   std::vector<Index> at_corner = vertices_at_corners(result, features.corners.size());
-  std::vector<KeptEdge> edges = kept_edges(kept, features, at_corner, result);
+  std::vector<KeptEdge> edges = kept_edges(kept.curves, features, at_corner, result);
   add_missing_corners(kept, edges, at_corner, result);
   result.kept.assign(result.mesh.vertices.size(), kNone);
   for (std::size_t c = 0; c < at_corner.size(); ++c) {
@@ -231,6 +241,16 @@ void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const 
   for (KeptEdge& edge : edges) chains.push_back(std::move(edge.chain));
   if (!chains.empty()) take_out_divisions(chains, input, result);
   check_edges(kept, features, result);
+}
+
+void make_curves_whole(const std::vector<char>& whole, const FeatureGraph& features, const TriangleMesh& surface,
+                       RemeshResult& result) {
+  const std::vector<Index> at_corner = vertices_at_corners(result, features.corners.size());
+  std::vector<VertexChain> chains;
+  for (KeptEdge& edge : kept_edges(whole, features, at_corner, result))
+    if (edge.chain.size() > 2 && edge.chain.front() != kNone && edge.chain.back() != kNone)
+      chains.push_back(std::move(edge.chain));
+  if (!chains.empty()) take_out_divisions(chains, surface, result);
 }
 
 }  // namespace bisector

@@ -15,6 +15,7 @@
 #include "core/geometry.h"
 #include "features/normals.h"
 #include "features/wedges.h"
+#include "mesh/corefine.h"
 #include "mesh/joining.h"
 #include "mesh/spatial_order.h"
 #include "mesh/topology.h"
@@ -33,6 +34,10 @@ constexpr std::size_t kLeastForDensity = 3000;
 constexpr std::size_t kMostVertices = 100'000'000;
 // Of the diagonal: how far vertices are moved that would be at the same point.
 constexpr double kApart = 1e-7;
+// Of triangles that cross, from which on they are more of a soup than components.
+constexpr std::size_t kMostPairs = 100'000;
+// Plans without what there is no room for.
+constexpr int kMostRounds = 10;
 // Of the diagonal, from no rounding to that of six digits.
 constexpr double kRoundings[] = {0, 1e-7, 1e-6, kRounding};
 
@@ -244,9 +249,8 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   if (given_seeds_ > 0 || (branches && options.detail == DetailMode::off)) return;
   std::vector<double> lengths = lay_down_plain();
   if (!branches) apart_ = SetApart(mesh_, lengths, unbounded_->sizing.vertices);
-  if (options.detail == DetailMode::off) return;
-  add_wedges(lengths);
-  plan(lengths, options.detail == DetailMode::all);
+  const bool all = options.detail == DetailMode::all;
+  if (options.detail != DetailMode::off && !plan_with_intersections(all)) plan(std::move(lengths), all);
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
@@ -320,6 +324,44 @@ std::vector<double> Preparation::lay_down_plain() {
   return lengths;
 }
 
+// `lengths` are those of lay_down_plain(). What lies between components that are set apart is no detail.
+void Preparation::plan(std::vector<double> lengths, bool all) {
+  add_wedges(lengths);
+  plan_features(lengths, all);
+}
+
+// Cuts components that are set apart where they cross, and plans with what they have in common. Where the result has no
+// room for that it is let go. False, and nothing is done, if there is none.
+bool Preparation::plan_with_intersections(bool all) {
+  if (apart_.empty() || !keep_vertices_.empty()) return false;
+  std::optional<Corefinement> corefined = corefine_components(mesh_, kMostPairs);
+  if (!corefined) return false;
+  const Preparation uncut = *this;
+  std::vector<double>& values = sizing_.attribute;
+  if (!values.empty())
+    for (const InsertedVertex& v : corefined->inserted) {
+      double value = 0;
+      for (std::size_t k = 0; k < 3; ++k) value += v.weights[k] * values[mesh_.triangles[v.triangle][k]];
+      values.push_back(value);
+    }
+  mesh_ = std::move(corefined->mesh);
+  features_ = split_features(features_, corefined->splits);
+  const Preparation cut = *this;
+  std::vector<std::array<Index, 2>> left_out;
+  for (int round = 0; round < kMostRounds; ++round) {
+    *this = cut;
+    meeting_ = IntersectionCurves(mesh_, left_out, features_);
+    if (meeting_.empty()) break;
+    sizing_.sharp = features_.edges;
+    plan(lay_down_plain(), all);
+    const std::vector<std::array<Index, 2>> crowded = divide_intersection_curves();
+    if (crowded.empty()) return true;
+    left_out.insert(left_out.end(), crowded.begin(), crowded.end());
+  }
+  *this = uncut;
+  return false;
+}
+
 // `lengths` are those of lay_down_plain(), before and after.
 void Preparation::add_wedges(std::vector<double>& lengths) {
   const std::size_t vertices = mesh_.vertices.size();
@@ -327,20 +369,49 @@ void Preparation::add_wedges(std::vector<double>& lengths) {
   if (added.empty()) return;
   features_ = split_features(features_, splits_of(added, vertices));
   sizing_.sharp = features_.edges;
-  std::vector<double>& values = sizing_.attribute;
-  for (const auto& [a, b, t] : added)
-    if (!values.empty()) values.push_back(values[a] + t * (values[b] - values[a]));
+  add_values(added);
+  meeting_.follow(splits_of(added, vertices));
   lengths = lay_down_plain();
 }
 
-// `lengths` are those of lay_down_plain(). What lies between components that are set apart is no detail.
-void Preparation::plan(const std::vector<double>& lengths, bool all) {
+void Preparation::add_values(const std::vector<EdgePoint>& added) {
+  std::vector<double>& values = sizing_.attribute;
+  for (const auto& [a, b, t] : added)
+    if (!values.empty()) values.push_back(values[a] + t * (values[b] - values[a]));
+}
+
+// By the edge lengths that there are beside details. Returns the edges along which there is no room.
+std::vector<std::array<Index, 2>> Preparation::divide_intersection_curves() {
+  const SizedMesh sized = lay_down_bounded();
+  std::vector<double> lengths(mesh_.vertices.size());
+  for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(sized.sizing, v);
+  IntersectionCurves::Division division = meeting_.divide(mesh_, features_, lengths);
+  sizing_.sharp = features_.edges;
+  add_values(division.added);
+  const SizeBounds between{division.middles, division.lengths};
+  if (getenv("DBG")) {
+    std::vector<double> l = division.lengths;
+    std::sort(l.begin(), l.end());
+    double mean = 0;
+    for (double x : lengths) mean += x / double(lengths.size());
+    fprintf(stderr, "curves %zu pieces %zu mean h %g lengths/h:", meeting_.size(), l.size(), mean);
+    for (int k = 0; k <= 20; ++k) fprintf(stderr, " %.3g", l[(l.size() - 1) * k / 20] / mean);
+    fprintf(stderr, "\n");
+  }
+  kept_lengths_.add(between);
+  bounds_.add(between);
+  unbounded_.reset();
+  return std::move(division.crowded);
+}
+
+void Preparation::plan_features(const std::vector<double>& lengths, bool all) {
   const Sizing& plain = unbounded_->sizing;
   std::optional<TriangleMesh> moved;
   if (!apart_.empty()) apart_.move(moved.emplace(mesh_));
   DetailPlan plan = plan_details(moved ? *moved : mesh_, features_, lengths, plain.vertices, all);
   features_ = std::move(plan.features);
   add_corners(features_, keep_vertices_);
+  if (!meeting_.empty()) meeting_.put_into(features_);
   detail_ = plan.result;
   if (all && detail_.vertices > plain.vertices) {
     target_ = {detail_.vertices, 0};
@@ -366,14 +437,17 @@ void Preparation::ask_for(std::size_t vertices) {
   unbounded_.reset();
 }
 
-PreparedInput Preparation::lay_down() {
+SizedMesh Preparation::lay_down_bounded() const {
   std::optional<SizeField> field;
   if (!bounds_.points.empty()) field.emplace(bounds_.points, bounds_.lengths, kDetailGradation);
   std::optional<SizeFloor> floor;
   if (!kept_lengths_.points.empty()) floor.emplace(kept_lengths_.points, kept_lengths_.lengths, kDetailGradation);
-  SizedMesh sized = unbounded_ && !field ? *std::exchange(unbounded_, std::nullopt)
-                                         : refine_for_density(mesh_, sizing_, target_,
-                                                              {field ? &*field : nullptr, floor ? &*floor : nullptr});
+  return refine_for_density(mesh_, sizing_, target_, {field ? &*field : nullptr, floor ? &*floor : nullptr});
+}
+
+PreparedInput Preparation::lay_down() {
+  SizedMesh sized =
+      unbounded_ && bounds_.points.empty() ? *std::exchange(unbounded_, std::nullopt) : lay_down_bounded();
   if (sized.sizing.vertices > kMostVertices && given_seeds_ == 0)
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
                             target_.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));
@@ -382,6 +456,7 @@ PreparedInput Preparation::lay_down() {
   prepared.noisy = noisy_;
   prepared.features = split_features(features_, sized.splits);
   prepared.kept = kept_features(prepared.features);
+  if (!meeting_.empty()) prepared.whole = meeting_.among(prepared.features);
   prepared.mesh = std::move(sized.mesh);
   prepared.mesh.feature_edges.clear();
   prepared.mesh.labels.clear();

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "remesh/intersection_curves.h"
 #include "remesh/kept.h"
 #include "remesh/remesh.h"
 #include "remesh/set_apart.h"
@@ -19,6 +20,7 @@ struct PreparedInput {
   double unit_edge = 0;         // edge length where the density is 1
   std::size_t vertices = 0;     // wanted of the result
   KeptFeatures kept;
+  std::vector<char> whole;    // of each curve, whether it is to be one edge; empty: none is
   std::vector<Vec3> corners;  // of the features, before they were set apart
   DetailResult detail;
   bool noisy = false;  // normals are noise, and Energy::automatic means restricted
@@ -75,7 +77,13 @@ class Preparation {
             const std::vector<Index>& original);
   std::vector<double> lay_down_plain();
   void add_wedges(std::vector<double>& lengths);
-  void plan(const std::vector<double>& lengths, bool all);
+  void plan(std::vector<double> lengths, bool all);
+  void plan_features(const std::vector<double>& lengths, bool all);
+  // Of vertices that were put on edges.
+  void add_values(const std::vector<EdgePoint>& added);
+  bool plan_with_intersections(bool all);
+  std::vector<std::array<Index, 2>> divide_intersection_curves();
+  SizedMesh lay_down_bounded() const;
   KeptFeatures kept_features(const FeatureGraph& features) const;
 
   WeldResult welded_;  // without its mesh
@@ -89,6 +97,7 @@ class Preparation {
   std::optional<SizedMesh> unbounded_;  // laid down already, and still good
   SizeBounds bounds_;
   SetApart apart_;
+  IntersectionCurves meeting_;  // along which those that are set apart meet
   std::vector<Index> keep_vertices_;              // of mesh_, ascending
   std::vector<Index> kept_as_;                    // of each of mesh_'s vertices before its details, the input's
   std::vector<std::array<Index, 2>> keep_edges_;  // of mesh_, sorted, lower vertex first

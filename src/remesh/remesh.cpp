@@ -694,6 +694,18 @@ class NewCrossings {
   std::optional<std::size_t> of_input_, of_input_set_apart_;
 };
 
+// Seeds never leave the ends of curves that are to be edges.
+void hold_ends(const PreparedInput& prepared, std::vector<char>& held) {
+  const FeatureGraph& features = prepared.features;
+  held.resize(features.corners.size(), 0);
+  for (std::size_t c = 0; c < prepared.whole.size(); ++c) {
+    if (!prepared.whole[c]) continue;
+    for (const Index end : {features.curves[c].vertices.front(), features.curves[c].vertices.back()})
+      held[static_cast<std::size_t>(std::lower_bound(features.corners.begin(), features.corners.end(), end) -
+                                    features.corners.begin())] = 1;
+  }
+}
+
 // Why a result is to be made once more, or null, and how long edges should be where it is not good.
 struct AnotherRun {
   const char* why = nullptr;
@@ -805,6 +817,7 @@ Runs::Run Runs::make_run(bool last) {
       plan.held.push_back(v != kNone);
       if (v != kNone) v = input_of_[v];
     }
+    if (!prepared.whole.empty()) hold_ends(prepared, plan.held);
     const Surface surface(std::move(prepared.mesh), prepared.density);
     preparing_ += laying_down.seconds();
     const std::unique_ptr<Backend> backend = compute_.backend(surface);
@@ -824,6 +837,7 @@ Runs::Run Runs::make_run(bool last) {
     }
     if (placing_ == 0) placing_ = pipeline.spent().totals.work;
     RemeshResult result = pipeline.finish();
+    if (!prepared.whole.empty()) make_curves_whole(prepared.whole, prepared.features, surface.mesh, result);
     preparation_->apart().move_back(prepared.corners, result);
     if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
     result.edge_length = prepared.unit_edge;

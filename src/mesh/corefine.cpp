@@ -1,0 +1,282 @@
+#include "mesh/corefine.h"
+
+#include <CGAL/Constrained_Delaunay_triangulation_2.h>
+#include <CGAL/Constrained_triangulation_face_base_2.h>
+#include <CGAL/Exact_predicates_exact_constructions_kernel.h>
+#include <CGAL/Triangulation_data_structure_2.h>
+#include <CGAL/Triangulation_vertex_base_with_info_2.h>
+#include <CGAL/intersections.h>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <tuple>
+#include <utility>
+#include <variant>
+
+#include "bisector/quality.h"
+#include "core/geometry.h"
+#include "mesh/topology.h"
+
+namespace bisector {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_exact_constructions_kernel;
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<Index, Kernel>;
+using FaceBase = CGAL::Constrained_triangulation_face_base_2<Kernel>;
+using Structure = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
+using Delaunay = CGAL::Constrained_Delaunay_triangulation_2<Kernel, Structure, CGAL::Exact_intersections_tag>;
+using Point = Kernel::Point_3;
+using Edge = std::array<Index, 2>;
+
+Point exact(const Vec3& p) { return {p.x, p.y, p.z}; }
+
+// The value of the number itself, not of the interval that it is known by: equal numbers are rounded alike.
+double rounded(const Kernel::FT& x) { return CGAL::to_double(CGAL::exact(x)); }
+Vec3 rounded(const Point& p) { return {rounded(p.x()), rounded(p.y()), rounded(p.z())}; }
+
+// The plane of a triangle along one axis, and back.
+class Projection {
+ public:
+  explicit Projection(const std::array<Point, 3>& corners) : origin_(corners[0]) {
+    const auto normal = CGAL::cross_product(corners[1] - corners[0], corners[2] - corners[0]);
+    for (int k = 1; k < 3; ++k)
+      if (std::abs(CGAL::to_double(normal[k])) > std::abs(CGAL::to_double(normal[axis_]))) axis_ = k;
+    for (int k = 0; k < 3; ++k) slope_[k] = k == axis_ ? Kernel::FT(0) : -normal[k] / normal[axis_];
+    turned_ = normal[axis_] < 0;
+  }
+
+  Kernel::Point_2 operator()(const Point& p) const { return {p[(axis_ + 1) % 3], p[(axis_ + 2) % 3]}; }
+  Point back(const Kernel::Point_2& p) const {
+    std::array<Kernel::FT, 3> x;
+    const int i = (axis_ + 1) % 3, j = (axis_ + 2) % 3;
+    x[i] = p.x();
+    x[j] = p.y();
+    x[axis_] = origin_[axis_] + slope_[i] * (p.x() - origin_[i]) + slope_[j] * (p.y() - origin_[j]);
+    return {x[0], x[1], x[2]};
+  }
+  // Whether triangles run the other way round in the projection.
+  bool turned() const { return turned_; }
+
+ private:
+  Point origin_;
+  int axis_ = 0;
+  std::array<Kernel::FT, 3> slope_;
+  bool turned_ = false;
+};
+
+class Corefiner {
+ public:
+  Corefiner(const TriangleMesh& mesh, std::vector<Index> component)
+      : input_(mesh), component_(std::move(component)), cuts_(mesh.triangles.size()) {}
+
+  void add(Index s, Index t) {
+    const std::array<Point, 3> a = corners_of(s), b = corners_of(t);
+    const auto common =
+        CGAL::intersection(Kernel::Triangle_3(a[0], a[1], a[2]), Kernel::Triangle_3(b[0], b[1], b[2]));
+    if (!common) return;
+    Cut cut;
+    if (const Point* p = boost::get<Point>(&*common)) cut = {*p, *p};
+    else if (const Kernel::Segment_3* segment = boost::get<Kernel::Segment_3>(&*common))
+      cut = {segment->source(), segment->target()};
+    else return;
+    for (const auto& [triangle, corners] : {std::pair(s, a), std::pair(t, b)}) {
+      cuts_[triangle].push_back(cut);
+      for (const Point& p : cut) put_on_edge(triangle, corners, p);
+    }
+  }
+
+  Corefinement run() {
+    result_.mesh = input_;
+    result_.mesh.triangles.clear();
+    result_.mesh.labels.clear();
+    result_.mesh.face_of_triangle.clear();
+    for (Index t = 0; t < cuts_.size(); ++t)
+      if (cuts_[t].empty() && !has_points(t)) take(t, input_.triangles[t]);
+      else divide(t);
+    for (const auto& [edge, points] : on_edge_) add_splits(edge);
+    std::sort(result_.splits.begin(), result_.splits.end());
+    return std::move(result_);
+  }
+
+ private:
+  using Cut = std::array<Point, 2>;
+
+  std::array<Point, 3> corners_of(Index t) const {
+    const auto [a, b, c] = input_.triangles[t];
+    return {exact(input_.vertices[a]), exact(input_.vertices[b]), exact(input_.vertices[c])};
+  }
+
+  void put_on_edge(Index t, const std::array<Point, 3>& corners, const Point& p) {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (corners[k] == p) return;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (Kernel::Segment_3(corners[k], corners[(k + 1) % 3]).has_on(p)) {
+        on_edge_[sorted_edge(input_.triangles[t][k], input_.triangles[t][(k + 1) % 3])].push_back(p);
+        return;
+      }
+  }
+
+  bool has_points(Index t) const {
+    const Triangle& v = input_.triangles[t];
+    for (std::size_t k = 0; k < 3; ++k)
+      if (on_edge_.contains(sorted_edge(v[k], v[(k + 1) % 3]))) return true;
+    return false;
+  }
+
+  void take(Index t, const Triangle& part) {
+    result_.mesh.triangles.push_back(part);
+    result_.mesh.face_of_triangle.push_back(input_.face_of_triangle.empty() ? t : Index{input_.face_of_triangle[t]});
+    if (!input_.labels.empty()) result_.mesh.labels.push_back(std::int32_t{input_.labels[t]});
+  }
+
+  void divide(Index t) {
+    const Triangle& v = input_.triangles[t];
+    const std::array<Point, 3> corners = corners_of(t);
+    if (CGAL::collinear(corners[0], corners[1], corners[2])) return take(t, v);
+    const Projection flat(corners);
+    Delaunay parts;
+    for (std::size_t k = 0; k < 3; ++k) parts.insert(flat(corners[k]))->info() = v[k];
+    const auto insert = [&](const Point& p) {
+      const std::size_t before = parts.number_of_vertices();
+      const Delaunay::Vertex_handle at = parts.insert(flat(p));
+      if (parts.number_of_vertices() > before) at->info() = kNone;
+      return at;
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto points = on_edge_.find(sorted_edge(v[k], v[(k + 1) % 3]));
+      if (points == on_edge_.end()) continue;
+      for (const Point& p : points->second) insert(p);
+    }
+    for (const auto& [from, to] : cuts_[t]) {
+      const Delaunay::Vertex_handle a = insert(from), b = insert(to);
+      if (a != b) parts.insert_constraint(a, b);
+    }
+    // Vertices where two segments cross have no index either: they are not among the corners.
+    std::map<Delaunay::Vertex_handle, Index> index;
+    for (const auto at : parts.finite_vertex_handles()) {
+      const bool is_corner = at->point() == flat(corners[0]) || at->point() == flat(corners[1]) ||
+                             at->point() == flat(corners[2]);
+      index[at] = is_corner ? at->info() : vertex_at(t, rounded(flat.back(at->point())));
+    }
+    for (const auto face : parts.finite_face_handles()) {
+      Triangle part{index[face->vertex(0)], index[face->vertex(1)], index[face->vertex(2)]};
+      if (part[0] == part[1] || part[1] == part[2] || part[2] == part[0]) continue;
+      if (flat.turned()) std::swap(part[1], part[2]);
+      take(t, part);
+    }
+  }
+
+  Index vertex_at(Index t, const Vec3& p) {
+    const Triangle& v = input_.triangles[t];
+    for (const Index corner : v)
+      if (input_.vertices[corner] == p) return corner;
+    const auto [at, is_new] = vertex_at_.try_emplace(std::tuple(component_[v[0]], p.x, p.y, p.z),
+                                                     static_cast<Index>(result_.mesh.vertices.size()));
+    if (is_new) {
+      result_.mesh.vertices.push_back(p);
+      result_.inserted.push_back({t, weights_at(t, p)});
+    }
+    return at->second;
+  }
+
+  std::array<double, 3> weights_at(Index t, const Vec3& p) const {
+    const auto [a, b, c] = input_.triangles[t];
+    const Vec3 u = input_.vertices[b] - input_.vertices[a], w = input_.vertices[c] - input_.vertices[a];
+    const Vec3 normal = cross(u, w), d = p - input_.vertices[a];
+    const double square = norm2(normal);
+    const double second = dot(cross(d, w), normal) / square, third = dot(cross(u, d), normal) / square;
+    return {1 - second - third, second, third};
+  }
+
+  // From the lower end on, each point divides what is left of the edge.
+  void add_splits(const Edge& edge) {
+    std::vector<Point>& points = on_edge_[edge];
+    const Point from = exact(input_.vertices[edge[0]]);
+    std::sort(points.begin(), points.end(),
+              [&](const Point& a, const Point& b) { return CGAL::has_smaller_distance_to_point(from, a, b); });
+    Index last = edge[0];
+    for (const Point& p : points) {
+      const Vec3 at = rounded(p);
+      const auto found = vertex_at_.find(std::tuple(component_[edge[0]], at.x, at.y, at.z));
+      if (found == vertex_at_.end() || found->second == last) continue;
+      const Edge rest = sorted_edge(last, edge[1]);
+      result_.splits.push_back({rest[0], rest[1], found->second});
+      last = found->second;
+    }
+  }
+
+  const TriangleMesh& input_;
+  const std::vector<Index> component_;
+  std::vector<std::vector<Cut>> cuts_;               // of each triangle
+  std::map<Edge, std::vector<Point>> on_edge_;       // between its ends
+  std::map<std::tuple<Index, double, double, double>, Index> vertex_at_;
+  Corefinement result_;
+};
+
+}  // namespace
+
+std::optional<Corefinement> corefine_components(const TriangleMesh& mesh, std::size_t most_pairs) {
+  std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
+  std::vector<std::array<Index, 2>> pairs = find_self_intersections(mesh);
+  std::erase_if(pairs, [&](const std::array<Index, 2>& pair) {
+    return component[mesh.triangles[pair[0]][0]] == component[mesh.triangles[pair[1]][0]];
+  });
+  if (pairs.empty() || pairs.size() > most_pairs) return std::nullopt;
+  Corefiner corefiner(mesh, std::move(component));
+  for (const auto& [s, t] : pairs) corefiner.add(s, t);
+  return corefiner.run();
+}
+
+CommonParts find_common_parts(const TriangleMesh& mesh) {
+  const std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
+  std::vector<Index> order;
+  for (Index v = 0; v < component.size(); ++v)
+    if (component[v] != kNone) order.push_back(v);
+  const auto key = [&](Index v) {
+    const Vec3& p = mesh.vertices[v];
+    return std::tuple(p.x, p.y, p.z);
+  };
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return key(a) < key(b); });
+  CommonParts common;
+  common.same.assign(mesh.vertices.size(), kNone);
+  for (std::size_t first = 0, last = 0; first < order.size(); first = last) {
+    bool several = false;
+    for (; last < order.size() && key(order[last]) == key(order[first]); ++last)
+      several |= component[order[last]] != component[order[first]];
+    for (std::size_t k = first; several && k < last; ++k) common.same[order[k]] = order[first];
+  }
+  // Components at a triangle or edge of common vertices.
+  std::map<Triangle, std::vector<Index>> at_triangle;
+  const auto common_triangle = [&](const Triangle& t) {
+    Triangle v{common.same[t[0]], common.same[t[1]], common.same[t[2]]};
+    std::sort(v.begin(), v.end());
+    return v;
+  };
+  for (const Triangle& t : mesh.triangles)
+    if (const Triangle v = common_triangle(t); v[2] != kNone) at_triangle[v].push_back(component[t[0]]);
+  struct Sides {
+    std::vector<Index> components;
+    bool parts = false;  // one of them has a triangle of its own here
+  };
+  std::map<Edge, Sides> at_edge;
+  for (const Triangle& t : mesh.triangles) {
+    const auto both = at_triangle.find(common_triangle(t));
+    const bool own = both == at_triangle.end() ||
+                     std::all_of(both->second.begin(), both->second.end(), [&](Index c) { return c == component[t[0]]; });
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Edge edge = sorted_edge(common.same[t[k]], common.same[t[(k + 1) % 3]]);
+      if (edge[1] == kNone) continue;
+      Sides& sides = at_edge[edge];
+      sides.components.push_back(component[t[0]]);
+      sides.parts |= own;
+    }
+  }
+  for (auto& [edge, sides] : at_edge) {
+    std::sort(sides.components.begin(), sides.components.end());
+    if (sides.parts && sides.components.front() != sides.components.back()) common.edges.push_back(edge);
+  }
+  return common;
+}
+
+}  // namespace bisector

@@ -1,0 +1,43 @@
+// Components of a surface that cross each other, cut along the lines where they do.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "bisector/mesh.h"
+
+namespace bisector {
+
+// A vertex that was put into a triangle.
+struct InsertedVertex {
+  Index triangle;
+  std::array<double, 3> weights;  // barycentric, of the triangle's corners
+};
+
+struct Corefinement {
+  // The same surface; its vertices come first, then those that were put in. Labels and face_of_triangle follow.
+  TriangleMesh mesh;
+  std::vector<InsertedVertex> inserted;      // of each vertex that was put in, of the triangles as they were
+  std::vector<std::array<Index, 3>> splits;  // EdgeSplits of the edges that were divided (features/edge_splits.h)
+};
+
+// Cuts triangles of different components, which hang together through vertices, along their common segments, so that
+// components only meet in vertices and edges that are at the same points to the bit, up to the rounding of new vertices
+// to doubles. Triangles are divided by Delaunay triangulations with these segments as constraints, in exact arithmetic
+// (as the corefinement of Loriot, Lévy et al. in CGAL). What is coplanar is not cut along itself. Nothing if no two
+// triangles of different components intersect, or more than `most_pairs` do.
+std::optional<Corefinement> corefine_components(const TriangleMesh& mesh, std::size_t most_pairs);
+
+// What components have in common.
+struct CommonParts {
+  std::vector<Index> same;                  // of each vertex the first at the same point, kNone if on one component only
+  std::vector<std::array<Index, 2>> edges;  // between first vertices, lower one first, ascending
+};
+
+// Vertices and edges of different components at the same points, but for edges beside which components have no other
+// triangles than common ones.
+CommonParts find_common_parts(const TriangleMesh& mesh);
+
+}  // namespace bisector

@@ -1,0 +1,85 @@
+// Where components of a surface cross or touch: curves along which they get the same vertices and edges.
+//
+// Components are remeshed each for itself (remesh/set_apart.h), so triangles of one would cross those of another, in
+// the more pairs, the finer the result. Where both have the same vertices along the curves in which they meet, and the
+// same edges between these, they only touch. So the mesh is cut along these curves (mesh/corefine.h), which become
+// features and get corners an edge length apart, at the same points on all components; what is between two of them is
+// to be one edge of the result.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "bisector/features.h"
+#include "features/edge_splits.h"
+#include "features/wedges.h"
+
+namespace bisector {
+
+class IntersectionCurves {
+ public:
+  // None.
+  IntersectionCurves() = default;
+  // Those of a mesh whose components have been cut along them, but for the edges `left_out`. Its features get them:
+  // other curves end where they meet them.
+  IntersectionCurves(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& left_out,
+                     FeatureGraph& features);
+
+  bool empty() const { return curves_.empty(); }
+  std::size_t size() const { return curves_.size(); }
+
+  // The curves in features that are simplified for a coarse mesh (features/simplify.h). They have corners where other
+  // curves still end on any of the components, and at turns that are corners on all of them.
+  void put_into(FeatureGraph& simplified);
+
+  // To be told of edges of the mesh that were divided.
+  void follow(const EdgeSplits& splits);
+
+  struct Division {
+    std::vector<EdgePoint> added;  // vertices, in order, of edges as they were when each was put in
+    std::vector<Vec3> middles;     // of the edges that the result is to have
+    std::vector<double> lengths;   // of these edges
+    // Edges of the curves before that the result has no room for: corners of a component would be too near to an edge
+    // that does not end there, or two edges at too small an angle.
+    std::vector<std::array<Index, 2>> crowded;
+  };
+  // Puts vertices into the mesh where the curves are to have corners: as far from each other as the least edge length
+  // of the components there, `edge_length` being wanted at each vertex. A closed curve gets three at least, and two that
+  // join the same corners one each. The features get these corners.
+  Division divide(TriangleMesh& mesh, FeatureGraph& features, const std::vector<double>& edge_length);
+
+  // Of each curve of a graph on the mesh, or on one with divided edges, whether it leads along one of these from corner
+  // to corner.
+  std::vector<char> among(const FeatureGraph& features) const;
+
+ private:
+  // One vertex after the other, as each of the components has them, at the same points.
+  struct Curve {
+    std::vector<std::vector<Index>> copies;
+    bool closed = false;
+
+    std::size_t edges() const { return copies[0].size() - (closed ? 0 : 1); }
+  };
+
+  // What is to be an edge of the result.
+  struct Piece {
+    const Curve* curve;
+    std::vector<std::array<Index, 2>> ends;  // on each of the components
+    double first, last;                      // along the polyline, in its edges
+    Vec3 from, to;
+  };
+
+  std::vector<std::array<Index, 2>> crowded_edges(const TriangleMesh& mesh, const FeatureGraph& features,
+                                                  const std::vector<Piece>& pieces) const;
+  void sort_edges();
+  bool join_at(Index vertex);
+  void drop_doubled(FeatureGraph& features) const;
+
+  std::vector<Curve> curves_;
+  std::vector<std::array<Index, 2>> edges_;  // along the curves, sorted, lower vertex first
+  EdgeSplits splits_;                        // of edges since the mesh was cut
+  std::size_t vertices_ = 0;                 // of the mesh
+};
+
+}  // namespace bisector
