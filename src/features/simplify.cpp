@@ -88,15 +88,12 @@ class CornerGraph {
     return {arms > 2 ? 2.0 : arms == 2 ? 0.0 : 1.0, weight};
   }
 
-  // Whether three or more curves meet that are not all creases, nor creases that end on one of another component.
+  // Whether three or more curves meet that are not all creases.
   bool is_branching_of_others(Index corner) const {
-    std::size_t others = 0, intersections = 0;
-    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm) {
-      const FeatureCurve& curve = curves_.graph().curves[arm->curve];
-      intersections += curve.kind == FeatureKind::intersection;
-      others += !is_crease(curve);
-    }
-    return at_.size(corner) > 2 && (others > intersections || intersections > 2);
+    bool others = false;
+    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm)
+      others |= !is_crease(curves_.graph().curves[arm->curve]);
+    return others && at_.size(corner) > 2;
   }
 
   const FeatureCurves& curves_;

@@ -22,8 +22,8 @@ using Edge = std::array<Index, 2>;
 // Of the edge length: how near to a vertex of the curve a corner is put there.
 constexpr double kAtVertex = 0.02;
 // Of an edge: how near others may come to it, and how far the curve away from it.
-constexpr double kLeastGap = 0.4, kMostBend = 0.35;
-constexpr double kLeastCosine = 0.82;  // of 35 degrees between two edges
+const double kLeastGap = getenv("G") ? atof(getenv("G")) : 0.15, kMostBend = getenv("B") ? atof(getenv("B")) : 0.5;
+const double kLeastCosine = getenv("A") ? cos(3.14159/180*atof(getenv("A"))) : 0.966;  // of 15 degrees between two edges
 
 // An edge of the mesh on one of the components that have it.
 struct Copy {
@@ -222,38 +222,6 @@ IntersectionCurves::IntersectionCurves(const TriangleMesh& mesh, const std::vect
   sort_edges();
 }
 
-// Makes one curve of the two that end at a vertex, if no others do. Copies belong to the same components.
-bool IntersectionCurves::join_at(Index vertex) {
-  std::vector<std::size_t> at;
-  for (std::size_t c = 0; c < curves_.size(); ++c) {
-    if (curves_[c].closed) continue;
-    if (curves_[c].copies[0].front() == vertex) at.push_back(c);
-    if (curves_[c].copies[0].back() == vertex) at.push_back(c);
-  }
-  if (at.size() != 2) return false;
-  Curve& first = curves_[at[0]];
-  if (at[0] == at[1]) {
-    for (std::vector<Index>& copy : first.copies)
-      if (copy.front() != copy.back()) return false;
-    for (std::vector<Index>& copy : first.copies) copy.pop_back();
-    first.closed = true;
-    return true;
-  }
-  Curve& second = curves_[at[1]];
-  if (first.copies.size() != second.copies.size()) return false;
-  const auto turn = [](Curve& curve) {
-    for (std::vector<Index>& copy : curve.copies) std::reverse(copy.begin(), copy.end());
-  };
-  if (first.copies[0].back() != vertex) turn(first);
-  if (second.copies[0].front() != vertex) turn(second);
-  for (std::size_t c = 0; c < first.copies.size(); ++c)
-    if (first.copies[c].back() != second.copies[c].front()) return false;
-  for (std::size_t c = 0; c < first.copies.size(); ++c)
-    first.copies[c].insert(first.copies[c].end(), second.copies[c].begin() + 1, second.copies[c].end());
-  curves_.erase(curves_.begin() + static_cast<std::ptrdiff_t>(at[1]));
-  return true;
-}
-
 void IntersectionCurves::put_into(FeatureGraph& simplified) {
   std::set<Index> ends;  // of other curves
   std::vector<FeatureCurve> others;
@@ -262,32 +230,16 @@ void IntersectionCurves::put_into(FeatureGraph& simplified) {
     if (!curve.closed) ends.insert({curve.vertices.front(), curve.vertices.back()});
     others.push_back(std::move(curve));
   }
-  std::map<Index, bool> joins;  // of the first copies' ends
-  const auto look_at = [&](const Curve& curve, bool front) {
-    bool ends_here = false, turns = true;
-    for (const std::vector<Index>& copy : curve.copies) {
-      const Index end = front ? copy.front() : copy.back();
-      ends_here |= ends.contains(end);
-      turns &= std::binary_search(simplified.corners.begin(), simplified.corners.end(), end);
-    }
-    bool& goes = joins.try_emplace(front ? curve.copies[0].front() : curve.copies[0].back(), true).first->second;
-    goes = goes && !ends_here && !turns;
-  };
-  std::set<Index> on_curves;
-  for (const Curve& curve : curves_) {
-    for (const std::vector<Index>& copy : curve.copies) on_curves.insert(copy.begin(), copy.end());
-    if (curve.closed) continue;
-    look_at(curve, true);
-    look_at(curve, false);
-  }
-  for (const auto& [vertex, goes] : joins)
-    if (goes) join_at(vertex);
-  std::erase_if(simplified.corners, [&](Index v) { return on_curves.contains(v) && !ends.contains(v); });
   std::vector<Index> corners(ends.begin(), ends.end());
   for (const Curve& curve : curves_)
     for (const std::vector<Index>& copy : curve.copies) {
-      others.push_back({copy, curve.closed, FeatureKind::intersection});
       if (!curve.closed) corners.insert(corners.end(), {copy.front(), copy.back()});
+      FeatureCurve& whole = others.emplace_back(FeatureCurve{{}, curve.closed, FeatureKind::intersection});
+      for (std::size_t k = 0; k < curve.edges(); ++k) {
+        const std::vector<Index> chain = edge_chain(splits_, copy[k], copy[(k + 1) % copy.size()]);
+        whole.vertices.insert(whole.vertices.end(), chain.begin(), chain.end() - 1);
+      }
+      if (!curve.closed) whole.vertices.push_back(copy.back());
     }
   simplified.curves = std::move(others);
   sort_edges();

@@ -29,8 +29,8 @@ class IntersectionCurves {
   bool empty() const { return curves_.empty(); }
   std::size_t size() const { return curves_.size(); }
 
-  // The curves in features that are simplified for a coarse mesh (features/simplify.h). They have corners where other
-  // curves still end on any of the components, and at turns that are corners on all of them.
+  // To be told of features that were simplified for a coarse mesh (features/simplify.h), which get these curves as they
+  // are, with their corners.
   void put_into(FeatureGraph& simplified);
 
   // To be told of edges of the mesh that were divided.
@@ -73,7 +73,6 @@ class IntersectionCurves {
   std::vector<std::array<Index, 2>> crowded_edges(const TriangleMesh& mesh, const FeatureGraph& features,
                                                   const std::vector<Piece>& pieces) const;
   void sort_edges();
-  bool join_at(Index vertex);
   void drop_doubled(FeatureGraph& features) const;
 
   std::vector<Curve> curves_;

@@ -169,9 +169,12 @@ void take_out_divisions(const std::vector<VertexChain>& chains, const TriangleMe
   std::sort(sides.begin(), sides.end());
   for (const VertexChain& chain : chains) {
     const Edge edge = sorted_edge(chain.front(), chain.back());
-    if (!std::binary_search(sides.begin(), sides.end(), edge)) continue;
-    whole.push_back(edge);
-    for (std::size_t k = 0; k + 1 < chain.size(); ++k) links.push_back(sorted_edge(chain[k], chain[k + 1]));
+    const bool is_whole = std::binary_search(sides.begin(), sides.end(), edge);
+    if (is_whole) whole.push_back(edge);
+    for (std::size_t k = 0; k + 1 < chain.size(); ++k)
+      if (const Edge link = sorted_edge(chain[k], chain[k + 1]);
+          is_whole || !std::binary_search(sides.begin(), sides.end(), link))
+        links.push_back(link);
   }
   std::sort(links.begin(), links.end());
   std::vector<Edge> edges;

@@ -27,6 +27,7 @@
 #include "remesh/deviation.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/fit.h"
+#include "remesh/flip_crossings.h"
 #include "remesh/improve.h"
 #include "remesh/mend.h"
 #include "remesh/prepare.h"
@@ -839,6 +840,7 @@ Runs::Run Runs::make_run(bool last) {
     RemeshResult result = pipeline.finish();
     if (!prepared.whole.empty()) make_curves_whole(prepared.whole, prepared.features, surface.mesh, result);
     preparation_->apart().move_back(prepared.corners, result);
+    if (!prepared.whole.empty()) flip_where_components_cross(result.mesh);
     if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;
