@@ -72,8 +72,7 @@ class Corefiner {
 
   void add(Index s, Index t) {
     const std::array<Point, 3> a = corners_of(s), b = corners_of(t);
-    const auto common =
-        CGAL::intersection(Kernel::Triangle_3(a[0], a[1], a[2]), Kernel::Triangle_3(b[0], b[1], b[2]));
+    const auto common = CGAL::intersection(Kernel::Triangle_3(a[0], a[1], a[2]), Kernel::Triangle_3(b[0], b[1], b[2]));
     if (!common) return;
     Cut cut;
     if (const Point* p = boost::get<Point>(&*common)) cut = {*p, *p};
@@ -155,8 +154,8 @@ class Corefiner {
     // Vertices where two segments cross have no index either: they are not among the corners.
     std::map<Delaunay::Vertex_handle, Index> index;
     for (const auto at : parts.finite_vertex_handles()) {
-      const bool is_corner = at->point() == flat(corners[0]) || at->point() == flat(corners[1]) ||
-                             at->point() == flat(corners[2]);
+      const bool is_corner =
+          at->point() == flat(corners[0]) || at->point() == flat(corners[1]) || at->point() == flat(corners[2]);
       index[at] = is_corner ? at->info() : vertex_at(t, rounded(flat.back(at->point())));
     }
     for (const auto face : parts.finite_face_handles()) {
@@ -208,8 +207,8 @@ class Corefiner {
 
   const TriangleMesh& input_;
   const std::vector<Index> component_;
-  std::vector<std::vector<Cut>> cuts_;               // of each triangle
-  std::map<Edge, std::vector<Point>> on_edge_;       // between its ends
+  std::vector<std::vector<Cut>> cuts_;          // of each triangle
+  std::map<Edge, std::vector<Point>> on_edge_;  // between its ends
   std::map<std::tuple<Index, double, double, double>, Index> vertex_at_;
   Corefinement result_;
 };
@@ -262,8 +261,8 @@ CommonParts find_common_parts(const TriangleMesh& mesh) {
   std::map<Edge, Sides> at_edge;
   for (const Triangle& t : mesh.triangles) {
     const auto both = at_triangle.find(common_triangle(t));
-    const bool own = both == at_triangle.end() ||
-                     std::all_of(both->second.begin(), both->second.end(), [&](Index c) { return c == component[t[0]]; });
+    const bool own = both == at_triangle.end() || std::all_of(both->second.begin(), both->second.end(),
+                                                              [&](Index c) { return c == component[t[0]]; });
     for (std::size_t k = 0; k < 3; ++k) {
       const Edge edge = sorted_edge(common.same[t[k]], common.same[t[(k + 1) % 3]]);
       if (edge[1] == kNone) continue;

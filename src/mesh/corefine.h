@@ -32,7 +32,7 @@ std::optional<Corefinement> corefine_components(const TriangleMesh& mesh, std::s
 
 // What components have in common.
 struct CommonParts {
-  std::vector<Index> same;                  // of each vertex the first at the same point, kNone if on one component only
+  std::vector<Index> same;  // of each vertex the first at the same point, kNone if on one component only
   std::vector<std::array<Index, 2>> edges;  // between first vertices, lower one first, ascending
 };
 

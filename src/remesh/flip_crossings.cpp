@@ -20,7 +20,7 @@ namespace {
 
 using Edge = std::array<Index, 2>;
 
-constexpr double kGoodAngle = 30;  // degrees
+constexpr double kGoodAngle = 25;  // degrees
 constexpr int kPasses = 3;
 
 double least_angle(const TriangleMesh& mesh, const Triangle& t) {
@@ -99,7 +99,6 @@ class Flipper {
   // Pairs that cross of two triangles among themselves and with those of `near`.
   std::size_t crossings(const std::array<Triangle, 2>& two, const std::vector<Index>& near) const {
     TriangleMesh part;
-    part.vertices = {};
     std::map<Index, Index> vertex;
     const auto add = [&](Triangle t) {
       for (Index& v : t) {
@@ -144,9 +143,9 @@ class Flipper {
     std::sort(near.begin(), near.end());
     near.erase(std::unique(near.begin(), near.end()), near.end());
     std::erase_if(near, [&](Index n) { return n == t || n == u; });
-    flip.rank = {static_cast<std::ptrdiff_t>(crossings({v, w}, near)) -
-                     static_cast<std::ptrdiff_t>(crossings(flip.as, near)),
-                 after};
+    flip.rank = {
+        static_cast<std::ptrdiff_t>(crossings({v, w}, near)) - static_cast<std::ptrdiff_t>(crossings(flip.as, near)),
+        after};
     if (flip.rank.first <= 0) return std::nullopt;
     return flip;
   }

@@ -22,8 +22,8 @@ using Edge = std::array<Index, 2>;
 // Of the edge length: how near to a vertex of the curve a corner is put there.
 constexpr double kAtVertex = 0.02;
 // Of an edge: how near others may come to it, and how far the curve away from it.
-const double kLeastGap = getenv("G") ? atof(getenv("G")) : 0.15, kMostBend = getenv("B") ? atof(getenv("B")) : 0.5;
-const double kLeastCosine = getenv("A") ? cos(3.14159/180*atof(getenv("A"))) : 0.966;  // of 15 degrees between two edges
+constexpr double kLeastGap = 0.15, kMostBend = 0.5;
+constexpr double kLeastCosine = 0.966;  // of 15 degrees between two edges
 
 // An edge of the mesh on one of the components that have it.
 struct Copy {
@@ -45,12 +45,13 @@ class Network {
     for (const Triangle& t : mesh.triangles)
       for (std::size_t k = 0; k < 3; ++k) {
         const Index a = t[k], b = t[(k + 1) % 3], p = common.same[a], q = common.same[b];
-        if (p == kNone || q == kNone || !std::binary_search(common.edges.begin(), common.edges.end(), sorted_edge(p, q)))
+        if (p == kNone || q == kNone ||
+            !std::binary_search(common.edges.begin(), common.edges.end(), sorted_edge(p, q)))
           continue;
         std::vector<Copy>& copies = copies_[sorted_edge(p, q)];
         const Copy copy{component[a], p < q ? Edge{a, b} : Edge{b, a}};
-        const auto same = std::find_if(copies.begin(), copies.end(),
-                                       [&](const Copy& c) { return c.component == copy.component; });
+        const auto same =
+            std::find_if(copies.begin(), copies.end(), [&](const Copy& c) { return c.component == copy.component; });
         if (same == copies.end()) copies.push_back(copy);
       }
     const std::set<Edge> go(left_out.begin(), left_out.end());
@@ -210,7 +211,8 @@ IntersectionCurves::IntersectionCurves(const TriangleMesh& mesh, const std::vect
       copy.pop_back();
     }
     if (!hangs_together) continue;
-    for (const std::vector<Index>& copy : curve.copies) all.curves.push_back({copy, path.closed, FeatureKind::intersection});
+    for (const std::vector<Index>& copy : curve.copies)
+      all.curves.push_back({copy, path.closed, FeatureKind::intersection});
     curves_.push_back(std::move(curve));
   }
   std::vector<Index> corners = network.ends();
@@ -251,9 +253,8 @@ void IntersectionCurves::put_into(FeatureGraph& simplified) {
 void IntersectionCurves::drop_doubled(FeatureGraph& features) const {
   const std::vector<char> is_among = among(features);
   std::size_t k = 0;
-  std::erase_if(features.curves, [&](const FeatureCurve& curve) {
-    return is_among[k++] && curve.kind != FeatureKind::intersection;
-  });
+  std::erase_if(features.curves,
+                [&](const FeatureCurve& curve) { return is_among[k++] && curve.kind != FeatureKind::intersection; });
   features.edges = edges_of(features.curves);
 }
 
@@ -275,8 +276,37 @@ void IntersectionCurves::follow(const EdgeSplits& splits) {
   sort_edges();
 }
 
+// Of the corners along the polyline, both ends included, in its edges: at a vertex if the place is a whole number.
+std::vector<double> IntersectionCurves::corner_places(const Curve& curve, const TriangleMesh& mesh,
+                                                      const std::vector<double>& edge_length, std::size_t least) {
+  const std::vector<Index>& on = curve.copies[0];
+  std::vector<double> length(on.size());
+  for (std::size_t k = 0; k < on.size(); ++k) {
+    length[k] = edge_length[on[k]];
+    for (const std::vector<Index>& copy : curve.copies) length[k] = std::min(length[k], edge_length[copy[k]]);
+  }
+  // How many edges of the result it is to each vertex.
+  std::vector<double> way{0};
+  for (std::size_t k = 0; k < curve.edges(); ++k) {
+    const std::size_t next = (k + 1) % on.size();
+    const double along = norm(mesh.vertices[on[next]] - mesh.vertices[on[k]]);
+    way.push_back(way.back() + 2 * along / (length[k] + length[next]));
+  }
+  const std::size_t count = std::max(least, static_cast<std::size_t>(std::lround(way.back())));
+  std::vector<double> places{0};
+  for (std::size_t i = 1; i < count; ++i) {
+    const double at = way.back() * static_cast<double>(i) / static_cast<double>(count);
+    const auto after = std::upper_bound(way.begin(), way.end() - 1, at);
+    const auto k = static_cast<double>(after - way.begin() - 1);
+    const double to_last = at - *(after - 1), to_next = *after - at;
+    places.push_back(to_last < kAtVertex ? k : to_next < kAtVertex ? k + 1 : k + to_last / (to_last + to_next));
+  }
+  places.push_back(static_cast<double>(curve.edges()));
+  return places;
+}
+
 IntersectionCurves::Division IntersectionCurves::divide(TriangleMesh& mesh, FeatureGraph& features,
-                                                         const std::vector<double>& edge_length) {
+                                                        const std::vector<double>& edge_length) {
   Division division;
   std::vector<Index> all_corners;
   const std::size_t before = mesh.vertices.size();
@@ -304,53 +334,20 @@ IntersectionCurves::Division IntersectionCurves::divide(TriangleMesh& mesh, Feat
     if (!curve.closed) ++between[sorted_edge(curve.copies[0].front(), curve.copies[0].back())];
   for (const Curve& curve : curves_) {
     const std::vector<Index>& on = curve.copies[0];
-    const std::size_t edges = on.size() - (curve.closed ? 0 : 1);
-    std::vector<double> length(on.size());
-    for (std::size_t k = 0; k < on.size(); ++k) {
-      length[k] = edge_length[on[k]];
-      for (const std::vector<Index>& copy : curve.copies) length[k] = std::min(length[k], edge_length[copy[k]]);
-    }
-    // How many edges long the curve is up to each vertex.
-    std::vector<double> way{0};
-    for (std::size_t k = 0; k < edges; ++k) {
-      const Vec3 along = mesh.vertices[on[(k + 1) % on.size()]] - mesh.vertices[on[k]];
-      way.push_back(way.back() + 2 * norm(along) / (length[k] + length[(k + 1) % on.size()]));
-    }
     const bool loop = curve.closed || on.front() == on.back();
     const std::size_t least = loop ? 3 : between[sorted_edge(on.front(), on.back())] > 1 ? 2 : 1;
-    const std::size_t count = std::max(least, static_cast<std::size_t>(std::lround(way.back())));
+    const std::vector<double> places = corner_places(curve, mesh, edge_length, least);
     std::vector<std::vector<Index>> corners(curve.copies.size());
-    std::vector<double> places;  // of the corners, along the polyline in its edges
-    for (std::size_t i = curve.closed ? 0 : 1; i < count; ++i) {
-      const double at = way.back() * static_cast<double>(i) / static_cast<double>(count);
-      std::size_t k = static_cast<std::size_t>(std::upper_bound(way.begin(), way.end(), at) - way.begin()) - 1;
-      k = std::min(k, edges - 1);
-      const double to_last = at - way[k], to_next = way[k + 1] - at;
-      const std::size_t next = (k + 1) % on.size();
-      places.push_back(to_last < kAtVertex   ? static_cast<double>(k)
-                       : to_next < kAtVertex ? static_cast<double>(k + 1)
-                                             : static_cast<double>(k) + to_last / (to_last + to_next));
-      const Vec3 p = mesh.vertices[on[k]] +
-                     (to_last / (to_last + to_next)) * (mesh.vertices[on[next]] - mesh.vertices[on[k]]);
-      for (std::size_t c = 0; c < curve.copies.size(); ++c) {
-        const std::vector<Index>& copy = curve.copies[c];
-        corners[c].push_back(to_last < kAtVertex   ? copy[k]
-                             : to_next < kAtVertex ? copy[next]
-                                                   : put(copy[k], copy[next], p));
-      }
+    for (const double place : places) {
+      const auto k = static_cast<std::size_t>(place);
+      const double t = place - static_cast<double>(k);
+      const std::size_t from = k % on.size(), to = (k + 1) % on.size();
+      const Vec3 p = mesh.vertices[on[from]] + t * (mesh.vertices[on[to]] - mesh.vertices[on[from]]);
+      for (std::size_t c = 0; c < corners.size(); ++c)
+        corners[c].push_back(t == 0 ? curve.copies[c][from] : put(curve.copies[c][from], curve.copies[c][to], p));
     }
-    for (std::size_t c = 0; c < corners.size(); ++c) {
-      all_corners.insert(all_corners.end(), corners[c].begin(), corners[c].end());
-      if (curve.closed) {
-        corners[c].push_back(Index{corners[c].front()});
-      } else {
-        corners[c].insert(corners[c].begin(), curve.copies[c].front());
-        corners[c].push_back(curve.copies[c].back());
-      }
-    }
-    if (!curve.closed) places.insert(places.begin(), 0);
-    places.push_back(static_cast<double>(edges) + (curve.closed ? places.front() : 0));
-    for (std::size_t k = 1; k < corners[0].size(); ++k) {
+    for (const std::vector<Index>& copy : corners) all_corners.insert(all_corners.end(), copy.begin(), copy.end());
+    for (std::size_t k = 1; k < places.size(); ++k) {
       const Vec3 a = mesh.vertices[corners[0][k - 1]], b = mesh.vertices[corners[0][k]];
       Piece piece{&curve, {}, places[k - 1], places[k], a, b};
       for (const std::vector<Index>& copy : corners) piece.ends.push_back({copy[k - 1], copy[k]});

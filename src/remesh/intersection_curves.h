@@ -45,8 +45,8 @@ class IntersectionCurves {
     std::vector<std::array<Index, 2>> crowded;
   };
   // Puts vertices into the mesh where the curves are to have corners: as far from each other as the least edge length
-  // of the components there, `edge_length` being wanted at each vertex. A closed curve gets three at least, and two that
-  // join the same corners one each. The features get these corners.
+  // of the components there, `edge_length` being wanted at each vertex. A closed curve gets three at least, and two
+  // that join the same corners one each. The features get these corners.
   Division divide(TriangleMesh& mesh, FeatureGraph& features, const std::vector<double>& edge_length);
 
   // Of each curve of a graph on the mesh, or on one with divided edges, whether it leads along one of these from corner
@@ -70,6 +70,8 @@ class IntersectionCurves {
     Vec3 from, to;
   };
 
+  static std::vector<double> corner_places(const Curve& curve, const TriangleMesh& mesh,
+                                           const std::vector<double>& edge_length, std::size_t least);
   std::vector<std::array<Index, 2>> crowded_edges(const TriangleMesh& mesh, const FeatureGraph& features,
                                                   const std::vector<Piece>& pieces) const;
   void sort_edges();

@@ -28,8 +28,8 @@ struct KeptFeatures {
 void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const TriangleMesh& input,
                   RemeshResult& result);
 
-// Takes the vertices out of the result, in the same way, that divide curves which are to be one edge: `whole` has a value
-// for each. `surface` is what has been remeshed. Curves stay as they are where that does not go.
+// Takes the vertices out of the result, in the same way, that divide curves which are to be one edge: `whole` has a
+// value for each. `surface` is what has been remeshed. Curves stay as they are where that does not go.
 void make_curves_whole(const std::vector<char>& whole, const FeatureGraph& features, const TriangleMesh& surface,
                        RemeshResult& result);
 

@@ -250,7 +250,14 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   std::vector<double> lengths = lay_down_plain();
   if (!branches) apart_ = SetApart(mesh_, lengths, unbounded_->sizing.vertices);
   const bool all = options.detail == DetailMode::all;
-  if (options.detail != DetailMode::off && !plan_with_intersections(all)) plan(std::move(lengths), all);
+  if (options.detail == DetailMode::off) return;
+  if (!plan_with_intersections(all)) {
+    plan(std::move(lengths), all);
+    return;
+  }
+  context.warn(fmt::format("components meet along {}, where the result has the same vertices and edges of both{}",
+                           plural(meeting_.size(), "curve"),
+                           lets_cross_ ? "; they cross elsewhere, where the edges are too long for it" : ""));
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
@@ -355,7 +362,10 @@ bool Preparation::plan_with_intersections(bool all) {
     sizing_.sharp = features_.edges;
     plan(lay_down_plain(), all);
     const std::vector<std::array<Index, 2>> crowded = divide_intersection_curves();
-    if (crowded.empty()) return true;
+    if (crowded.empty()) {
+      lets_cross_ = !left_out.empty();
+      return true;
+    }
     left_out.insert(left_out.end(), crowded.begin(), crowded.end());
   }
   *this = uncut;
@@ -389,15 +399,6 @@ std::vector<std::array<Index, 2>> Preparation::divide_intersection_curves() {
   sizing_.sharp = features_.edges;
   add_values(division.added);
   const SizeBounds between{division.middles, division.lengths};
-  if (getenv("DBG")) {
-    std::vector<double> l = division.lengths;
-    std::sort(l.begin(), l.end());
-    double mean = 0;
-    for (double x : lengths) mean += x / double(lengths.size());
-    fprintf(stderr, "curves %zu pieces %zu mean h %g lengths/h:", meeting_.size(), l.size(), mean);
-    for (int k = 0; k <= 20; ++k) fprintf(stderr, " %.3g", l[(l.size() - 1) * k / 20] / mean);
-    fprintf(stderr, "\n");
-  }
   kept_lengths_.add(between);
   bounds_.add(between);
   unbounded_.reset();

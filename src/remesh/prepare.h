@@ -69,6 +69,8 @@ class Preparation {
   // The input, welded and oriented.
   const TriangleMesh& mesh() const { return mesh_; }
   const SetApart& apart() const { return apart_; }
+  // Whether components that are set apart cross where the result has no room for the curve in which they do.
+  bool lets_cross() const { return lets_cross_; }
 
  private:
   void find_noise(FeatureOptions& features);
@@ -97,7 +99,8 @@ class Preparation {
   std::optional<SizedMesh> unbounded_;  // laid down already, and still good
   SizeBounds bounds_;
   SetApart apart_;
-  IntersectionCurves meeting_;  // along which those that are set apart meet
+  bool lets_cross_ = false;
+  IntersectionCurves meeting_;                    // along which those that are set apart meet
   std::vector<Index> keep_vertices_;              // of mesh_, ascending
   std::vector<Index> kept_as_;                    // of each of mesh_'s vertices before its details, the input's
   std::vector<std::array<Index, 2>> keep_edges_;  // of mesh_, sorted, lower vertex first

@@ -671,7 +671,7 @@ class NewCrossings {
 
   Crossings of(const TriangleMesh& mesh) {
     Crossings found = find_crossings(mesh);
-    return found.pairs > 0 && of_input() > 0 ? Crossings{} : found;
+    return found.pairs > 0 && (input_.lets_cross() || of_input() > 0) ? Crossings{} : found;
   }
 
   // Pairs of the input's triangles, but for those of components that are set apart.
