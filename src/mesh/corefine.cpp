@@ -9,10 +9,9 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
+#include <set>
 #include <tuple>
 #include <utility>
-#include <variant>
 
 #include "bisector/quality.h"
 #include "core/geometry.h"
@@ -70,19 +69,15 @@ class Corefiner {
   Corefiner(const TriangleMesh& mesh, std::vector<Index> component)
       : input_(mesh), component_(std::move(component)), cuts_(mesh.triangles.size()) {}
 
+  // What two triangles of different components have in common.
   void add(Index s, Index t) {
     const std::array<Point, 3> a = corners_of(s), b = corners_of(t);
     const auto common = CGAL::intersection(Kernel::Triangle_3(a[0], a[1], a[2]), Kernel::Triangle_3(b[0], b[1], b[2]));
     if (!common) return;
-    Cut cut;
-    if (const Point* p = boost::get<Point>(&*common)) cut = {*p, *p};
+    if (const Point* p = boost::get<Point>(&*common)) found_.push_back({{s, t}, {*p, *p}});
     else if (const Kernel::Segment_3* segment = boost::get<Kernel::Segment_3>(&*common))
-      cut = {segment->source(), segment->target()};
-    else return;
-    for (const auto& [triangle, corners] : {std::pair(s, a), std::pair(t, b)}) {
-      cuts_[triangle].push_back(cut);
-      for (const Point& p : cut) put_on_edge(triangle, corners, p);
-    }
+      found_.push_back({{s, t}, {segment->source(), segment->target()}});
+    else overlapping_.insert(components_of({s, t}));
   }
 
   Corefinement run() {
@@ -90,6 +85,13 @@ class Corefiner {
     result_.mesh.triangles.clear();
     result_.mesh.labels.clear();
     result_.mesh.face_of_triangle.clear();
+    for (const auto& [pair, cut] : found_) {
+      if (overlapping_.contains(components_of(pair))) continue;
+      for (const Index t : pair) {
+        cuts_[t].push_back(cut);
+        for (const Point& p : cut) put_on_edge(t, corners_of(t), p);
+      }
+    }
     for (Index t = 0; t < cuts_.size(); ++t)
       if (cuts_[t].empty() && !has_points(t)) take(t, input_.triangles[t]);
       else divide(t);
@@ -100,6 +102,10 @@ class Corefiner {
 
  private:
   using Cut = std::array<Point, 2>;
+
+  std::pair<Index, Index> components_of(const std::array<Index, 2>& pair) const {
+    return std::minmax({component_[input_.triangles[pair[0]][0]], component_[input_.triangles[pair[1]][0]]});
+  }
 
   std::array<Point, 3> corners_of(Index t) const {
     const auto [a, b, c] = input_.triangles[t];
@@ -207,8 +213,10 @@ class Corefiner {
 
   const TriangleMesh& input_;
   const std::vector<Index> component_;
-  std::vector<std::vector<Cut>> cuts_;          // of each triangle
-  std::map<Edge, std::vector<Point>> on_edge_;  // between its ends
+  std::vector<std::pair<std::array<Index, 2>, Cut>> found_;
+  std::set<std::pair<Index, Index>> overlapping_;  // components
+  std::vector<std::vector<Cut>> cuts_;             // of each triangle
+  std::map<Edge, std::vector<Point>> on_edge_;     // between its ends
   std::map<std::tuple<Index, double, double, double>, Index> vertex_at_;
   Corefinement result_;
 };

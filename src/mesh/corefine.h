@@ -25,9 +25,9 @@ struct Corefinement {
 
 // Cuts triangles of different components, which hang together through vertices, along their common segments, so that
 // components only meet in vertices and edges that are at the same points to the bit, up to the rounding of new vertices
-// to doubles. Triangles are divided by Delaunay triangulations with these segments as constraints, in exact arithmetic
-// (as the corefinement of Loriot, Lévy et al. in CGAL). What is coplanar is not cut along itself. Nothing if no two
-// triangles of different components intersect, or more than `most_pairs` do.
+// to doubles. Triangles are divided by constrained Delaunay triangulations in exact arithmetic. Two components with
+// triangles that lie on each other in a plane are not cut along each other: they would have areas in common still.
+// Nothing if no triangles of different components intersect, or more than `most_pairs` do.
 std::optional<Corefinement> corefine_components(const TriangleMesh& mesh, std::size_t most_pairs);
 
 // What components have in common.

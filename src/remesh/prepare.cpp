@@ -215,7 +215,7 @@ WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double
   return welded;
 }
 
-Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches)
+Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches, bool shares_intersections)
     : welded_(weld_and_orient(ordered.mesh, ordered.options.weld, context)), mesh_(std::exchange(welded_.mesh, {})),
       sizing_(ordered.options.sizing), target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
   const TriangleMesh& input = ordered.mesh;
@@ -251,13 +251,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   if (!branches) apart_ = SetApart(mesh_, lengths, unbounded_->sizing.vertices);
   const bool all = options.detail == DetailMode::all;
   if (options.detail == DetailMode::off) return;
-  if (!plan_with_intersections(all)) {
-    plan(std::move(lengths), all);
-    return;
-  }
-  context.warn(fmt::format("components meet along {}, where the result has the same vertices and edges of both{}",
-                           plural(meeting_.size(), "curve"),
-                           lets_cross_ ? "; they cross elsewhere, where the edges are too long for it" : ""));
+  if (!shares_intersections || !plan_with_intersections(all)) plan(std::move(lengths), all);
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
@@ -392,6 +386,7 @@ void Preparation::add_values(const std::vector<EdgePoint>& added) {
 
 // By the edge lengths that there are beside details. Returns the edges along which there is no room.
 std::vector<std::array<Index, 2>> Preparation::divide_intersection_curves() {
+  undivided_ = {mesh_, features_, sizing_, bounds_, meeting_};
   const SizedMesh sized = lay_down_bounded();
   std::vector<double> lengths(mesh_.vertices.size());
   for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(sized.sizing, v);
@@ -430,7 +425,22 @@ void Preparation::bound(const SizeBounds& bounds) {
   if (!bounds.points.empty()) unbounded_.reset();
   const std::size_t before = bounds_.points.size();
   bounds_.add(bounds);
-  for (std::size_t k = before; k < bounds_.points.size(); ++k) bounds_.points[k] = apart_.back(bounds_.points[k]);
+  for (std::size_t k = before; k < bounds_.points.size(); ++k) {
+    bounds_.points[k] = apart_.back(bounds_.points[k]);
+    if (undivided_) undivided_->bounds.add({{bounds_.points[k]}, {bounds_.lengths[k]}});
+  }
+}
+
+void Preparation::divide_intersections_again() {
+  if (!undivided_) return;
+  Undivided before = *std::exchange(undivided_, std::nullopt);
+  mesh_ = std::move(before.mesh);
+  features_ = std::move(before.features);
+  sizing_ = std::move(before.sizing);
+  bounds_ = std::move(before.bounds);
+  meeting_ = std::move(before.meeting);
+  kept_lengths_ = {};
+  divide_intersection_curves();
 }
 
 void Preparation::ask_for(std::size_t vertices) {

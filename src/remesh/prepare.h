@@ -56,19 +56,25 @@ struct OrderedInput {
 class Preparation {
  public:
   // Welds and orients the input, finds its features and plans their details. Where it branches on purpose, parts that
-  // touch are neither separated nor set apart. Throws Error as remesh does.
-  Preparation(OrderedInput input, const Context& context, bool branches = false);
+  // touch are neither separated nor set apart; where it does not share intersections, components that are set apart are
+  // not cut where they cross. Throws Error as remesh does.
+  Preparation(OrderedInput input, const Context& context, bool branches = false, bool shares_intersections = true);
 
   // Beside the bounds that there are already. Points may be those of what was set apart.
   void bound(const SizeBounds& bounds);
   // So many vertices, whatever was asked for.
   void ask_for(std::size_t vertices);
+  // Components that share intersections get corners there for the edge lengths as they are now. Curves and corners are
+  // others then than in domains before.
+  void divide_intersections_again();
   // The domain with its density as it stands.
   PreparedInput lay_down();
   const WeldResult& welded() const { return welded_; }
   // The input, welded and oriented.
   const TriangleMesh& mesh() const { return mesh_; }
   const SetApart& apart() const { return apart_; }
+  // The curves along which components have the same vertices.
+  const IntersectionCurves& intersections() const { return meeting_; }
   // Whether components that are set apart cross where the result has no room for the curve in which they do.
   bool lets_cross() const { return lets_cross_; }
 
@@ -99,7 +105,17 @@ class Preparation {
   std::optional<SizedMesh> unbounded_;  // laid down already, and still good
   SizeBounds bounds_;
   SetApart apart_;
+  // Before the intersection curves were divided, but with all bounds.
+  struct Undivided {
+    TriangleMesh mesh;
+    FeatureGraph features;
+    SizingOptions sizing;
+    SizeBounds bounds;
+    IntersectionCurves meeting;
+  };
+
   bool lets_cross_ = false;
+  std::optional<Undivided> undivided_;
   IntersectionCurves meeting_;                    // along which those that are set apart meet
   std::vector<Index> keep_vertices_;              // of mesh_, ascending
   std::vector<Index> kept_as_;                    // of each of mesh_'s vertices before its details, the input's

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "bisector/distance_bound.h"
@@ -59,6 +60,8 @@ constexpr double kMostOnFeatures = 1e6, kMostOnFeaturesPerVertex = 1000;
 // cell, or curve, in so many is such.
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
+// Of triangles, more than one sliver in so many are too high a price for components that do not cross.
+constexpr std::size_t kFewSlivers = 50;
 // Of the seeds wanted, by how many those of an earlier run may be off. Where topology took many more, it has to be
 // found anew for other edge lengths.
 constexpr double kMostOff = 0.01;
@@ -731,6 +734,24 @@ AnotherRun another_run(Pipeline& pipeline, const JudgedResult& judged, const Cro
   return next;
 }
 
+bool has_faults(const JudgedResult& judged) {
+  return !judged.result.topology_matches || judged.result.features.broken > 0 || judged.slivers.worth_another_run ||
+         judged.slivers.hopeless;
+}
+
+// Whether a result in which components share vertices where they meet is to be preferred to one in which they do not:
+// slivers are few, and fewer triangles cross, if these are no more than those of the input.
+bool shares_well(const JudgedResult& shared, const JudgedResult& apart, const TriangleMesh& input) {
+  const std::size_t too_many = count_self_intersections(input) + 1;
+  const auto rank = [&](const JudgedResult& j) {
+    const TriangleMesh& mesh = j.result.mesh;
+    const std::size_t slivers = j.slivers.bounds.points.size() / 3;
+    return std::tuple(!j.result.topology_matches, slivers * kFewSlivers > mesh.triangles.size(),
+                      std::min(count_self_intersections(mesh), too_many), slivers);
+  };
+  return rank(shared) < rank(apart);
+}
+
 }  // namespace
 
 RemeshPlan plan_of(const RemeshOptions& options) {
@@ -757,19 +778,16 @@ class Runs {
   Runs(const TriangleMesh& input, const RemeshOptions& options, bool branches, const Context& context)
       : input_(input), options_(options), branches_(branches), context_(context), compute_(options.compute, context),
         progress_(context) {
-    OrderedInput ordered(input, options);
-    vertex_of_ = std::move(ordered.vertex_of);
-    input_of_.resize(ordered.mesh.vertices.size());
+    prepare(context, true);
+    input_of_.resize(input.vertices.size());
     for (Index v = 0; v < vertex_of_.size(); ++v)
       if (vertex_of_[v] != kNone) input_of_[vertex_of_[v]] = v;
-    preparation_.emplace(std::move(ordered), context, branches);
-    new_crossings_.emplace(*preparation_);
-    may_shorten_ = options.seeds.empty() && options.detail != DetailMode::off;
     preparing_ = watch_.seconds();
   }
 
   RemeshResult run() {
     settle();
+    if (!preparation_->intersections().empty()) settle_intersections();
     if (options_.distance_max > 0) come_near();
     return take_best();
   }
@@ -781,8 +799,10 @@ class Runs {
     AnotherRun next;
   };
 
+  void prepare(const Context& context, bool shares_intersections);
   Run make_run(bool last);
   void settle();
+  void settle_intersections();
   void come_near();
   RemeshResult take_best();
 
@@ -801,8 +821,17 @@ class Runs {
   double placing_ = 0;  // work until seeds are placed for the first time, those of a run for sizes among them
   Spent spent_;
   std::optional<PlacedSeeds> earlier_;
+  double work_before_ = 0;  // of runs in which components shared vertices
   std::optional<JudgedResult> best_;
 };
+
+void Runs::prepare(const Context& context, bool shares_intersections) {
+  OrderedInput ordered(input_, options_);
+  vertex_of_ = std::move(ordered.vertex_of);
+  preparation_.emplace(std::move(ordered), context, branches_, shares_intersections);
+  new_crossings_.emplace(*preparation_);
+  may_shorten_ = options_.seeds.empty() && options_.detail != DetailMode::off;
+}
 
 Runs::Run Runs::make_run(bool last) {
   const MakeBackend make_backend = [&](const Surface& surface) { return compute_.backend(surface); };
@@ -862,10 +891,34 @@ void Runs::settle() {
     Run run = make_run(left == 0);
     if (best_ && !is_better(run.judged, *best_)) return;
     best_ = std::move(run.judged);
-    if (left == 0 || !run.next.why || spent_.totals.work > kMostWork * placing_) return;
+    if (left == 0 || !run.next.why || spent_.totals.work - work_before_ > kMostWork * placing_) return;
     preparation_->bound(run.next.bounds);
     progress_.start_again(run.next.why);
   }
+}
+
+// Where the curves in which components meet leave no good triangles, components are remeshed without them, too.
+void Runs::settle_intersections() {
+  if (has_faults(*best_)) {
+    std::optional<Preparation> sharing = std::move(preparation_);
+    std::optional<PlacedSeeds> seeds = std::exchange(earlier_, std::nullopt);
+    std::optional<JudgedResult> shared = std::exchange(best_, std::nullopt);
+    work_before_ = spent_.totals.work;
+    progress_.start_again("components that cross");
+    Context silent = context_;
+    silent.warning = nullptr;
+    prepare(silent, false);
+    settle();
+    if (!shares_well(*shared, *best_, preparation_->mesh())) return;
+    preparation_ = std::move(sharing);
+    new_crossings_.emplace(*preparation_);
+    earlier_ = std::move(seeds);
+    best_ = std::move(shared);
+  }
+  const std::size_t curves = preparation_->intersections().size();
+  context_.warn(fmt::format(
+      "components meet along {} curve{}, where they have the same vertices and edges{}", curves, curves == 1 ? "" : "s",
+      preparation_->lets_cross() ? "; elsewhere they cross, since edges are too long for it" : ""));
 }
 
 // With shorter edges, and as many vertices as that takes, where the result is too far from the input.
@@ -882,6 +935,10 @@ void Runs::come_near() {
     asked = std::min(std::max(next, asked + 1), outcome.most_vertices);
     preparation_->bound(last.bounds);
     preparation_->ask_for(asked);
+    if (!preparation_->intersections().empty()) {
+      preparation_->divide_intersections_again();
+      earlier_.reset();
+    }
     progress_.start_again("shorter edges for the distance");
     Run run = make_run(true);
     run.judged.crossings = new_crossings_->of(run.judged.result.mesh).pairs;

@@ -113,7 +113,8 @@ TEST(Preparation, BoundsFollowWhatIsSetApart) {
   const auto densest = std::max_element(prepared.density.begin(), prepared.density.end());
   ASSERT_NE(densest, prepared.density.end());
   EXPECT_GT(*densest, 100 * *std::min_element(prepared.density.begin(), prepared.density.end()));
-  EXPECT_LT(norm(prepared.mesh.vertices[static_cast<std::size_t>(densest - prepared.density.begin())] - at), 0.02);
+  const Vec3& there = prepared.mesh.vertices[static_cast<std::size_t>(densest - prepared.density.begin())];
+  EXPECT_LT(norm(preparation.apart().back(there) - preparation.apart().back(at)), 0.02);
 }
 
 }  // namespace
