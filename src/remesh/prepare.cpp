@@ -36,6 +36,8 @@ constexpr std::size_t kMostVertices = 100'000'000;
 constexpr double kApart = 1e-7;
 // Of triangles that cross, from which on they are more of a soup than components.
 constexpr std::size_t kMostPairs = 100'000;
+// Of the vertices wanted, for each edge that two components have in common: with fewer, nothing is left for the rest.
+constexpr std::size_t kLeastPerEdge = 8;
 // Plans without what there is no room for.
 constexpr int kMostRounds = 10;
 // Of the diagonal, from no rounding to that of six digits.
@@ -354,8 +356,11 @@ bool Preparation::plan_with_intersections(bool all) {
     meeting_ = IntersectionCurves(mesh_, left_out, features_);
     if (meeting_.empty()) break;
     sizing_.sharp = features_.edges;
-    plan(lay_down_plain(), all);
+    std::vector<double> lengths = lay_down_plain();
+    const std::size_t vertices = unbounded_->sizing.vertices;
+    plan(std::move(lengths), all);
     const std::vector<std::array<Index, 2>> crowded = divide_intersection_curves();
+    if (kLeastPerEdge * kept_lengths_.points.size() > vertices) break;
     if (crowded.empty()) {
       lets_cross_ = !left_out.empty();
       return true;
