@@ -97,14 +97,15 @@ class Corefiner {
       else divide(t);
     for (const auto& [edge, points] : on_edge_) add_splits(edge);
     std::sort(result_.splits.begin(), result_.splits.end());
+    result_.overlapping.assign(overlapping_.begin(), overlapping_.end());
     return std::move(result_);
   }
 
  private:
   using Cut = std::array<Point, 2>;
 
-  std::pair<Index, Index> components_of(const std::array<Index, 2>& pair) const {
-    return std::minmax({component_[input_.triangles[pair[0]][0]], component_[input_.triangles[pair[1]][0]]});
+  std::array<Index, 2> components_of(const std::array<Index, 2>& pair) const {
+    return sorted_edge(component_[input_.triangles[pair[0]][0]], component_[input_.triangles[pair[1]][0]]);
   }
 
   std::array<Point, 3> corners_of(Index t) const {
@@ -214,9 +215,9 @@ class Corefiner {
   const TriangleMesh& input_;
   const std::vector<Index> component_;
   std::vector<std::pair<std::array<Index, 2>, Cut>> found_;
-  std::set<std::pair<Index, Index>> overlapping_;  // components
-  std::vector<std::vector<Cut>> cuts_;             // of each triangle
-  std::map<Edge, std::vector<Point>> on_edge_;     // between its ends
+  std::set<std::array<Index, 2>> overlapping_;  // components
+  std::vector<std::vector<Cut>> cuts_;          // of each triangle
+  std::map<Edge, std::vector<Point>> on_edge_;  // between its ends
   std::map<std::tuple<Index, double, double, double>, Index> vertex_at_;
   Corefinement result_;
 };
@@ -235,7 +236,7 @@ std::optional<Corefinement> corefine_components(const TriangleMesh& mesh, std::s
   return corefiner.run();
 }
 
-CommonParts find_common_parts(const TriangleMesh& mesh) {
+CommonParts find_common_parts(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& overlapping) {
   const std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
   std::vector<Index> order;
   for (Index v = 0; v < component.size(); ++v)
@@ -280,8 +281,14 @@ CommonParts find_common_parts(const TriangleMesh& mesh) {
     }
   }
   for (auto& [edge, sides] : at_edge) {
-    std::sort(sides.components.begin(), sides.components.end());
-    if (sides.parts && sides.components.front() != sides.components.back()) common.edges.push_back(edge);
+    std::vector<Index>& of = sides.components;
+    std::sort(of.begin(), of.end());
+    of.erase(std::unique(of.begin(), of.end()), of.end());
+    bool meets = false;
+    for (std::size_t i = 0; i < of.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        meets |= !std::binary_search(overlapping.begin(), overlapping.end(), std::array<Index, 2>{of[j], of[i]});
+    if (sides.parts && meets) common.edges.push_back(edge);
   }
   return common;
 }

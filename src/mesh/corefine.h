@@ -21,6 +21,8 @@ struct Corefinement {
   TriangleMesh mesh;
   std::vector<InsertedVertex> inserted;      // of each vertex that was put in, of the triangles as they were
   std::vector<std::array<Index, 3>> splits;  // EdgeSplits of the edges that were divided (features/edge_splits.h)
+  // Pairs of components, lower one first and ascending, that have areas in common: they were not cut along each other.
+  std::vector<std::array<Index, 2>> overlapping;
 };
 
 // Cuts triangles of different components, which hang together through vertices, along their common segments, so that
@@ -37,7 +39,7 @@ struct CommonParts {
 };
 
 // Vertices and edges of different components at the same points, but for edges beside which components have no other
-// triangles than common ones.
-CommonParts find_common_parts(const TriangleMesh& mesh);
+// triangles than common ones, and those that no two have but pairs that are overlapping.
+CommonParts find_common_parts(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& overlapping = {});
 
 }  // namespace bisector

@@ -9,7 +9,6 @@
 
 #include "core/geometry.h"
 #include "features/curves.h"
-#include "mesh/corefine.h"
 #include "mesh/edge_splitter.h"
 #include "mesh/topology.h"
 #include "remesh/kept.h"
@@ -38,8 +37,9 @@ struct Copy {
 // The lines that components have in common, as a graph over the first vertex at each point.
 class Network {
  public:
-  Network(const TriangleMesh& mesh, const std::vector<Edge>& left_out) {
-    const CommonParts common = find_common_parts(mesh);
+  Network(const Corefinement& cut, const std::vector<Edge>& left_out) {
+    const TriangleMesh& mesh = cut.mesh;
+    const CommonParts common = find_common_parts(mesh, cut.overlapping);
     if (common.edges.empty()) return;
     const std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
     for (const Triangle& t : mesh.triangles)
@@ -172,17 +172,17 @@ FeatureGraph features_beside(const FeatureGraph& features, const Network& networ
 
 }  // namespace
 
-IntersectionCurves::IntersectionCurves(const TriangleMesh& mesh, const std::vector<Edge>& left_out,
+IntersectionCurves::IntersectionCurves(const Corefinement& cut, const std::vector<Edge>& left_out,
                                        FeatureGraph& features)
-    : vertices_(mesh.vertices.size()) {
-  Network network(mesh, left_out);
+    : vertices_(cut.mesh.vertices.size()) {
+  Network network(cut, left_out);
   if (network.edges().empty()) return;
   FeatureGraph all = features_beside(features, network);
   FeatureOptions turns;
   turns.mode = FeatureMode::none;
   turns.given = network.edges();
   network.end_at_branchings();
-  for (const Index corner : detect_features(mesh, turns).corners) network.end_at(corner);
+  for (const Index corner : detect_features(cut.mesh, turns).corners) network.end_at(corner);
   for (const Index corner : all.corners) network.end_at(corner);
   for (const FeatureCurve& curve : all.curves)
     for (const Index v : curve.vertices) network.end_at(v);

@@ -14,6 +14,7 @@
 #include "bisector/features.h"
 #include "features/edge_splits.h"
 #include "features/wedges.h"
+#include "mesh/corefine.h"
 
 namespace bisector {
 
@@ -23,7 +24,7 @@ class IntersectionCurves {
   IntersectionCurves() = default;
   // Those of a mesh whose components have been cut along them, but for the edges `left_out`. Its features get them:
   // other curves end where they meet them.
-  IntersectionCurves(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& left_out,
+  IntersectionCurves(const Corefinement& cut, const std::vector<std::array<Index, 2>>& left_out,
                      FeatureGraph& features);
 
   bool empty() const { return curves_.empty(); }

@@ -347,13 +347,13 @@ bool Preparation::plan_with_intersections(bool all) {
       for (std::size_t k = 0; k < 3; ++k) value += v.weights[k] * values[mesh_.triangles[v.triangle][k]];
       values.push_back(value);
     }
-  mesh_ = std::move(corefined->mesh);
+  mesh_ = corefined->mesh;
   features_ = split_features(features_, corefined->splits);
   const Preparation cut = *this;
   std::vector<std::array<Index, 2>> left_out;
   for (int round = 0; round < kMostRounds; ++round) {
     *this = cut;
-    meeting_ = IntersectionCurves(mesh_, left_out, features_);
+    meeting_ = IntersectionCurves(*corefined, left_out, features_);
     if (meeting_.empty()) break;
     sizing_.sharp = features_.edges;
     std::vector<double> lengths = lay_down_plain();

@@ -117,7 +117,9 @@ INSTANTIATE_TEST_SUITE_P(All, Corefined, testing::ValuesIn(crossings()), [](cons
 
 TEST(Corefine, CutsNothingWhereAreasAreCommonOrNothingMeets) {
   const auto stacked = corefine_components(joined(box(1), box(2), {0.5, 0.5, 1}), kAnyPairs);
-  EXPECT_TRUE(!stacked || stacked->inserted.empty());
+  ASSERT_TRUE(stacked.has_value());
+  EXPECT_TRUE(stacked->inserted.empty());
+  EXPECT_EQ(stacked->overlapping, (std::vector<std::array<Index, 2>>{{0, 1}}));
   EXPECT_FALSE(corefine_components(joined(box(1), box(1), {2, 0, 0}), kAnyPairs).has_value());
   // One surface that crosses itself has one component.
   EXPECT_FALSE(corefine_components(box(2), kAnyPairs).has_value());
@@ -129,6 +131,7 @@ TEST(Corefine, FindsNoEdgesInsideOfCommonFaces) {
   const CommonParts common = find_common_parts(joined(box(2), box(2), {0, 0, 1}));
   EXPECT_EQ(common.edges.size(), 8u);
   EXPECT_TRUE(find_common_parts(joined(box(2), box(2))).edges.empty());
+  EXPECT_TRUE(find_common_parts(joined(box(2), box(2), {0, 0, 1}), {{0, 1}}).edges.empty());
 }
 
 }  // namespace

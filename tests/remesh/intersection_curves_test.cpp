@@ -38,7 +38,7 @@ TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
   ASSERT_TRUE(cut.has_value());
   TriangleMesh mesh = cut->mesh;
   FeatureGraph features = detect_features(mesh, {});
-  IntersectionCurves curves(mesh, {}, features);
+  IntersectionCurves curves(*cut, {}, features);
   ASSERT_EQ(curves.size(), 2u);
   const double wanted = 0.1;
   const auto division = curves.divide(mesh, features, std::vector<double>(mesh.vertices.size(), wanted));
@@ -65,7 +65,7 @@ TEST(IntersectionCurves, WithoutRoomAreLeftOut) {
   FeatureGraph features = detect_features(cut->mesh, {});
   TriangleMesh mesh = cut->mesh;
   FeatureGraph with = features;
-  IntersectionCurves curves(mesh, {}, with);
+  IntersectionCurves curves(*cut, {}, with);
   // The circles are three edges each then, and bulge out of them.
   const auto division = curves.divide(mesh, with, std::vector<double>(mesh.vertices.size(), 100.0));
   for (const auto& edge : division.crowded) {
@@ -80,7 +80,7 @@ TEST(IntersectionCurves, WithoutRoomAreLeftOut) {
       if (common.same[a] != kNone && common.same[b] != kNone) all.push_back(sorted_edge(a, b));
     }
   const std::size_t before = features.curves.size();
-  EXPECT_TRUE(IntersectionCurves(cut->mesh, all, features).empty());
+  EXPECT_TRUE(IntersectionCurves(*cut, all, features).empty());
   EXPECT_EQ(features.curves.size(), before);
 }
 
