@@ -66,7 +66,8 @@ constexpr std::size_t kFewSlivers = 50;
 // found anew for other edge lengths.
 constexpr double kMostOff = 0.01;
 // Of a result, while that makes it better, and while all took no more than so many times the work of placing seeds.
-constexpr int kRefinements = 3;
+// Where components share intersections there may have to be runs in which they do not.
+constexpr int kRefinements = 3, kSharedRefinements = 1;
 constexpr double kMostWork = 5;
 // Runs for a distance to the input, how many times the vertices they may take, and the gap between bounds of it.
 constexpr int kNearings = 8;
@@ -887,7 +888,8 @@ Runs::Run Runs::make_run(bool last) {
 
 // While results become better, with shorter edges for what is wrong with them.
 void Runs::settle() {
-  for (int left = may_shorten_ ? kRefinements : 0;; --left) {
+  const int refinements = preparation_->intersections().empty() ? kRefinements : kSharedRefinements;
+  for (int left = may_shorten_ ? refinements : 0;; --left) {
     Run run = make_run(left == 0);
     if (best_ && !is_better(run.judged, *best_)) return;
     best_ = std::move(run.judged);
