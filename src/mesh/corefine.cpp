@@ -1,10 +1,7 @@
 #include "mesh/corefine.h"
 
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
-#include <CGAL/Constrained_triangulation_face_base_2.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
-#include <CGAL/Triangulation_data_structure_2.h>
-#include <CGAL/Triangulation_vertex_base_with_info_2.h>
 #include <CGAL/intersections.h>
 
 #include <algorithm>
@@ -16,15 +13,13 @@
 #include "bisector/quality.h"
 #include "core/geometry.h"
 #include "mesh/topology.h"
+#include "mesh/triangle_quality.h"
 
 namespace bisector {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_exact_constructions_kernel;
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<Index, Kernel>;
-using FaceBase = CGAL::Constrained_triangulation_face_base_2<Kernel>;
-using Structure = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
-using Delaunay = CGAL::Constrained_Delaunay_triangulation_2<Kernel, Structure, CGAL::Exact_intersections_tag>;
+using Delaunay = CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Default, CGAL::Exact_intersections_tag>;
 using Point = Kernel::Point_3;
 using Edge = std::array<Index, 2>;
 
@@ -142,29 +137,18 @@ class Corefiner {
     if (CGAL::collinear(corners[0], corners[1], corners[2])) return take(t, v);
     const Projection flat(corners);
     Delaunay parts;
-    for (std::size_t k = 0; k < 3; ++k) parts.insert(flat(corners[k]))->info() = v[k];
-    const auto insert = [&](const Point& p) {
-      const std::size_t before = parts.number_of_vertices();
-      const Delaunay::Vertex_handle at = parts.insert(flat(p));
-      if (parts.number_of_vertices() > before) at->info() = kNone;
-      return at;
-    };
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto points = on_edge_.find(sorted_edge(v[k], v[(k + 1) % 3]));
-      if (points == on_edge_.end()) continue;
-      for (const Point& p : points->second) insert(p);
-    }
+    std::map<Delaunay::Vertex_handle, Index> index;
+    for (std::size_t k = 0; k < 3; ++k) index[parts.insert(flat(corners[k]))] = v[k];
+    for (std::size_t k = 0; k < 3; ++k)
+      if (const auto points = on_edge_.find(sorted_edge(v[k], v[(k + 1) % 3])); points != on_edge_.end())
+        for (const Point& p : points->second) parts.insert(flat(p));
     for (const auto& [from, to] : cuts_[t]) {
-      const Delaunay::Vertex_handle a = insert(from), b = insert(to);
+      const Delaunay::Vertex_handle a = parts.insert(flat(from)), b = parts.insert(flat(to));
       if (a != b) parts.insert_constraint(a, b);
     }
-    // Vertices where two segments cross have no index either: they are not among the corners.
-    std::map<Delaunay::Vertex_handle, Index> index;
-    for (const auto at : parts.finite_vertex_handles()) {
-      const bool is_corner =
-          at->point() == flat(corners[0]) || at->point() == flat(corners[1]) || at->point() == flat(corners[2]);
-      index[at] = is_corner ? at->info() : vertex_at(t, rounded(flat.back(at->point())));
-    }
+    // Those where two segments cross are among them.
+    for (const auto at : parts.finite_vertex_handles())
+      if (!index.contains(at)) index[at] = vertex_at(t, rounded(flat.back(at->point())));
     for (const auto face : parts.finite_face_handles()) {
       Triangle part{index[face->vertex(0)], index[face->vertex(1)], index[face->vertex(2)]};
       if (part[0] == part[1] || part[1] == part[2] || part[2] == part[0]) continue;
@@ -181,18 +165,11 @@ class Corefiner {
                                                      static_cast<Index>(result_.mesh.vertices.size()));
     if (is_new) {
       result_.mesh.vertices.push_back(p);
-      result_.inserted.push_back({t, weights_at(t, p)});
+      const auto [a, b, c] = v;
+      result_.inserted.push_back(
+          {t, barycentric_weights(input_.vertices[a], input_.vertices[b], input_.vertices[c], p)});
     }
     return at->second;
-  }
-
-  std::array<double, 3> weights_at(Index t, const Vec3& p) const {
-    const auto [a, b, c] = input_.triangles[t];
-    const Vec3 u = input_.vertices[b] - input_.vertices[a], w = input_.vertices[c] - input_.vertices[a];
-    const Vec3 normal = cross(u, w), d = p - input_.vertices[a];
-    const double square = norm2(normal);
-    const double second = dot(cross(d, w), normal) / square, third = dot(cross(u, d), normal) / square;
-    return {1 - second - third, second, third};
   }
 
   // From the lower end on, each point divides what is left of the edge.

@@ -25,6 +25,14 @@ inline double triangle_height(const Vec3& a, const Vec3& b, const Vec3& c) {
   return longest > 0 ? norm(twice_area_normal(a, b, c)) / longest : 0;
 }
 
+// Barycentric coordinates of a point in the plane of a triangle that has an area.
+inline std::array<double, 3> barycentric_weights(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
+  const Vec3 n = twice_area_normal(a, b, c);
+  const double scale = 1 / norm2(n);
+  const double second = dot(cross(p - a, c - a), n) * scale, third = dot(cross(b - a, p - a), n) * scale;
+  return {1 - second - third, second, third};
+}
+
 struct Valences {
   std::vector<Index> neighbours;  // of each vertex, through edges
   std::vector<char> border;       // whether a vertex has an edge of one triangle

@@ -15,6 +15,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "mesh/topology.h"
+#include "mesh/triangle_quality.h"
 #include "spatial/nearest.h"
 
 namespace bisector {
@@ -51,14 +52,6 @@ Vec3 unit_normal(const Corners& p) {
 }
 
 Vec3 nearest_on(const Corners& t, const Vec3& p) { return nearest_on_triangle(p, t[0], t[1], t[2]); }
-
-// Barycentric coordinates of a point of a triangle that has an area.
-Weights weights_of(const Corners& p, const Vec3& q) {
-  const Vec3 n = cross(p[1] - p[0], p[2] - p[0]);
-  const double scale = 1 / norm2(n);
-  const double b = dot(cross(q - p[0], p[2] - p[0]), n) * scale, c = dot(cross(p[1] - p[0], q - p[0]), n) * scale;
-  return {1 - b - c, b, c};
-}
 
 // A triangle similar to the one that it is part of.
 struct Part {
@@ -322,7 +315,7 @@ std::vector<Local> Fit::local_forms() const {
         }
         for (const Index* i = points.begin(t); i != points.end(t); ++i) {
           const Vec3 q = nearest_on(p, points_[*i]);
-          add(reference_weight(), weights_of(p, q), points_[*i] - q, point_triangle_[*i]);
+          add(reference_weight(), barycentric_weights(p[0], p[1], p[2], q), points_[*i] - q, point_triangle_[*i]);
         }
       },
       256);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "core/geometry.h"
@@ -28,10 +27,6 @@ constexpr double kLeastCosine = 0.966;  // of 15 degrees between two edges
 struct Copy {
   Index component;
   Edge ends;  // of the mesh, at the points of the common edge's ends
-
-  friend bool operator<(const Copy& a, const Copy& b) {
-    return std::tie(a.component, a.ends) < std::tie(b.component, b.ends);
-  }
 };
 
 // The lines that components have in common, as a graph over the first vertex at each point.
@@ -60,7 +55,7 @@ class Network {
                          [&](const Copy& copy) { return go.contains(sorted_edge(copy.ends[0], copy.ends[1])); });
     });
     for (auto& [edge, copies] : copies_) {
-      std::sort(copies.begin(), copies.end());
+      std::sort(copies.begin(), copies.end(), [](const Copy& a, const Copy& b) { return a.component < b.component; });
       for (const Index end : edge) beside_[end].push_back(edge);
       for (const Copy& copy : copies) {
         edges_.push_back(sorted_edge(copy.ends[0], copy.ends[1]));
@@ -74,8 +69,6 @@ class Network {
   // Of the mesh, sorted.
   const std::vector<Edge>& edges() const { return edges_; }
   bool has(Index a, Index b) const { return std::binary_search(edges_.begin(), edges_.end(), sorted_edge(a, b)); }
-  const std::map<Index, std::vector<Edge>>& points() const { return beside_; }
-  const std::vector<Copy>& copies(const Edge& edge) const { return copies_.at(edge); }
 
   // Curves end at this vertex, and at those of other components at its point.
   void end_at(Index vertex) {
@@ -121,6 +114,29 @@ class Network {
     for (const auto& [point, edges] : beside_)
       for (const Edge& edge : edges)
         if (!taken.contains(edge)) follow(point, edge);
+    return found;
+  }
+  // The vertices along a path on each of the components, none if they do not hang together: a component may have
+  // several at a point.
+  std::vector<std::vector<Index>> copies_along(const Path& path) const {
+    const std::vector<Index>& on = path.points;
+    std::vector<std::vector<Index>> found;
+    for (std::size_t k = 0; k + (path.closed ? 0 : 1) < on.size(); ++k) {
+      const Index from = on[k], to = on[(k + 1) % on.size()];
+      const std::vector<Copy>& copies = copies_.at(sorted_edge(from, to));
+      const std::size_t start = from < to ? 0 : 1;
+      if (k == 0)
+        for (const Copy& copy : copies) found.push_back({copy.ends[start]});
+      for (std::size_t c = 0; c < found.size(); ++c) {
+        if (found[c].back() != copies[c].ends[start]) return {};
+        found[c].push_back(copies[c].ends[1 - start]);
+      }
+    }
+    for (std::vector<Index>& copy : found) {
+      if (!path.closed) continue;
+      if (copy.back() != copy.front()) return {};
+      copy.pop_back();
+    }
     return found;
   }
 
@@ -186,66 +202,33 @@ IntersectionCurves::IntersectionCurves(const Corefinement& cut, const std::vecto
   for (const Index corner : all.corners) network.end_at(corner);
   for (const FeatureCurve& curve : all.curves)
     for (const Index v : curve.vertices) network.end_at(v);
-  for (const Network::Path& path : network.paths()) {
-    Curve curve;
-    curve.closed = path.closed;
-    const std::size_t edges = path.points.size() - (path.closed ? 0 : 1);
-    const auto copies_of = [&](std::size_t k) {
-      return network.copies(sorted_edge(path.points[k], path.points[(k + 1) % path.points.size()]));
-    };
-    curve.copies.resize(copies_of(0).size());
-    bool hangs_together = true;
-    for (std::size_t k = 0; k < edges; ++k) {
-      const std::size_t from = path.points[k] < path.points[(k + 1) % path.points.size()] ? 0 : 1;
-      const std::vector<Copy> copies = copies_of(k);
-      for (std::size_t c = 0; c < curve.copies.size(); ++c) {
-        std::vector<Index>& copy = curve.copies[c];
-        if (k == 0) copy.push_back(copies[c].ends[from]);
-        hangs_together &= copy.back() == copies[c].ends[from];
-        copy.push_back(copies[c].ends[1 - from]);
-      }
-    }
-    for (std::vector<Index>& copy : curve.copies) {
-      if (!path.closed) continue;
-      hangs_together &= copy.back() == copy.front();
-      copy.pop_back();
-    }
-    if (!hangs_together) continue;
-    for (const std::vector<Index>& copy : curve.copies)
-      all.curves.push_back({copy, path.closed, FeatureKind::intersection});
-    curves_.push_back(std::move(curve));
-  }
+  for (const Network::Path& path : network.paths())
+    if (Curve curve{network.copies_along(path), path.closed}; !curve.copies.empty())
+      curves_.push_back(std::move(curve));
+  for (FeatureCurve& curve : copies()) all.curves.push_back(std::move(curve));
   std::vector<Index> corners = network.ends();
   for (const FeatureCurve& curve : all.curves)
     if (!curve.closed) corners.insert(corners.end(), {curve.vertices.front(), curve.vertices.back()});
   add_corners(all, corners);
   all.edges = edges_of(all.curves);
   features = std::move(all);
-  sort_edges();
+  edges_ = edges_of(copies());
 }
 
-void IntersectionCurves::put_into(FeatureGraph& simplified) {
-  std::set<Index> ends;  // of other curves
+void IntersectionCurves::put_into(FeatureGraph& simplified) const {
+  std::set<Index> ends;
   std::vector<FeatureCurve> others;
   for (FeatureCurve& curve : simplified.curves) {
     if (curve.kind == FeatureKind::intersection) continue;
     if (!curve.closed) ends.insert({curve.vertices.front(), curve.vertices.back()});
     others.push_back(std::move(curve));
   }
-  std::vector<Index> corners(ends.begin(), ends.end());
-  for (const Curve& curve : curves_)
-    for (const std::vector<Index>& copy : curve.copies) {
-      if (!curve.closed) corners.insert(corners.end(), {copy.front(), copy.back()});
-      FeatureCurve& whole = others.emplace_back(FeatureCurve{{}, curve.closed, FeatureKind::intersection});
-      for (std::size_t k = 0; k < curve.edges(); ++k) {
-        const std::vector<Index> chain = edge_chain(splits_, copy[k], copy[(k + 1) % copy.size()]);
-        whole.vertices.insert(whole.vertices.end(), chain.begin(), chain.end() - 1);
-      }
-      if (!curve.closed) whole.vertices.push_back(copy.back());
-    }
+  for (FeatureCurve& curve : copies()) {
+    if (!curve.closed) ends.insert({curve.vertices.front(), curve.vertices.back()});
+    others.push_back(std::move(curve));
+  }
   simplified.curves = std::move(others);
-  sort_edges();
-  add_corners(simplified, corners);
+  add_corners(simplified, {ends.begin(), ends.end()});
   drop_doubled(simplified);
 }
 
@@ -258,22 +241,25 @@ void IntersectionCurves::drop_doubled(FeatureGraph& features) const {
   features.edges = edges_of(features.curves);
 }
 
-void IntersectionCurves::sort_edges() {
-  edges_.clear();
+std::vector<FeatureCurve> IntersectionCurves::copies() const {
+  std::vector<FeatureCurve> all;
   for (const Curve& curve : curves_)
-    for (const std::vector<Index>& copy : curve.copies)
-      for (std::size_t k = 0; k + (curve.closed ? 0 : 1) < copy.size(); ++k) {
+    for (const std::vector<Index>& copy : curve.copies) {
+      std::vector<Index>& on = all.emplace_back(FeatureCurve{{}, curve.closed, FeatureKind::intersection}).vertices;
+      for (std::size_t k = 0; k < curve.edges(); ++k) {
         const std::vector<Index> chain = edge_chain(splits_, copy[k], copy[(k + 1) % copy.size()]);
-        for (std::size_t e = 1; e < chain.size(); ++e) edges_.push_back(sorted_edge(chain[e - 1], chain[e]));
+        on.insert(on.end(), chain.begin(), chain.end() - 1);
       }
-  std::sort(edges_.begin(), edges_.end());
+      if (!curve.closed) on.push_back(copy.back());
+    }
+  return all;
 }
 
 void IntersectionCurves::follow(const EdgeSplits& splits) {
   splits_.insert(splits_.end(), splits.begin(), splits.end());
   std::sort(splits_.begin(), splits_.end());
   for (const auto& [a, b, middle] : splits) vertices_ = std::max(vertices_, std::size_t{middle} + 1);
-  sort_edges();
+  edges_ = edges_of(copies());
 }
 
 // Of the corners along the polyline, both ends included, in its edges: at a vertex if the place is a whole number.
@@ -393,7 +379,8 @@ std::vector<Edge> IntersectionCurves::crowded_edges(const TriangleMesh& mesh, co
         if (corner == ends[0] || corner == ends[1] || component[corner] != component[ends[0]]) continue;
         if (away(mesh.vertices[corner]) >= kLeastGap * length) continue;
         is_crowded[q] = 1;
-        for (const std::size_t other : at[corner]) is_crowded[other] = 1;
+        if (const auto others = at.find(corner); others != at.end())
+          for (const std::size_t other : others->second) is_crowded[other] = 1;
       }
       for (std::size_t k = 0; k < 2; ++k)
         for (const std::size_t other : at[ends[k]])

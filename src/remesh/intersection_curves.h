@@ -32,7 +32,7 @@ class IntersectionCurves {
 
   // To be told of features that were simplified for a coarse mesh (features/simplify.h), which get these curves as they
   // are, with their corners.
-  void put_into(FeatureGraph& simplified);
+  void put_into(FeatureGraph& simplified) const;
 
   // To be told of edges of the mesh that were divided.
   void follow(const EdgeSplits& splits);
@@ -75,7 +75,8 @@ class IntersectionCurves {
                                            const std::vector<double>& edge_length, std::size_t least);
   std::vector<std::array<Index, 2>> crowded_edges(const TriangleMesh& mesh, const FeatureGraph& features,
                                                   const std::vector<Piece>& pieces) const;
-  void sort_edges();
+  // The curves as they are in features.
+  std::vector<FeatureCurve> copies() const;
   void drop_doubled(FeatureGraph& features) const;
 
   std::vector<Curve> curves_;

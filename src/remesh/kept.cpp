@@ -45,15 +45,6 @@ std::vector<Index> vertices_at_corners(const RemeshResult& result, std::size_t c
   return at;
 }
 
-// The corners at both ends of an open curve.
-std::array<std::size_t, 2> ends_of(const FeatureGraph& features, const FeatureCurve& curve) {
-  const auto corner_at = [&](Index v) {
-    const auto corner = std::lower_bound(features.corners.begin(), features.corners.end(), v);
-    return static_cast<std::size_t>(corner - features.corners.begin());
-  };
-  return {corner_at(curve.vertices.front()), corner_at(curve.vertices.back())};
-}
-
 // The cells of a border's corner at an obtuse angle and of its two neighbours may meet nowhere on the surface. Then the
 // dual's border leads from one neighbour to the other, and lacks the triangle of the three, which is added. False if
 // that is not so.
@@ -208,6 +199,14 @@ void check_edges(const KeptFeatures& kept, const FeatureGraph& features, const R
 }
 
 }  // namespace
+
+std::array<std::size_t, 2> ends_of(const FeatureGraph& features, const FeatureCurve& curve) {
+  const auto corner_at = [&](Index v) {
+    const auto corner = std::lower_bound(features.corners.begin(), features.corners.end(), v);
+    return static_cast<std::size_t>(corner - features.corners.begin());
+  };
+  return {corner_at(curve.vertices.front()), corner_at(curve.vertices.back())};
+}
 
 void add_corners(FeatureGraph& graph, const std::vector<Index>& vertices) {
   if (vertices.empty()) return;

@@ -13,6 +13,9 @@ namespace bisector {
 // Makes vertices of the mesh corners: curves through them are divided there, and those on no curve stand alone.
 void add_corners(FeatureGraph& graph, const std::vector<Index>& vertices);
 
+// The corners at both ends of an open curve, by their places among those of the graph.
+std::array<std::size_t, 2> ends_of(const FeatureGraph& features, const FeatureCurve& curve);
+
 // What of a prepared input is to be kept, by its features.
 struct KeptFeatures {
   std::vector<Index> corners;  // of each corner, the vertex of the input that it is; kNone: it may be left out

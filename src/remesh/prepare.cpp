@@ -217,7 +217,7 @@ WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double
   return welded;
 }
 
-Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches, bool shares_intersections)
+Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches)
     : welded_(weld_and_orient(ordered.mesh, ordered.options.weld, context)), mesh_(std::exchange(welded_.mesh, {})),
       sizing_(ordered.options.sizing), target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
   const TriangleMesh& input = ordered.mesh;
@@ -251,9 +251,9 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   if (given_seeds_ > 0 || (branches && options.detail == DetailMode::off)) return;
   std::vector<double> lengths = lay_down_plain();
   if (!branches) apart_ = SetApart(mesh_, lengths, unbounded_->sizing.vertices);
-  const bool all = options.detail == DetailMode::all;
   if (options.detail == DetailMode::off) return;
-  if (!shares_intersections || !plan_with_intersections(all)) plan(std::move(lengths), all);
+  resolves_all_ = options.detail == DetailMode::all;
+  if (!plan_with_intersections()) plan(std::move(lengths));
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
@@ -282,7 +282,6 @@ void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::arra
     kept_lengths_.points.push_back(0.5 * (mesh_.vertices[a] + mesh_.vertices[b]));
     kept_lengths_.lengths.push_back(norm(mesh_.vertices[b] - mesh_.vertices[a]));
   }
-  bounds_.add(kept_lengths_);
   // Edges are no longer than kept vertices are apart.
   if (points.size() < 2) return;
   const PointSet set{points};
@@ -328,18 +327,18 @@ std::vector<double> Preparation::lay_down_plain() {
 }
 
 // `lengths` are those of lay_down_plain(). What lies between components that are set apart is no detail.
-void Preparation::plan(std::vector<double> lengths, bool all) {
+void Preparation::plan(std::vector<double> lengths) {
   add_wedges(lengths);
-  plan_features(lengths, all);
+  plan_features(lengths);
 }
 
 // Cuts components that are set apart where they cross, and plans with what they have in common. Where the result has no
 // room for that it is let go. False, and nothing is done, if there is none.
-bool Preparation::plan_with_intersections(bool all) {
-  if (apart_.empty() || !keep_vertices_.empty()) return false;
+bool Preparation::plan_with_intersections() {
+  if (apart_.empty() || noisy_ || !keep_vertices_.empty()) return false;
   std::optional<Corefinement> corefined = corefine_components(mesh_, kMostPairs);
   if (!corefined) return false;
-  const Preparation uncut = *this;
+  auto uncut = std::make_shared<const Preparation>(*this);
   std::vector<double>& values = sizing_.attribute;
   if (!values.empty())
     for (const InsertedVertex& v : corefined->inserted) {
@@ -358,17 +357,24 @@ bool Preparation::plan_with_intersections(bool all) {
     sizing_.sharp = features_.edges;
     std::vector<double> lengths = lay_down_plain();
     const std::size_t vertices = unbounded_->sizing.vertices;
-    plan(std::move(lengths), all);
+    plan(std::move(lengths));
     const std::vector<std::array<Index, 2>> crowded = divide_intersection_curves();
     if (kLeastPerEdge * kept_lengths_.points.size() > vertices) break;
     if (crowded.empty()) {
       lets_cross_ = !left_out.empty();
+      uncut_ = std::move(uncut);
       return true;
     }
     left_out.insert(left_out.end(), crowded.begin(), crowded.end());
   }
-  *this = uncut;
+  *this = *uncut;
   return false;
+}
+
+Preparation Preparation::without_intersections() const {
+  Preparation without = *uncut_;
+  without.plan(without.lay_down_plain());
+  return without;
 }
 
 // `lengths` are those of lay_down_plain(), before and after.
@@ -391,30 +397,28 @@ void Preparation::add_values(const std::vector<EdgePoint>& added) {
 
 // By the edge lengths that there are beside details. Returns the edges along which there is no room.
 std::vector<std::array<Index, 2>> Preparation::divide_intersection_curves() {
-  undivided_ = {mesh_, features_, sizing_, bounds_, meeting_};
+  undivided_ = {mesh_, features_, sizing_, meeting_};
   const SizedMesh sized = lay_down_bounded();
   std::vector<double> lengths(mesh_.vertices.size());
   for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(sized.sizing, v);
   IntersectionCurves::Division division = meeting_.divide(mesh_, features_, lengths);
   sizing_.sharp = features_.edges;
   add_values(division.added);
-  const SizeBounds between{division.middles, division.lengths};
-  kept_lengths_.add(between);
-  bounds_.add(between);
+  kept_lengths_ = {std::move(division.middles), std::move(division.lengths)};
   unbounded_.reset();
   return std::move(division.crowded);
 }
 
-void Preparation::plan_features(const std::vector<double>& lengths, bool all) {
+void Preparation::plan_features(const std::vector<double>& lengths) {
   const Sizing& plain = unbounded_->sizing;
   std::optional<TriangleMesh> moved;
   if (!apart_.empty()) apart_.move(moved.emplace(mesh_));
-  DetailPlan plan = plan_details(moved ? *moved : mesh_, features_, lengths, plain.vertices, all);
+  DetailPlan plan = plan_details(moved ? *moved : mesh_, features_, lengths, plain.vertices, resolves_all_);
   features_ = std::move(plan.features);
   add_corners(features_, keep_vertices_);
   if (!meeting_.empty()) meeting_.put_into(features_);
   detail_ = plan.result;
-  if (all && detail_.vertices > plain.vertices) {
+  if (resolves_all_ && detail_.vertices > plain.vertices) {
     target_ = {detail_.vertices, 0};
     unbounded_.reset();
   }
@@ -430,10 +434,7 @@ void Preparation::bound(const SizeBounds& bounds) {
   if (!bounds.points.empty()) unbounded_.reset();
   const std::size_t before = bounds_.points.size();
   bounds_.add(bounds);
-  for (std::size_t k = before; k < bounds_.points.size(); ++k) {
-    bounds_.points[k] = apart_.back(bounds_.points[k]);
-    if (undivided_) undivided_->bounds.add({{bounds_.points[k]}, {bounds_.lengths[k]}});
-  }
+  for (std::size_t k = before; k < bounds_.points.size(); ++k) bounds_.points[k] = apart_.back(bounds_.points[k]);
 }
 
 void Preparation::divide_intersections_again() {
@@ -442,7 +443,6 @@ void Preparation::divide_intersections_again() {
   mesh_ = std::move(before.mesh);
   features_ = std::move(before.features);
   sizing_ = std::move(before.sizing);
-  bounds_ = std::move(before.bounds);
   meeting_ = std::move(before.meeting);
   kept_lengths_ = {};
   divide_intersection_curves();
@@ -454,16 +454,18 @@ void Preparation::ask_for(std::size_t vertices) {
 }
 
 SizedMesh Preparation::lay_down_bounded() const {
+  SizeBounds most = bounds_;
+  most.add(kept_lengths_);
   std::optional<SizeField> field;
-  if (!bounds_.points.empty()) field.emplace(bounds_.points, bounds_.lengths, kDetailGradation);
+  if (!most.points.empty()) field.emplace(most.points, most.lengths, kDetailGradation);
   std::optional<SizeFloor> floor;
   if (!kept_lengths_.points.empty()) floor.emplace(kept_lengths_.points, kept_lengths_.lengths, kDetailGradation);
   return refine_for_density(mesh_, sizing_, target_, {field ? &*field : nullptr, floor ? &*floor : nullptr});
 }
 
 PreparedInput Preparation::lay_down() {
-  SizedMesh sized =
-      unbounded_ && bounds_.points.empty() ? *std::exchange(unbounded_, std::nullopt) : lay_down_bounded();
+  const bool bounded = !bounds_.points.empty() || !kept_lengths_.points.empty();
+  SizedMesh sized = unbounded_ && !bounded ? *std::exchange(unbounded_, std::nullopt) : lay_down_bounded();
   if (sized.sizing.vertices > kMostVertices && given_seeds_ == 0)
     throw Error(fmt::format("edges of {} make about {:.3g} vertices, more than {}; ask for longer ones",
                             target_.edge_length, static_cast<double>(sized.sizing.vertices), kMostVertices));

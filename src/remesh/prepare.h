@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -56,9 +57,11 @@ struct OrderedInput {
 class Preparation {
  public:
   // Welds and orients the input, finds its features and plans their details. Where it branches on purpose, parts that
-  // touch are neither separated nor set apart; where it does not share intersections, components that are set apart are
-  // not cut where they cross. Throws Error as remesh does.
-  Preparation(OrderedInput input, const Context& context, bool branches = false, bool shares_intersections = true);
+  // touch are neither separated nor set apart. Throws Error as remesh does.
+  Preparation(OrderedInput input, const Context& context, bool branches = false);
+
+  // The same, if there are intersections, but components that cross stay as they are and share no vertices.
+  Preparation without_intersections() const;
 
   // Beside the bounds that there are already. Points may be those of what was set apart.
   void bound(const SizeBounds& bounds);
@@ -85,11 +88,11 @@ class Preparation {
             const std::vector<Index>& original);
   std::vector<double> lay_down_plain();
   void add_wedges(std::vector<double>& lengths);
-  void plan(std::vector<double> lengths, bool all);
-  void plan_features(const std::vector<double>& lengths, bool all);
+  void plan(std::vector<double> lengths);
+  void plan_features(const std::vector<double>& lengths);
   // Of vertices that were put on edges.
   void add_values(const std::vector<EdgePoint>& added);
-  bool plan_with_intersections(bool all);
+  bool plan_with_intersections();
   std::vector<std::array<Index, 2>> divide_intersection_curves();
   SizedMesh lay_down_bounded() const;
   KeptFeatures kept_features(const FeatureGraph& features) const;
@@ -101,26 +104,26 @@ class Preparation {
   SizingTarget target_;
   std::size_t given_seeds_;
   DetailResult detail_;
+  bool resolves_all_ = false;
   bool noisy_ = false;
   std::optional<SizedMesh> unbounded_;  // laid down already, and still good
   SizeBounds bounds_;
   SetApart apart_;
-  // Before the intersection curves were divided, but with all bounds.
+  // Before the intersection curves were divided.
   struct Undivided {
     TriangleMesh mesh;
     FeatureGraph features;
     SizingOptions sizing;
-    SizeBounds bounds;
     IntersectionCurves meeting;
   };
-
+  IntersectionCurves meeting_;  // along which those that are set apart meet
   bool lets_cross_ = false;
   std::optional<Undivided> undivided_;
-  IntersectionCurves meeting_;                    // along which those that are set apart meet
+  std::shared_ptr<const Preparation> uncut_;      // before components were cut where they meet
   std::vector<Index> keep_vertices_;              // of mesh_, ascending
   std::vector<Index> kept_as_;                    // of each of mesh_'s vertices before its details, the input's
   std::vector<std::array<Index, 2>> keep_edges_;  // of mesh_, sorted, lower vertex first
-  SizeBounds kept_lengths_;                       // edges around what is kept are so long
+  SizeBounds kept_lengths_;                       // edges around what is kept, or shared, are so long
 };
 
 }  // namespace bisector

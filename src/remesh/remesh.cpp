@@ -701,14 +701,10 @@ class NewCrossings {
 
 // Seeds never leave the ends of curves that are to be edges.
 void hold_ends(const PreparedInput& prepared, std::vector<char>& held) {
-  const FeatureGraph& features = prepared.features;
-  held.resize(features.corners.size(), 0);
-  for (std::size_t c = 0; c < prepared.whole.size(); ++c) {
-    if (!prepared.whole[c]) continue;
-    for (const Index end : {features.curves[c].vertices.front(), features.curves[c].vertices.back()})
-      held[static_cast<std::size_t>(std::lower_bound(features.corners.begin(), features.corners.end(), end) -
-                                    features.corners.begin())] = 1;
-  }
+  held.resize(prepared.features.corners.size(), 0);
+  for (std::size_t c = 0; c < prepared.whole.size(); ++c)
+    if (prepared.whole[c])
+      for (const std::size_t corner : ends_of(prepared.features, prepared.features.curves[c])) held[corner] = 1;
 }
 
 // Why a result is to be made once more, or null, and how long edges should be where it is not good.
@@ -779,10 +775,14 @@ class Runs {
   Runs(const TriangleMesh& input, const RemeshOptions& options, bool branches, const Context& context)
       : input_(input), options_(options), branches_(branches), context_(context), compute_(options.compute, context),
         progress_(context) {
-    prepare(context, true);
-    input_of_.resize(input.vertices.size());
+    OrderedInput ordered(input, options);
+    vertex_of_ = std::move(ordered.vertex_of);
+    input_of_.resize(ordered.mesh.vertices.size());
     for (Index v = 0; v < vertex_of_.size(); ++v)
       if (vertex_of_[v] != kNone) input_of_[vertex_of_[v]] = v;
+    preparation_.emplace(std::move(ordered), context, branches);
+    new_crossings_.emplace(*preparation_);
+    may_shorten_ = refines();
     preparing_ = watch_.seconds();
   }
 
@@ -800,7 +800,7 @@ class Runs {
     AnotherRun next;
   };
 
-  void prepare(const Context& context, bool shares_intersections);
+  bool refines() const { return options_.seeds.empty() && options_.detail != DetailMode::off; }
   Run make_run(bool last);
   void settle();
   void settle_intersections();
@@ -825,14 +825,6 @@ class Runs {
   double work_before_ = 0;  // of runs in which components shared vertices
   std::optional<JudgedResult> best_;
 };
-
-void Runs::prepare(const Context& context, bool shares_intersections) {
-  OrderedInput ordered(input_, options_);
-  vertex_of_ = std::move(ordered.vertex_of);
-  preparation_.emplace(std::move(ordered), context, branches_, shares_intersections);
-  new_crossings_.emplace(*preparation_);
-  may_shorten_ = options_.seeds.empty() && options_.detail != DetailMode::off;
-}
 
 Runs::Run Runs::make_run(bool last) {
   const MakeBackend make_backend = [&](const Surface& surface) { return compute_.backend(surface); };
@@ -901,15 +893,14 @@ void Runs::settle() {
 
 // Where the curves in which components meet leave no good triangles, components are remeshed without them, too.
 void Runs::settle_intersections() {
-  if (has_faults(*best_)) {
-    std::optional<Preparation> sharing = std::move(preparation_);
+  if (options_.min_angle > 0 && has_faults(*best_)) {
+    Preparation sharing = std::exchange(*preparation_, preparation_->without_intersections());
+    new_crossings_.emplace(*preparation_);
+    may_shorten_ = refines();
     std::optional<PlacedSeeds> seeds = std::exchange(earlier_, std::nullopt);
     std::optional<JudgedResult> shared = std::exchange(best_, std::nullopt);
     work_before_ = spent_.totals.work;
     progress_.start_again("components that cross");
-    Context silent = context_;
-    silent.warning = nullptr;
-    prepare(silent, false);
     settle();
     if (!shares_well(*shared, *best_, preparation_->mesh())) return;
     preparation_ = std::move(sharing);

@@ -12,9 +12,14 @@
 #include "bisector/quality.h"
 #include "bisector/remesh.h"
 #include "core/geometry.h"
+#include "features/curves.h"
+#include "features/edge_splits.h"
 #include "mesh/corefine.h"
+#include "mesh/edge_splitter.h"
 #include "mesh/topology.h"
 #include "remesh/flip_crossings.h"
+#include "remesh/kept.h"
+#include "remesh/prepare.h"
 #include "remesh/topology_control.h"
 #include "support/featured.h"
 #include "support/models.h"
@@ -27,11 +32,11 @@ TriangleMesh moved(TriangleMesh mesh, const Vec3& scale, const Vec3& by) {
   return mesh;
 }
 
-// A pin in a plate, and a ball on it.
-TriangleMesh pin_in_a_plate() {
-  const TriangleMesh plate = moved(box(1), {2, 2, 0.4}, {-1, -1, 0});
-  return joined(plate, moved(cylinder(24), {0.4, 0.4, 1.2}, {0.1, -0.05, -0.3}));
+TriangleMesh with_pin(const TriangleMesh& mesh, const Vec3& at) {
+  return joined(mesh, moved(cylinder(24), {0.4, 0.4, 1.2}, at));
 }
+
+TriangleMesh pin_in_a_plate() { return with_pin(moved(box(1), {2, 2, 0.4}, {-1, -1, 0}), {0.1, -0.05, -0.3}); }
 
 TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
   const auto cut = corefine_components(pin_in_a_plate(), 10'000);
@@ -40,7 +45,18 @@ TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
   FeatureGraph features = detect_features(mesh, {});
   IntersectionCurves curves(*cut, {}, features);
   ASSERT_EQ(curves.size(), 2u);
-  const double wanted = 0.1;
+  // Edges along a curve that have been divided on one component only.
+  const FeatureCurve first = *std::find_if(features.curves.begin(), features.curves.end(),
+                                           [](const FeatureCurve& c) { return c.kind == FeatureKind::intersection; });
+  std::vector<EdgePoint> early;
+  for (std::size_t k = 1; k < first.vertices.size(); ++k)
+    early.push_back({first.vertices[k - 1], first.vertices[k], 0.37});
+  const EdgeSplits splits = splits_of(early, mesh.vertices.size());
+  EdgeSplitter splitter(mesh);
+  for (const auto& [a, b, t] : early) splitter.split(a, b, t);
+  curves.follow(splits);
+  features = split_features(features, splits);
+  const double wanted = 0.07;
   const auto division = curves.divide(mesh, features, std::vector<double>(mesh.vertices.size(), wanted));
   EXPECT_TRUE(division.crowded.empty());
   for (const double length : division.lengths) EXPECT_NEAR(length, wanted, 0.2 * wanted);
@@ -59,29 +75,64 @@ TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
                             analyse_topology(cut->mesh.triangles, cut->mesh.vertices.size())));
 }
 
+// A vertex in the middle of what is to be an edge is taken out, and nothing else.
+TEST(IntersectionCurves, LoseWhatDividesTheirEdges) {
+  const TriangleMesh grid = grid_patch(6, 6);
+  const auto at = [&](double x, double y) {
+    return static_cast<Index>(std::find(grid.vertices.begin(), grid.vertices.end(), Vec3{x, y, 0}) -
+                              grid.vertices.begin());
+  };
+  FeatureGraph features;
+  features.curves = {{{at(2, 3), at(3, 3), at(4, 3)}, false, FeatureKind::intersection}};
+  features.corners = {std::min(at(2, 3), at(4, 3)), std::max(at(2, 3), at(4, 3))};
+  features.edges = edges_of(features.curves);
+  RemeshResult result;
+  result.mesh = grid;
+  result.mesh.feature_edges = features.edges;
+  result.places.resize(grid.vertices.size());
+  for (Index k = 0; k < 2; ++k) result.places[features.corners[k]] = {SeedPlace::Kind::fixed, kNone, k, 0};
+  result.places[at(3, 3)] = {SeedPlace::Kind::curve, 0, kNone, 1};
+  result.input_topology = analyse_topology(grid.triangles, grid.vertices.size());
+  make_curves_whole({1}, features, grid, result);
+  EXPECT_TRUE(result.topology_matches);
+  const std::vector<Vec3>& points = result.mesh.vertices;
+  EXPECT_EQ(std::count(points.begin(), points.end(), Vec3{3, 3, 0}), 0);
+  EXPECT_EQ(result.places.size(), points.size());
+  ASSERT_EQ(result.mesh.feature_edges.size(), 1u);
+  const auto [a, b] = result.mesh.feature_edges[0];
+  EXPECT_EQ(norm(points[a] - points[b]), 2);
+  const EdgeTable table = edge_table(result.mesh.triangles, points.size());
+  EXPECT_TRUE(std::binary_search(table.edges.begin(), table.edges.end(), sorted_edge(a, b)));
+  double area = 0;
+  for (const Triangle& t : result.mesh.triangles)
+    area += 0.5 * twice_area_normal(points[t[0]], points[t[1]], points[t[2]]).z;
+  EXPECT_NEAR(std::abs(area), 36, 1e-9);
+}
+
+// Two pins stand so near to each other that edges of their circles come between.
 TEST(IntersectionCurves, WithoutRoomAreLeftOut) {
-  const auto cut = corefine_components(pin_in_a_plate(), 10'000);
+  const auto cut = corefine_components(with_pin(pin_in_a_plate(), {0.905, -0.05, -0.3}), 10'000);
   ASSERT_TRUE(cut.has_value());
-  FeatureGraph features = detect_features(cut->mesh, {});
-  TriangleMesh mesh = cut->mesh;
-  FeatureGraph with = features;
-  IntersectionCurves curves(*cut, {}, with);
-  // The circles are three edges each then, and bulge out of them.
-  const auto division = curves.divide(mesh, with, std::vector<double>(mesh.vertices.size(), 100.0));
-  for (const auto& edge : division.crowded) {
-    const EdgeTable table = edge_table(cut->mesh.triangles, cut->mesh.vertices.size());
-    EXPECT_TRUE(std::binary_search(table.edges.begin(), table.edges.end(), edge));
+  const FeatureGraph features = detect_features(cut->mesh, {});
+  const EdgeTable table = edge_table(cut->mesh.triangles, cut->mesh.vertices.size());
+  std::vector<std::array<Index, 2>> left_out;
+  std::size_t rounds = 0, edges = 0;
+  for (bool has_room = false; !has_room; ++rounds) {
+    ASSERT_LT(rounds, 10u);
+    TriangleMesh mesh = cut->mesh;
+    FeatureGraph with = features;
+    IntersectionCurves curves(*cut, left_out, with);
+    const auto division = curves.divide(mesh, with, std::vector<double>(mesh.vertices.size(), 0.12));
+    for (const auto& edge : division.crowded)
+      EXPECT_TRUE(std::binary_search(table.edges.begin(), table.edges.end(), edge));
+    left_out.insert(left_out.end(), division.crowded.begin(), division.crowded.end());
+    has_room = division.crowded.empty();
+    edges = division.lengths.size();
   }
-  std::vector<std::array<Index, 2>> all;
-  const CommonParts common = find_common_parts(cut->mesh);
-  for (const Triangle& t : cut->mesh.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index a = t[k], b = t[(k + 1) % 3];
-      if (common.same[a] != kNone && common.same[b] != kNone) all.push_back(sorted_edge(a, b));
-    }
-  const std::size_t before = features.curves.size();
-  EXPECT_TRUE(IntersectionCurves(*cut, all, features).empty());
-  EXPECT_EQ(features.curves.size(), before);
+  EXPECT_GT(rounds, 1u);
+  EXPECT_GT(edges, 60u);
+  // What lies between the pins is left out, and nothing on the far sides.
+  for (const auto& edge : left_out) EXPECT_LT(std::abs(cut->mesh.vertices[edge[0]].x - 0.5025), 0.2);
 }
 
 TEST(IntersectionCurves, LeaveNoTrianglesThatCross) {
@@ -104,6 +155,29 @@ TEST(IntersectionCurves, LeaveNoTrianglesThatCross) {
     for (const Index end : edge) ++ends[end];
   EXPECT_GE(ends.size(), 12u);
   for (const auto& [point, count] : ends) EXPECT_EQ(count, 2u);
+}
+
+// Values of vertices that components get where they are cut are those of the triangles there.
+TEST(IntersectionCurves, CarryTheDensity) {
+  const TriangleMesh input = pin_in_a_plate();
+  RemeshOptions options;
+  options.vertices = 900;
+  options.sizing.kind = DensityKind::attribute;
+  for (const Vec3& p : input.vertices) options.sizing.attribute.push_back(2 + p.x);
+  Preparation preparation(OrderedInput(input, options), {});
+  ASSERT_FALSE(preparation.intersections().empty());
+  const PreparedInput prepared = preparation.lay_down();
+  const Preparation apart = preparation.without_intersections();
+  EXPECT_TRUE(apart.intersections().empty());
+  EXPECT_EQ(count_self_intersections(apart.mesh()), count_self_intersections(input));
+  EXPECT_EQ(count_self_intersections(preparation.mesh()), 0u);
+  // Edges are shorter near the curves, but nowhere longer than the attribute asks for, by the input's own vertices.
+  const auto share = [&](Index v) {
+    return prepared.density[v] / (2 + preparation.apart().back(prepared.mesh.vertices[v]).x);
+  };
+  double least = share(0);
+  for (Index v = 1; v < input.vertices.size(); ++v) least = std::min(least, share(v));
+  for (Index v = 0; v < prepared.mesh.vertices.size(); ++v) EXPECT_GE(share(v), 0.999 * least);
 }
 
 // Two pyramids on a bent square, with the same two triangles in it.
