@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <utility>
@@ -262,38 +263,77 @@ void IntersectionCurves::follow(const EdgeSplits& splits) {
   edges_ = edges_of(copies());
 }
 
-// Of the corners along the polyline, both ends included, in its edges: at a vertex if the place is a whole number.
-std::vector<double> IntersectionCurves::corner_places(const Curve& curve, const TriangleMesh& mesh,
-                                                      const std::vector<double>& edge_length, std::size_t least) {
-  const std::vector<Index>& on = curve.copies[0];
-  std::vector<double> length(on.size());
-  for (std::size_t k = 0; k < on.size(); ++k) {
-    length[k] = edge_length[on[k]];
-    for (const std::vector<Index>& copy : curve.copies) length[k] = std::min(length[k], edge_length[copy[k]]);
-  }
-  // How many edges of the result it is to each vertex.
-  std::vector<double> way{0};
+// The shortest that is wanted on any of the components, where their refined edges begin and end.
+std::vector<IntersectionCurves::Station> IntersectionCurves::stations(const Curve& curve, const SizedMesh& sized,
+                                                                      const EdgeSplits& splits) {
+  std::vector<Station> found;
   for (std::size_t k = 0; k < curve.edges(); ++k) {
-    const std::size_t next = (k + 1) % on.size();
-    const double along = norm(mesh.vertices[on[next]] - mesh.vertices[on[k]]);
-    way.push_back(way.back() + 2 * along / (length[k] + length[next]));
+    std::vector<std::vector<Station>> copies;
+    for (const std::vector<Index>& copy : curve.copies) {
+      const Index from = copy[k], to = copy[(k + 1) % copy.size()];
+      const Vec3 &a = sized.mesh.vertices[from], &b = sized.mesh.vertices[to];
+      const double length = norm(b - a);
+      std::vector<Station>& along = copies.emplace_back();
+      for (const Index v : edge_chain(splits, from, to))
+        along.push_back({v == from ? 0 : v == to ? 1 : norm(sized.mesh.vertices[v] - a) / length,
+                         target_edge_length(sized.sizing, v)});
+    }
+    std::vector<double> places;
+    for (const std::vector<Station>& along : copies)
+      for (const Station& station : along) places.push_back(station.place);
+    std::sort(places.begin(), places.end());
+    places.erase(std::unique(places.begin(), places.end()), places.end());
+    for (const double place : places) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const std::vector<Station>& along : copies) {
+        const auto next = std::find_if(along.begin() + 1, along.end() - 1,
+                                       [&](const Station& station) { return station.place >= place; });
+        const auto last = next - 1;
+        const double t = (place - last->place) / (next->place - last->place);
+        least = std::min(least, last->length + t * (next->length - last->length));
+      }
+      if (place == 0 && k > 0) found.back().length = std::min(found.back().length, least);
+      else found.push_back({static_cast<double>(k) + place, least});
+    }
+  }
+  return found;
+}
+
+// Of the corners along the polyline, both ends included, in its edges: at a vertex if the place is a whole number.
+std::vector<double> IntersectionCurves::corner_places(const Curve& curve, const SizedMesh& sized,
+                                                      const EdgeSplits& splits, std::size_t least) {
+  const std::vector<Index>& on = curve.copies[0];
+  const std::vector<Station> stations_along = stations(curve, sized, splits);
+  // How many edges of the result it is to each of them, and to each vertex.
+  std::vector<double> way{0}, way_to_vertex{0};
+  for (std::size_t i = 1; i < stations_along.size(); ++i) {
+    const Station &last = stations_along[i - 1], &next = stations_along[i];
+    const auto k = static_cast<std::size_t>(last.place);
+    const Vec3 edge = sized.mesh.vertices[on[(k + 1) % on.size()]] - sized.mesh.vertices[on[k]];
+    way.push_back(way.back() + 2 * (next.place - last.place) * norm(edge) / (last.length + next.length));
+    if (next.place == std::floor(next.place)) way_to_vertex.push_back(way.back());
   }
   const std::size_t count = std::max(least, static_cast<std::size_t>(std::lround(way.back())));
   std::vector<double> places{0};
   for (std::size_t i = 1; i < count; ++i) {
     const double at = way.back() * static_cast<double>(i) / static_cast<double>(count);
-    const auto after = std::upper_bound(way.begin(), way.end() - 1, at);
-    const auto k = static_cast<double>(after - way.begin() - 1);
-    const double to_last = at - *(after - 1), to_next = *after - at;
-    places.push_back(to_last < kAtVertex ? k : to_next < kAtVertex ? k + 1 : k + to_last / (to_last + to_next));
+    const auto after = static_cast<std::size_t>(std::upper_bound(way.begin(), way.end() - 1, at) - way.begin());
+    const Station &last = stations_along[after - 1], &next = stations_along[after];
+    const double place =
+        last.place + (at - way[after - 1]) / (way[after] - way[after - 1]) * (next.place - last.place);
+    const auto vertex = static_cast<std::size_t>(std::lround(place));
+    places.push_back(std::abs(at - way_to_vertex[vertex]) < kAtVertex ? static_cast<double>(vertex) : place);
   }
   places.push_back(static_cast<double>(curve.edges()));
   return places;
 }
 
 IntersectionCurves::Division IntersectionCurves::divide(TriangleMesh& mesh, FeatureGraph& features,
-                                                        const std::vector<double>& edge_length) {
+                                                        const SizedMesh& sized) {
   Division division;
+  EdgeSplits refined = splits_;
+  refined.insert(refined.end(), sized.splits.begin(), sized.splits.end());
+  std::sort(refined.begin(), refined.end());
   std::vector<Index> all_corners;
   const std::size_t before = mesh.vertices.size();
   std::vector<Piece> pieces;
@@ -322,7 +362,7 @@ IntersectionCurves::Division IntersectionCurves::divide(TriangleMesh& mesh, Feat
     const std::vector<Index>& on = curve.copies[0];
     const bool loop = curve.closed || on.front() == on.back();
     const std::size_t least = loop ? 3 : between[sorted_edge(on.front(), on.back())] > 1 ? 2 : 1;
-    const std::vector<double> places = corner_places(curve, mesh, edge_length, least);
+    const std::vector<double> places = corner_places(curve, sized, refined, least);
     std::vector<std::vector<Index>> corners(curve.copies.size());
     for (const double place : places) {
       const auto k = static_cast<std::size_t>(place);

@@ -15,6 +15,7 @@
 #include "features/edge_splits.h"
 #include "features/wedges.h"
 #include "mesh/corefine.h"
+#include "remesh/sizing.h"
 
 namespace bisector {
 
@@ -46,9 +47,9 @@ class IntersectionCurves {
     std::vector<std::array<Index, 2>> crowded;
   };
   // Puts vertices into the mesh where the curves are to have corners: as far from each other as the least edge length
-  // of the components there, `edge_length` being wanted at each vertex. A closed curve gets three at least, and two
+  // of the components there, which `sized`, a refinement of the mesh, has. A closed curve gets three at least, and two
   // that join the same corners one each. The features get these corners.
-  Division divide(TriangleMesh& mesh, FeatureGraph& features, const std::vector<double>& edge_length);
+  Division divide(TriangleMesh& mesh, FeatureGraph& features, const SizedMesh& sized);
 
   // Of each curve of a graph on the mesh, or on one with divided edges, whether it leads along one of these from corner
   // to corner.
@@ -71,8 +72,15 @@ class IntersectionCurves {
     Vec3 from, to;
   };
 
-  static std::vector<double> corner_places(const Curve& curve, const TriangleMesh& mesh,
-                                           const std::vector<double>& edge_length, std::size_t least);
+  // A place along a polyline, in its edges, and how long edges are to be there.
+  struct Station {
+    double place, length;
+  };
+
+  // `splits` are of all edges of the mesh as it was cut, down to those of `sized`.
+  static std::vector<Station> stations(const Curve& curve, const SizedMesh& sized, const EdgeSplits& splits);
+  static std::vector<double> corner_places(const Curve& curve, const SizedMesh& sized, const EdgeSplits& splits,
+                                           std::size_t least);
   std::vector<std::array<Index, 2>> crowded_edges(const TriangleMesh& mesh, const FeatureGraph& features,
                                                   const std::vector<Piece>& pieces) const;
   // The curves as they are in features.

@@ -14,6 +14,9 @@
 namespace bisector {
 namespace {
 
+// Of an edge that is to be whole: with ever more of them, the next result gets ever shorter edges there.
+constexpr std::size_t kMostParts = 3;
+
 using Edge = std::array<Index, 2>;
 
 // The parts of a curve between corners, `is_corner` by vertex.
@@ -245,14 +248,24 @@ void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const 
   check_edges(kept, features, result);
 }
 
-void make_curves_whole(const std::vector<char>& whole, const FeatureGraph& features, const TriangleMesh& surface,
-                       RemeshResult& result) {
+SizeBounds make_curves_whole(const std::vector<char>& whole, const FeatureGraph& features, const TriangleMesh& surface,
+                             RemeshResult& result) {
   const std::vector<Index> at_corner = vertices_at_corners(result, features.corners.size());
   std::vector<VertexChain> chains;
-  for (KeptEdge& edge : kept_edges(whole, features, at_corner, result))
-    if (edge.chain.size() > 2 && edge.chain.front() != kNone && edge.chain.back() != kNone)
-      chains.push_back(std::move(edge.chain));
+  SizeBounds divided;
+  for (KeptEdge& edge : kept_edges(whole, features, at_corner, result)) {
+    VertexChain& chain = edge.chain;
+    if (chain.size() <= 2 || chain.front() == kNone || chain.back() == kNone) continue;
+    const Vec3 &a = result.mesh.vertices[chain.front()], &b = result.mesh.vertices[chain.back()];
+    const auto parts = static_cast<double>(std::min(chain.size() - 1, kMostParts));
+    for (const double t : {0.0, 0.5, 1.0}) {
+      divided.points.push_back((1 - t) * a + t * b);
+      divided.lengths.push_back(norm(b - a) / parts);
+    }
+    chains.push_back(std::move(chain));
+  }
   if (!chains.empty()) take_out_divisions(chains, surface, result);
+  return divided;
 }
 
 }  // namespace bisector

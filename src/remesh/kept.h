@@ -7,6 +7,7 @@
 
 #include "bisector/features.h"
 #include "bisector/remesh.h"
+#include "remesh/size_bounds.h"
 
 namespace bisector {
 
@@ -32,8 +33,9 @@ void restore_kept(const KeptFeatures& kept, const FeatureGraph& features, const 
                   RemeshResult& result);
 
 // Takes the vertices out of the result, in the same way, that divide curves which are to be one edge: `whole` has a
-// value for each. `surface` is what has been remeshed. Curves stay as they are where that does not go.
-void make_curves_whole(const std::vector<char>& whole, const FeatureGraph& features, const TriangleMesh& surface,
-                       RemeshResult& result);
+// value for each. `surface` is what has been remeshed. Curves stay as they are where that does not go. Returns how long
+// edges would be along these curves with the vertices that were taken out.
+SizeBounds make_curves_whole(const std::vector<char>& whole, const FeatureGraph& features, const TriangleMesh& surface,
+                             RemeshResult& result);
 
 }  // namespace bisector

@@ -398,10 +398,7 @@ void Preparation::add_values(const std::vector<EdgePoint>& added) {
 // By the edge lengths that there are beside details. Returns the edges along which there is no room.
 std::vector<std::array<Index, 2>> Preparation::divide_intersection_curves() {
   undivided_ = {mesh_, features_, sizing_, meeting_};
-  const SizedMesh sized = lay_down_bounded();
-  std::vector<double> lengths(mesh_.vertices.size());
-  for (Index v = 0; v < lengths.size(); ++v) lengths[v] = target_edge_length(sized.sizing, v);
-  IntersectionCurves::Division division = meeting_.divide(mesh_, features_, lengths);
+  IntersectionCurves::Division division = meeting_.divide(mesh_, features_, lay_down_bounded());
   sizing_.sharp = features_.edges;
   add_values(division.added);
   kept_lengths_ = {std::move(division.middles), std::move(division.lengths)};
@@ -423,11 +420,6 @@ void Preparation::plan_features(const std::vector<double>& lengths) {
     unbounded_.reset();
   }
   bound({std::move(plan.points), std::move(plan.lengths)});
-}
-
-void SizeBounds::add(const SizeBounds& others) {
-  points.insert(points.end(), others.points.begin(), others.points.end());
-  lengths.insert(lengths.end(), others.lengths.begin(), others.lengths.end());
 }
 
 void Preparation::bound(const SizeBounds& bounds) {

@@ -10,6 +10,7 @@
 #include "remesh/kept.h"
 #include "remesh/remesh.h"
 #include "remesh/set_apart.h"
+#include "remesh/size_bounds.h"
 #include "remesh/sizing.h"
 
 namespace bisector {
@@ -25,14 +26,6 @@ struct PreparedInput {
   std::vector<Vec3> corners;  // of the features, before they were set apart
   DetailResult detail;
   bool noisy = false;  // normals are noise, and Energy::automatic means restricted
-};
-
-// Edges at these points must not be longer than these lengths, in the mesh's unit.
-struct SizeBounds {
-  std::vector<Vec3> points;
-  std::vector<double> lengths;
-
-  void add(const SizeBounds& others);
 };
 
 // The input with its borders joined: within `tolerance`, or, without one, as RemeshOptions::weld says. Triangles that

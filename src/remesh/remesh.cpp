@@ -860,7 +860,8 @@ Runs::Run Runs::make_run(bool last) {
     }
     if (placing_ == 0) placing_ = pipeline.spent().totals.work;
     RemeshResult result = pipeline.finish();
-    if (!prepared.whole.empty()) make_curves_whole(prepared.whole, prepared.features, surface.mesh, result);
+    SizeBounds divided;
+    if (!prepared.whole.empty()) divided = make_curves_whole(prepared.whole, prepared.features, surface.mesh, result);
     preparation_->apart().move_back(prepared.corners, result);
     if (!prepared.whole.empty()) flip_where_components_cross(result.mesh);
     if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
@@ -869,10 +870,12 @@ Runs::Run Runs::make_run(bool last) {
     result.detail = prepared.detail;
     spent_ = {pipeline.spent().totals, result.seconds};
     Run run{judge(std::move(result)), {}};
+    fprintf(stderr, "RUN n %zu  work %g placing %g  topo %d broken %zu slivers %zu hopeless %d worth %d iters t %.1f curves %zu features %.1f topology %.1f improve %.1f\n", run.judged.result.mesh.vertices.size(), spent_.totals.work-work_before_, placing_, run.judged.result.topology_matches, run.judged.result.features.broken, run.judged.slivers.bounds.points.size(), run.judged.slivers.hopeless, run.judged.slivers.worth_another_run, watch_.seconds(), preparation_->intersections().size(), spent_.seconds.features, spent_.seconds.topology, spent_.seconds.improve);
     last = last || !asks_for_disks(plan) || plan.min_angle == 0;
     const Crossings crossings = last && !best_ ? Crossings{} : new_crossings_->of(run.judged.result.mesh);
     run.judged.crossings = crossings.pairs;
     if (!last && (!best_ || is_better(run.judged, *best_))) run.next = another_run(pipeline, run.judged, crossings);
+    run.next.bounds.add(divided);
     earlier_ = pipeline.seeds();
     return run;
   }
@@ -887,6 +890,10 @@ void Runs::settle() {
     best_ = std::move(run.judged);
     if (left == 0 || !run.next.why || spent_.totals.work - work_before_ > kMostWork * placing_) return;
     preparation_->bound(run.next.bounds);
+    if (!preparation_->intersections().empty()) {
+      preparation_->divide_intersections_again();
+      earlier_.reset();
+    }
     progress_.start_again(run.next.why);
   }
 }

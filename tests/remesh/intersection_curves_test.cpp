@@ -57,7 +57,7 @@ TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
   curves.follow(splits);
   features = split_features(features, splits);
   const double wanted = 0.07;
-  const auto division = curves.divide(mesh, features, std::vector<double>(mesh.vertices.size(), wanted));
+  const auto division = curves.divide(mesh, features, SizedMesh{mesh, {{}, wanted}});
   EXPECT_TRUE(division.crowded.empty());
   for (const double length : division.lengths) EXPECT_NEAR(length, wanted, 0.2 * wanted);
   const std::vector<char> whole = curves.among(features);
@@ -122,7 +122,7 @@ TEST(IntersectionCurves, WithoutRoomAreLeftOut) {
     TriangleMesh mesh = cut->mesh;
     FeatureGraph with = features;
     IntersectionCurves curves(*cut, left_out, with);
-    const auto division = curves.divide(mesh, with, std::vector<double>(mesh.vertices.size(), 0.12));
+    const auto division = curves.divide(mesh, with, SizedMesh{mesh, {{}, 0.12}});
     for (const auto& edge : division.crowded)
       EXPECT_TRUE(std::binary_search(table.edges.begin(), table.edges.end(), edge));
     left_out.insert(left_out.end(), division.crowded.begin(), division.crowded.end());
