@@ -275,7 +275,9 @@ std::vector<IntersectionCurves::Station> IntersectionCurves::stations(const Curv
       const double length = norm(b - a);
       std::vector<Station>& along = copies.emplace_back();
       for (const Index v : edge_chain(splits, from, to))
-        along.push_back({v == from ? 0 : v == to ? 1 : norm(sized.mesh.vertices[v] - a) / length,
+        along.push_back({v == from ? 0
+                         : v == to ? 1
+                                   : norm(sized.mesh.vertices[v] - a) / length,
                          target_edge_length(sized.sizing, v)});
     }
     std::vector<double> places;
@@ -319,8 +321,7 @@ std::vector<double> IntersectionCurves::corner_places(const Curve& curve, const 
     const double at = way.back() * static_cast<double>(i) / static_cast<double>(count);
     const auto after = static_cast<std::size_t>(std::upper_bound(way.begin(), way.end() - 1, at) - way.begin());
     const Station &last = stations_along[after - 1], &next = stations_along[after];
-    const double place =
-        last.place + (at - way[after - 1]) / (way[after] - way[after - 1]) * (next.place - last.place);
+    const double place = last.place + (at - way[after - 1]) / (way[after] - way[after - 1]) * (next.place - last.place);
     const auto vertex = static_cast<std::size_t>(std::lround(place));
     places.push_back(std::abs(at - way_to_vertex[vertex]) < kAtVertex ? static_cast<double>(vertex) : place);
   }

@@ -870,7 +870,6 @@ Runs::Run Runs::make_run(bool last) {
     result.detail = prepared.detail;
     spent_ = {pipeline.spent().totals, result.seconds};
     Run run{judge(std::move(result)), {}};
-    fprintf(stderr, "RUN n %zu  work %g placing %g  topo %d broken %zu slivers %zu hopeless %d worth %d iters t %.1f curves %zu features %.1f topology %.1f improve %.1f\n", run.judged.result.mesh.vertices.size(), spent_.totals.work-work_before_, placing_, run.judged.result.topology_matches, run.judged.result.features.broken, run.judged.slivers.bounds.points.size(), run.judged.slivers.hopeless, run.judged.slivers.worth_another_run, watch_.seconds(), preparation_->intersections().size(), spent_.seconds.features, spent_.seconds.topology, spent_.seconds.improve);
     last = last || !asks_for_disks(plan) || plan.min_angle == 0;
     const Crossings crossings = last && !best_ ? Crossings{} : new_crossings_->of(run.judged.result.mesh);
     run.judged.crossings = crossings.pairs;

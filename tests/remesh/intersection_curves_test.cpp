@@ -14,12 +14,14 @@
 #include "core/geometry.h"
 #include "features/curves.h"
 #include "features/edge_splits.h"
+#include "features/size_field.h"
 #include "mesh/corefine.h"
 #include "mesh/edge_splitter.h"
 #include "mesh/topology.h"
 #include "remesh/flip_crossings.h"
 #include "remesh/kept.h"
 #include "remesh/prepare.h"
+#include "remesh/sizing.h"
 #include "remesh/topology_control.h"
 #include "support/featured.h"
 #include "support/models.h"
@@ -37,6 +39,13 @@ TriangleMesh with_pin(const TriangleMesh& mesh, const Vec3& at) {
 }
 
 TriangleMesh pin_in_a_plate() { return with_pin(moved(box(1), {2, 2, 0.4}, {-1, -1, 0}), {0.1, -0.05, -0.3}); }
+
+SizedMesh uniform(const TriangleMesh& mesh, double length) {
+  SizedMesh sized;
+  sized.mesh = mesh;
+  sized.sizing.unit_edge = length;
+  return sized;
+}
 
 TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
   const auto cut = corefine_components(pin_in_a_plate(), 10'000);
@@ -57,7 +66,7 @@ TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
   curves.follow(splits);
   features = split_features(features, splits);
   const double wanted = 0.07;
-  const auto division = curves.divide(mesh, features, SizedMesh{mesh, {{}, wanted}});
+  const auto division = curves.divide(mesh, features, uniform(mesh, wanted));
   EXPECT_TRUE(division.crowded.empty());
   for (const double length : division.lengths) EXPECT_NEAR(length, wanted, 0.2 * wanted);
   const std::vector<char> whole = curves.among(features);
@@ -73,6 +82,28 @@ TEST(IntersectionCurves, AreDividedAlikeOnBothComponents) {
   for (const auto& [edge, count] : ends) EXPECT_EQ(count, 2);
   EXPECT_TRUE(same_topology(analyse_topology(mesh.triangles, mesh.vertices.size()),
                             analyse_topology(cut->mesh.triangles, cut->mesh.vertices.size())));
+}
+
+// A wall stands in a plate. What is wanted in the middle of its long sides, vertices at their ends do not know.
+TEST(IntersectionCurves, AreDividedByTheSizesAlongThem) {
+  const TriangleMesh wall = moved(box(1), {1.6, 0.2, 1.2}, {-0.8, -0.1, -0.4});
+  const auto cut = corefine_components(joined(moved(box(1), {2, 2, 0.4}, {-1, -1, 0}), wall), 10'000);
+  ASSERT_TRUE(cut.has_value());
+  TriangleMesh mesh = cut->mesh;
+  FeatureGraph features = detect_features(mesh, {});
+  IntersectionCurves curves(*cut, {}, features);
+  const double least = 0.03, gradation = 0.3, plain = 0.2;
+  const std::vector<Vec3> points{{0.11, -0.1, 0.4}, {0.11, 0.1, 0.4}, {0.11, -0.1, 0}, {0.11, 0.1, 0}};
+  const SizeField field(points, std::vector<double>(4, least), gradation);
+  const auto division = curves.divide(mesh, features, refine_for_density(mesh, {}, {0, plain}, {&field, nullptr}));
+  ASSERT_GT(division.lengths.size(), 40u);
+  for (std::size_t k = 0; k < division.lengths.size(); ++k) {
+    const double bound = field(division.middles[k]);
+    // Short sides are as long as they are.
+    if (std::abs(division.middles[k].x) > 0.79) continue;
+    EXPECT_LT(division.lengths[k], 1.4 * bound);
+    EXPECT_GT(division.lengths[k], 0.5 * std::min(bound, plain));
+  }
 }
 
 // A vertex in the middle of what is to be an edge is taken out, and nothing else.
@@ -93,7 +124,12 @@ TEST(IntersectionCurves, LoseWhatDividesTheirEdges) {
   for (Index k = 0; k < 2; ++k) result.places[features.corners[k]] = {SeedPlace::Kind::fixed, kNone, k, 0};
   result.places[at(3, 3)] = {SeedPlace::Kind::curve, 0, kNone, 1};
   result.input_topology = analyse_topology(grid.triangles, grid.vertices.size());
-  make_curves_whole({1}, features, grid, result);
+  const SizeBounds divided = make_curves_whole({1}, features, grid, result);
+  ASSERT_EQ(divided.points.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(divided.points[k].y, 3);
+    EXPECT_EQ(divided.lengths[k], 1);
+  }
   EXPECT_TRUE(result.topology_matches);
   const std::vector<Vec3>& points = result.mesh.vertices;
   EXPECT_EQ(std::count(points.begin(), points.end(), Vec3{3, 3, 0}), 0);
@@ -122,7 +158,7 @@ TEST(IntersectionCurves, WithoutRoomAreLeftOut) {
     TriangleMesh mesh = cut->mesh;
     FeatureGraph with = features;
     IntersectionCurves curves(*cut, left_out, with);
-    const auto division = curves.divide(mesh, with, SizedMesh{mesh, {{}, 0.12}});
+    const auto division = curves.divide(mesh, with, uniform(mesh, 0.12));
     for (const auto& edge : division.crowded)
       EXPECT_TRUE(std::binary_search(table.edges.begin(), table.edges.end(), edge));
     left_out.insert(left_out.end(), division.crowded.begin(), division.crowded.end());
