@@ -1,7 +1,6 @@
 // A run: the domain's backend, the seeds, the diagram of exactly those seeds, and what all its evaluations cost.
 #pragma once
 
-#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -76,8 +75,8 @@ class CvtRun {
   double step_work() const;
   // Counts so many steps. Unlike evaluations work is the same in a run that goes on from a checkpoint.
   void add_work(int steps) { totals.work += steps * step_work(); }
-  // When there have been so many times as many steps as by now, or as a run has at least.
-  double work_after(double times) const { return times * std::max(totals.work, kLeastSteps * step_work()); }
+  // After so many more steps of diagrams with their stray parts.
+  double work_after(int steps) const { return totals.work + steps * plain_step_work(); }
   // Whether a diagram covers the domain: the masses of its cells sum, to `mass`, to the domain's. One that does not is
   // never used.
   bool covers(double mass) const;
@@ -85,12 +84,11 @@ class CvtRun {
   void change_backend(Backend& backend);
 
  private:
-  static constexpr double kLeastSteps = 100;
-
   friend class Descent;
   friend class SavedStep;
   friend struct CvtGradient complete(CvtRun& run, bool constrained);
 
+  double plain_step_work() const;
   void count(const EvaluationReport& report);
   Localiser& localiser();
   void leave_out_strays(DiagramOfSeeds& known);
