@@ -736,15 +736,19 @@ bool has_faults(const JudgedResult& judged) {
          judged.slivers.hopeless;
 }
 
+std::size_t slivers_of(const JudgedResult& judged) { return judged.slivers.bounds.points.size() / 3; }
+
+bool has_many_slivers(const JudgedResult& judged) {
+  return slivers_of(judged) * kFewSlivers > judged.result.mesh.triangles.size();
+}
+
 // Whether a result in which components share vertices where they meet is to be preferred to one in which they do not:
 // slivers are few, and fewer triangles cross, if these are no more than those of the input.
 bool shares_well(const JudgedResult& shared, const JudgedResult& apart, const TriangleMesh& input) {
   const std::size_t too_many = count_self_intersections(input) + 1;
   const auto rank = [&](const JudgedResult& j) {
-    const TriangleMesh& mesh = j.result.mesh;
-    const std::size_t slivers = j.slivers.bounds.points.size() / 3;
-    return std::tuple(!j.result.topology_matches, slivers * kFewSlivers > mesh.triangles.size(),
-                      std::min(count_self_intersections(mesh), too_many), slivers);
+    return std::tuple(!j.result.topology_matches, has_many_slivers(j),
+                      std::min(count_self_intersections(j.result.mesh), too_many), slivers_of(j));
   };
   return rank(shared) < rank(apart);
 }
@@ -882,14 +886,15 @@ Runs::Run Runs::make_run(bool last) {
 
 // While results become better, with shorter edges for what is wrong with them.
 void Runs::settle() {
-  const int refinements = preparation_->intersections().empty() ? kRefinements : kSharedRefinements;
-  for (int left = may_shorten_ ? refinements : 0;; --left) {
+  const bool shares = !preparation_->intersections().empty();
+  for (int left = may_shorten_ ? (shares ? kSharedRefinements : kRefinements) : 0;; --left) {
     Run run = make_run(left == 0);
     if (best_ && !is_better(run.judged, *best_)) return;
     best_ = std::move(run.judged);
     if (left == 0 || !run.next.why || spent_.totals.work - work_before_ > kMostWork * placing_) return;
+    if (shares && has_many_slivers(*best_)) return;
     preparation_->bound(run.next.bounds);
-    if (!preparation_->intersections().empty()) {
+    if (shares) {
       preparation_->divide_intersections_again();
       earlier_.reset();
     }
