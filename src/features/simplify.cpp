@@ -234,6 +234,7 @@ Vec3 arm_of(const std::vector<Index>& chain, std::size_t from, bool onwards, con
 // Curves that leave a corner run together as long as they are nearer to each other than this part of the way from it,
 // at less than 9 degrees, and than kShared.
 constexpr double kTogether = 0.15;
+constexpr int kSamples = 8;  // of each edge
 
 // Sets curves that leave the same corner apart: where one runs beside another from there on, it ends on that one where
 // they part. Ways that led them to the corner run along edges of the mesh, which may be as near to each other as facets
@@ -283,8 +284,14 @@ class Parting {
     const auto is_beside = [&](const Vec3& q) {
       return distance_to(other, q) < std::min(limit_, kTogether * norm(q - vertices_[corner]));
     };
+    // Both may end at the same corner, and be apart between.
+    const auto edge_is_beside = [&](const Vec3& from, const Vec3& to) {
+      for (int k = 1; k <= kSamples; ++k)
+        if (!is_beside(from + (static_cast<double>(k) / kSamples) * (to - from))) return false;
+      return true;
+    };
     std::size_t last = 0;
-    while (last + 1 < chain.size() && is_beside(vertices_[chain[last + 1]])) ++last;
+    while (last + 1 < chain.size() && edge_is_beside(vertices_[chain[last]], vertices_[chain[last + 1]])) ++last;
     if (last == 0) return false;
     const double beside = arc_lengths(chain, vertices_)[last];
     if (beside < limit_) return false;

@@ -478,6 +478,31 @@ TEST(SimplifiedFeatures, PartWhereTheyNoLongerRunTogether) {
   }
 }
 
+// An edge between the ends of a half circle is as near to it as can be at both ends, and nowhere between.
+TEST(SimplifiedFeatures, BetweenTheSameCornersStayWhereTheyAreApart) {
+  Chains net;
+  const Index from = net.corner({2, 0, 0}), to = net.corner({-2, 0, 0});
+  std::vector<Index> arc{from};
+  std::vector<Triangle> triangles;
+  for (int k = 1; k < 16; ++k) {
+    const double angle = k * std::numbers::pi / 16;
+    arc.push_back(static_cast<Index>(net.points.size()));
+    net.points.push_back({2 * std::cos(angle), 2 * std::sin(angle), 0});
+  }
+  arc.push_back(to);
+  for (std::size_t k = 1; k + 1 < arc.size(); ++k) triangles.push_back({arc[k], arc[k + 1], from});
+  for (const bool edge_first : {false, true}) {
+    net.graph.curves = {{arc, false, FeatureKind::crease}, {{from, to}, false, FeatureKind::crease}};
+    if (edge_first) std::swap(net.graph.curves[0], net.graph.curves[1]);
+    net.graph.edges = edges_of(net.graph.curves);
+    const Csr<Index> neighbours = vertex_neighbours(triangles, net.points.size());
+    for (const double width : {0.5, 1.0}) {
+      const SimplifiedFeatures left = simplify_features(net.graph, net.points, {1, 1}, width, {}, neighbours);
+      EXPECT_EQ(left.graph.edges, net.graph.edges);
+    }
+  }
+}
+
 // A crease along both sides of a strip and around a field at its end becomes one line to a loop.
 TEST(SimplifiedFeatures, GoWhereTheyRunBesideThemselves) {
   CreasesOnAGrid grid;
