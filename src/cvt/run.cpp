@@ -101,9 +101,9 @@ void CvtRun::adopt(PlacedSeeds placed, DiagramOfSeeds known) {
   if (!localised_ && diagram_.strays > 0) diagram_ = {};
 }
 
-double CvtRun::plain_step_work() const { return static_cast<double>(backend_->facet_count() + 3 * seeds.size()); }
-
-double CvtRun::step_work() const { return (localised_ ? kLocalisedWork : 1) * plain_step_work(); }
+double CvtRun::step_work() const {
+  return (localised_ ? kLocalisedWork : 1) * static_cast<double>(backend_->facet_count() + 3 * seeds.size());
+}
 
 bool CvtRun::covers(double mass) const {
   const double total = backend_->mass();

@@ -75,8 +75,6 @@ class CvtRun {
   double step_work() const;
   // Counts so many steps. Unlike evaluations work is the same in a run that goes on from a checkpoint.
   void add_work(int steps) { totals.work += steps * step_work(); }
-  // After so many more steps of diagrams with their stray parts.
-  double work_after(int steps) const { return totals.work + steps * plain_step_work(); }
   // Whether a diagram covers the domain: the masses of its cells sum, to `mass`, to the domain's. One that does not is
   // never used.
   bool covers(double mass) const;
@@ -88,7 +86,6 @@ class CvtRun {
   friend class SavedStep;
   friend struct CvtGradient complete(CvtRun& run, bool constrained);
 
-  double plain_step_work() const;
   void count(const EvaluationReport& report);
   Localiser& localiser();
   void leave_out_strays(DiagramOfSeeds& known);

@@ -5,7 +5,7 @@
 
 #include "bisector/context.h"
 #include "core/geometry.h"
-#include "remesh/prepare.h"
+#include "remesh/size_bounds.h"
 
 namespace bisector {
 

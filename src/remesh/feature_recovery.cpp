@@ -22,9 +22,6 @@ using Kind = SeedPlace::Kind;
 // moves. What comes next begins at once when a round leaves more than this share of the faults.
 constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
 constexpr double kWorthARound = 0.75;
-// What optimisations take at most, in steps of the whole run, about twice those of placing seeds: then nothing moves
-// any more, either.
-constexpr int kMostSteps = 450;
 constexpr int kFirstSteps = 20, kLastSteps = 4;
 // Rounds of clearing curves at the end of a level, and steps after each.
 constexpr int kClearingRounds = 2, kClearingSteps = 20;
@@ -382,7 +379,6 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   const Want chains = run.traced() | Want::dual;
   const FeatureCurves& curves = run.curves();
   const std::size_t count = run.seeds.size(), most = count + count / 4 + kMostAdded;
-  const double most_work = run.work_after(kMostSteps);
   protect_acute_corners(curves, measure, c, run.seeds);
   PlacedSeeds best;
   std::size_t fewest = std::numeric_limits<std::size_t>::max(), previous = fewest;
@@ -397,7 +393,7 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
     }
     const bool stuck = static_cast<double>(found.faults.size()) > kWorthARound * static_cast<double>(previous);
     previous = found.faults.size();
-    if ((stuck && crowd) || run.totals.work > most_work) round = std::max(round, kMovingRounds);
+    if (stuck && crowd) round = std::max(round, kMovingRounds);
     crowd = crowd || stuck || round >= kRelocatingRounds;
     const bool last = round >= kMovingRounds;
     if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most) break;

@@ -286,6 +286,7 @@ std::vector<IntersectionCurves::Station> IntersectionCurves::stations(const Curv
     std::sort(places.begin(), places.end());
     places.erase(std::unique(places.begin(), places.end()), places.end());
     for (const double place : places) {
+      if (place == 0 && k > 0) continue;  // the end of the edge before
       double least = std::numeric_limits<double>::infinity();
       for (const std::vector<Station>& along : copies) {
         const auto next = std::find_if(along.begin() + 1, along.end() - 1,
@@ -294,8 +295,7 @@ std::vector<IntersectionCurves::Station> IntersectionCurves::stations(const Curv
         const double t = (place - last->place) / (next->place - last->place);
         least = std::min(least, last->length + t * (next->length - last->length));
       }
-      if (place == 0 && k > 0) found.back().length = std::min(found.back().length, least);
-      else found.push_back({static_cast<double>(k) + place, least});
+      found.push_back({static_cast<double>(k) + place, least});
     }
   }
   return found;

@@ -429,8 +429,8 @@ void Preparation::bound(const SizeBounds& bounds) {
   for (std::size_t k = before; k < bounds_.points.size(); ++k) bounds_.points[k] = apart_.back(bounds_.points[k]);
 }
 
-void Preparation::divide_intersections_again() {
-  if (!undivided_) return;
+bool Preparation::divide_intersections_again() {
+  if (!undivided_) return false;
   Undivided before = *std::exchange(undivided_, std::nullopt);
   mesh_ = std::move(before.mesh);
   features_ = std::move(before.features);
@@ -438,6 +438,7 @@ void Preparation::divide_intersections_again() {
   meeting_ = std::move(before.meeting);
   kept_lengths_ = {};
   divide_intersection_curves();
+  return true;
 }
 
 void Preparation::ask_for(std::size_t vertices) {

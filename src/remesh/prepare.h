@@ -61,8 +61,8 @@ class Preparation {
   // So many vertices, whatever was asked for.
   void ask_for(std::size_t vertices);
   // Components that share intersections get corners there for the edge lengths as they are now. Curves and corners are
-  // others then than in domains before.
-  void divide_intersections_again();
+  // others then than in domains before. False if there are none.
+  bool divide_intersections_again();
   // The domain with its density as it stands.
   PreparedInput lay_down();
   const WeldResult& welded() const { return welded_; }

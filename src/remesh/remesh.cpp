@@ -805,6 +805,7 @@ class Runs {
   };
 
   bool refines() const { return options_.seeds.empty() && options_.detail != DetailMode::off; }
+  void shorten_edges(const SizeBounds& bounds);
   Run make_run(bool last);
   void settle();
   void settle_intersections();
@@ -829,6 +830,12 @@ class Runs {
   double work_before_ = 0;  // of runs in which components shared vertices
   std::optional<JudgedResult> best_;
 };
+
+// In the runs to come. Components that share intersections get other corners there, which seeds do not fit any more.
+void Runs::shorten_edges(const SizeBounds& bounds) {
+  preparation_->bound(bounds);
+  if (preparation_->divide_intersections_again()) earlier_.reset();
+}
 
 Runs::Run Runs::make_run(bool last) {
   const MakeBackend make_backend = [&](const Surface& surface) { return compute_.backend(surface); };
@@ -855,8 +862,8 @@ Runs::Run Runs::make_run(bool last) {
     if (std::exchange(may_shorten_, false)) {
       const SizeBounds crowded = pipeline.crowded();
       if (!crowded.points.empty()) {
-        preparation_->bound(crowded);
         earlier_ = pipeline.seeds();
+        shorten_edges(crowded);
         spent_ = pipeline.spent();
         progress_.start_again("shorter edges for topology");
         continue;
@@ -893,11 +900,7 @@ void Runs::settle() {
     best_ = std::move(run.judged);
     if (left == 0 || !run.next.why || spent_.totals.work - work_before_ > kMostWork * placing_) return;
     if (shares && has_many_slivers(*best_)) return;
-    preparation_->bound(run.next.bounds);
-    if (shares) {
-      preparation_->divide_intersections_again();
-      earlier_.reset();
-    }
+    shorten_edges(run.next.bounds);
     progress_.start_again(run.next.why);
   }
 }
@@ -937,12 +940,8 @@ void Runs::come_near() {
     const auto next = static_cast<std::size_t>(std::ceil(last.growth * static_cast<double>(asked)));
     if (last.bounds.points.empty() || asked >= outcome.most_vertices) break;
     asked = std::min(std::max(next, asked + 1), outcome.most_vertices);
-    preparation_->bound(last.bounds);
     preparation_->ask_for(asked);
-    if (!preparation_->intersections().empty()) {
-      preparation_->divide_intersections_again();
-      earlier_.reset();
-    }
+    shorten_edges(last.bounds);
     progress_.start_again("shorter edges for the distance");
     Run run = make_run(true);
     run.judged.crossings = new_crossings_->of(run.judged.result.mesh).pairs;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "bisector/remesh.h"
-#include "remesh/prepare.h"
+#include "remesh/size_bounds.h"
 
 namespace bisector {
 

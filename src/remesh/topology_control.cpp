@@ -33,7 +33,7 @@ constexpr std::size_t kDivergence = 2;
 constexpr int kTrims = 8;
 constexpr std::size_t kMostTrimmed = 8;
 // Where a surface may have no such mesh at all, no more is inserted after so many steps of the whole run.
-constexpr int kMostFutileSteps = 200;
+constexpr int kMostFutileSteps = 70;
 // Steps of the optimiser and of Lloyd once the property holds, and how often a step is shortened for it.
 constexpr int kPolishingSteps = 20, kSmoothingSteps = 20, kRetreats = 12;
 // Seeds that may be added: a quarter of them and kMostAdded. A surface may need more than were asked for: so many are
@@ -227,8 +227,9 @@ class Control {
  public:
   Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, OptimiseOptions options)
       : run_(run), trace_(trace), is_sound_(is_sound),
-        most_work_(is_sound ? kInfinity : run.work_after(kMostFutileSteps)), options_(std::move(options)),
-        wanted_(run.seeds.size()), given_(wanted_), most_(std::max(budget(), kGrown)), lost_(run.curves().size(), 0) {
+        most_work_(is_sound ? kInfinity : run.totals.work + kMostFutileSteps * run.step_work()),
+        options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_), most_(std::max(budget(), kGrown)),
+        lost_(run.curves().size(), 0) {
     options_.done = 1;
     options_.share = 0;
   }
