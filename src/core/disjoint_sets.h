@@ -56,8 +56,7 @@ class ConcurrentSets {
     }
   }
 
- private:
-  std::atomic_ref<I> at(I i) { return std::atomic_ref<I>(parent_[i]); }
+  // The lowest item of the set that i is in, while nothing is joined.
   I root(I i) {
     for (;;) {
       const I parent = at(i).load(std::memory_order_relaxed);
@@ -67,6 +66,9 @@ class ConcurrentSets {
       i = above;
     }
   }
+
+ private:
+  std::atomic_ref<I> at(I i) { return std::atomic_ref<I>(parent_[i]); }
 
   std::vector<I> parent_;
 };

@@ -75,7 +75,7 @@ std::vector<Index> seeds_on(const RestrictedPolygons& polygons, const std::vecto
   return seeds;
 }
 
-void optimise_piece(CvtRun& run, const Piece& piece, const std::vector<char>& free, const OptimiseOptions& options) {
+void move_on_piece(CvtRun& run, const Piece& piece, const std::vector<char>& free, const MoveSeeds& move) {
   CpuBackend backend(piece.surface, NeighbourSource::nearest);
   CvtRun part(backend, run.curves(), run.context());
   for (const Index i : piece.seeds) {
@@ -84,7 +84,7 @@ void optimise_piece(CvtRun& run, const Piece& piece, const std::vector<char>& fr
     part.seeds.add(run.seeds.position(i), place);
   }
   part.localise(run.localises());
-  optimise(part, options);
+  move(part, piece.seeds);
   for (std::size_t k = 0; k < piece.seeds.size(); ++k)
     if (free[piece.seeds[k]]) run.seeds.put(piece.seeds[k], part.seeds.position(k), part.seeds.place(k));
   run.totals += part.totals;
@@ -96,7 +96,7 @@ SeedsBefore seeds_before(CvtRun& run) {
   return {run.seeds.positions(), extract_dual_edges(run.diagram(Want::polygons).polygons, run.seeds.positions())};
 }
 
-void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options) {
+void move_around(CvtRun& run, const SeedsBefore& before, const MoveSeeds& move) {
   std::vector<char> free = changed_seeds(before, run.seeds.positions());
   if (std::find(free.begin(), free.end(), 1) == free.end()) return;
   const Diagram& diagram = run.diagram(Want::polygons);
@@ -110,10 +110,17 @@ void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptio
   std::size_t count = 0;
   for (std::size_t i = 0; i < inner.size(); ++i)
     for (const Index* t = cells.begin(i); inner[i] && t != cells.end(i); ++t) count += !std::exchange(triangles[*t], 1);
-  if (count == 0 || static_cast<double>(count) > kLargePiece * static_cast<double>(triangles.size()))
-    return optimise(run, options);
+  if (count == 0 || static_cast<double>(count) > kLargePiece * static_cast<double>(triangles.size())) {
+    std::vector<Index> all(run.seeds.size());
+    std::iota(all.begin(), all.end(), Index{0});
+    return move(run, all);
+  }
   const std::vector<Index> seeds = seeds_on(diagram.polygons, triangles, run.seeds.size());
-  optimise_piece(run, {marked_surface(run.surface(), triangles), seeds}, free, options);
+  move_on_piece(run, {marked_surface(run.surface(), triangles), seeds}, free, move);
+}
+
+void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options) {
+  move_around(run, before, [&](CvtRun& part, const std::vector<Index>&) { optimise(part, options); });
 }
 
 }  // namespace bisector

@@ -12,6 +12,7 @@
 
 #include "backend/project.h"
 #include "core/parallel.h"
+#include "cvt/optimise_around.h"
 #include "remesh/sheets.h"
 #include "voronoi/dual.h"
 #include "voronoi/polygons.h"
@@ -34,8 +35,9 @@ constexpr int kTrims = 8;
 constexpr std::size_t kMostTrimmed = 8;
 // Where a surface may have no such mesh at all, no more is inserted after so many steps of the whole run.
 constexpr int kMostFutileSteps = 70;
-// Steps of the optimiser and of Lloyd once the property holds, and how often a step is shortened for it.
-constexpr int kPolishingSteps = 20, kSmoothingSteps = 20, kRetreats = 12;
+// Steps of the optimiser once the property holds; rounds of Lloyd's steps, and steps of each; and how often seeds go
+// back for the property.
+constexpr int kPolishingSteps = 20, kSmoothingRounds = 5, kSmoothingSteps = 4, kRetreats = 12;
 // Seeds that may be added: a quarter of them and kMostAdded. A surface may need more than were asked for: so many are
 // allowed to grow to, and in the end.
 constexpr std::size_t kMostAdded = 100, kGrown = 300, kAnyway = 5000;
@@ -241,6 +243,7 @@ class Control {
     keep_best();
     if (!holds()) {
       const SavedSeeds given = best_;
+      const SeedsBefore before = seeds_before(run_);
       grow();
       const SavedSeeds start = best_;
       most_ = budget();
@@ -256,8 +259,8 @@ class Control {
       }
       if (holds()) {
         trim();
-        polish();
-        smooth();
+        polish(before);
+        smooth(before);
       } else {
         // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show.
         restore(best_has_too_few_ || !is_sound_ ? given : best_);
@@ -502,28 +505,42 @@ class Control {
     return held;
   }
 
-  // The optimiser's steps.
-  void polish() {
+  // The optimiser's steps, around what has changed.
+  void polish(const SeedsBefore& given) {
     const PlacedSeeds before = run_.seeds;
     options_.iterations = kPolishingSteps;
     options_.phase = "topology, polishing";
-    optimise(run_, options_);
+    optimise_around(run_, given, options_);
     const std::vector<Vec3> next = run_.seeds.positions();
     std::vector<char> held = held_seeds();
     move(before, next, held);
   }
 
   // Lloyd's steps, for they move a seed by its own cell alone.
-  void smooth() {
+  void smooth(const SeedsBefore& given) {
     std::vector<char> held = held_seeds();
-    for (int step = 0; step < kSmoothingSteps; ++step) {
+    for (int round = 0; round < kSmoothingRounds; ++round) {
       const PlacedSeeds before = run_.seeds;
-      const CellMoments& moments = run_.diagram(options_.constrained ? Want::triangles : Want::moments).moments;
-      std::vector<Vec3> next = before.positions(), normals(next.size());
+      move_around(run_, given,
+                  [&](CvtRun& part, const std::vector<Index>& seeds) { step_to_centroids(part, seeds, held); });
+      const std::vector<Vec3> next = run_.seeds.positions();
+      if (next == before.positions() || !move(before, next, held)) return;
+    }
+  }
+
+  // Of the part's seeds, which are these of the run, those that are not held.
+  void step_to_centroids(CvtRun& part, const std::vector<Index>& seeds, const std::vector<char>& held) {
+    for (int step = 0; step < kSmoothingSteps; ++step) {
+      part.context().check();
+      part.add_work(1);
+      const CellMoments& moments = part.diagram(options_.constrained ? Want::triangles : Want::moments).moments;
+      std::vector<Vec3> next = part.seeds.positions(), normals(next.size());
       for (std::size_t i = 0; i < next.size(); ++i)
         if (const Moments& m = moments.cells[i]; m.mass > 0) next[i] += (1 / m.mass) * m.first;
-      if (options_.constrained) project_to_cells(run_.surface(), moments.triangles, {}, next, normals);
-      if (!move(before, next, held)) return;
+      if (options_.constrained) project_to_cells(part.surface(), moments.triangles, {}, next, normals);
+      const std::span<Vec3> positions = part.seeds.edit_positions();
+      for (std::size_t i = 0; i < next.size(); ++i)
+        if (part.seeds.on_surface(static_cast<Index>(i)) && !held[seeds[i]]) positions[i] = next[i];
     }
   }
 

@@ -1,6 +1,7 @@
 #include "spatial/seed_tree.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "core/parallel.h"
@@ -97,6 +98,40 @@ void SeedTree::descend(std::size_t level, std::size_t node, const Vec3& q, doubl
   std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count));
   for (std::size_t k = 0; k < count; ++k)
     if (order[k].first <= squared * kMargin) descend(level - 1, order[k].second, q, squared, best);
+}
+
+void SeedTree::set_values(const std::vector<double>& values) {
+  largest_.resize(levels_.size());
+  const auto set_level = [&](std::size_t level, const std::vector<double>& below, std::size_t arity) {
+    largest_[level].resize(levels_[level].size());
+    parallel_each(largest_[level].size(), [&](std::size_t i) {
+      const auto first = below.begin() + static_cast<std::ptrdiff_t>(i * arity);
+      const auto end = below.begin() + static_cast<std::ptrdiff_t>(std::min(below.size(), (i + 1) * arity));
+      largest_[level][i] = *std::max_element(first, end);
+    });
+  };
+  set_level(0, values, kLeaf);
+  for (std::size_t level = 1; level < levels_.size(); ++level) set_level(level, largest_[level - 1], kArity);
+}
+
+double SeedTree::largest_within(const Box& box, double radius, double least) const {
+  double largest = std::max(least, 0.0);
+  descend(levels_.size() - 1, 0, box, radius, largest);
+  return largest;
+}
+
+void SeedTree::descend(std::size_t level, std::size_t node, const Box& box, double radius, double& largest) const {
+  const double value = largest_[level][node];
+  if (value <= largest) return;
+  const double between = std::sqrt(squared_distance(levels_[level][node], box)) / kMargin - radius;
+  const double within = value - std::max(0.0, between);
+  if (within <= largest) return;
+  if (level == 0) {
+    largest = within;
+    return;
+  }
+  const std::size_t end = std::min(levels_[level - 1].size(), (node + 1) * kArity);
+  for (std::size_t child = node * kArity; child < end; ++child) descend(level - 1, child, box, radius, largest);
 }
 
 }  // namespace bisector

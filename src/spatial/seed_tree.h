@@ -22,14 +22,22 @@ class SeedTree {
   // The index of a point whose distance to q is the least up to rounding. There must be a point.
   Index nearest(const Vec3& q) const;
 
+  // Gives each point a value of at least 0.
+  void set_values(const std::vector<double>& values);
+  // An upper bound of the largest value among the points less what is between the point and the `radius` around the
+  // box; at least `least`, and 0.
+  double largest_within(const Box& box, double radius, double least) const;
+
  private:
   static constexpr std::size_t kArity = 4;
 
   void descend(std::size_t level, std::size_t node, const Box& box, double squared, std::vector<Index>& indices) const;
   void descend(std::size_t level, std::size_t node, const Vec3& q, double& squared, Index& best) const;
+  void descend(std::size_t level, std::size_t node, const Box& box, double radius, double& largest) const;
 
   const std::vector<Vec3>* points_ = nullptr;
-  std::vector<std::vector<Box>> levels_;  // from the leaves up to the root; node i has the children kArity i, ...
+  std::vector<std::vector<Box>> levels_;      // from the leaves up to the root; node i has the children kArity i, ...
+  std::vector<std::vector<double>> largest_;  // value below each node
 };
 
 }  // namespace bisector

@@ -93,7 +93,22 @@ bool Clipper::clip(const Neighbours& neighbours, Index slot) {
 bool Clipper::clip(std::span<const Index> others, Index slot) {
   start(slot);
   place_lines();
-  return std::all_of(others.begin(), others.end(), [&](Index other) { return other == slot || visit(other); });
+  bounded_ = false;
+  const auto is_left = [&](Index other) {
+    if (other == slot) return true;
+    if (!bounded_) bound_polygon();
+    const Vec3 d = seeds_->x[other] - seeds_->x[slot];
+    const double squared = norm2(d);
+    if (!reach_.is_safe_from(squared)) cut(other, d, squared);
+    return polygon_.size > 0;
+  };
+  // Slots that are near in their order are near in space, and cut away most of what there is to cut away.
+  const auto middle = std::lower_bound(others.begin(), others.end(), slot);
+  for (auto before = middle, after = middle; before != others.begin() || after != others.end();) {
+    if (after != others.end() && !is_left(*after++)) return false;
+    if (before != others.begin() && !is_left(*--before)) return false;
+  }
+  return true;
 }
 
 void Clipper::place_lines() {

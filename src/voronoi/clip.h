@@ -24,7 +24,7 @@ class Clipper {
   void begin(const Surface& surface, std::size_t facet);
   // Clips the facet to the cell of `slot`. False if the (perturbed) intersection is empty.
   bool clip(const Neighbours& neighbours, Index slot);
-  // The same as if no other seeds than these were there.
+  // The same as if no other seeds than these, ascending, were there.
   bool clip(std::span<const Index> others, Index slot);
   // Takes the whole facet, which the caller knows to lie in the cell.
   void take(Index slot);

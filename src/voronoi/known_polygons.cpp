@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/lanes.h"
 #include "voronoi/error_bounds.h"
 #include "voronoi/polygon_batch.h"
 
@@ -15,9 +14,6 @@ namespace bisector {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-#define BISECTOR_LANES_FILE "voronoi/polygon_lanes.inl"
-#include "core/each_lanes.inl"
 
 }  // namespace
 
@@ -32,7 +28,7 @@ void KnownPolygons::begin(const Surface& surface, const SortedSeeds& seeds, cons
   neighbours_ = &neighbours;
   owner_ = owner;
   screens_ = &screens;
-  compute_ = of_widest_lanes(avx512::compute, avx2::compute, portable::compute);
+  compute_ = widest_compute_polygons();
 }
 
 void KnownPolygons::add(Index index, Index slot, std::span<const Index> labels, Moments& moments, char& fails) {
@@ -46,32 +42,10 @@ void KnownPolygons::add(Index index, Index slot, std::span<const Index> labels, 
     if ((labels[previous] & ~kEdgeLabel) != (corner + 2) % 3 || owner_[summary.vertex[corner]] != slot) fails = 1;
   }
   if (fails) return;
-  const Facet& facet = surface_->facets[index];
   Batch& batch = batches_[count];
-  PolygonBatch& numbers = batch.numbers;
   const std::size_t lane = batch.filled++;
   batch.polygons[lane] = {slot, labels.data(), &moments, &fails};
-  const auto put = [lane](PolygonBatch::Row* rows, const Vec3& p) {
-    rows[0][lane] = p.x;
-    rows[1][lane] = p.y;
-    rows[2][lane] = p.z;
-  };
-  for (int k = 0; k < 3; ++k) {
-    put(numbers.corner[k], facet.corners[k]);
-    numbers.runs_on[k][lane] = facet.origin[k] == k;
-  }
-  put(numbers.normal, facet.normal);
-  numbers.anchor[lane] = facet.anchor;
-  put(numbers.seed, seeds_->x[slot]);
-  if (const FacetDensity* density = surface_->density_of(index)) {
-    for (int k = 0; k < 3; ++k) numbers.density[k][lane] = density->at[k];
-    put(numbers.gradient, density->gradient);
-  }
-  for (std::size_t k = 0; k < count; ++k) {
-    const bool edge = is_edge(labels[k]);
-    numbers.edge[k][lane] = edge ? static_cast<double>(labels[k] & ~kEdgeLabel) : -1;
-    if (!edge) put(numbers.other[k], seeds_->x[labels[k]]);
-  }
+  batch.numbers.put(lane, *surface_, index, *seeds_, slot, labels);
   if (batch.filled == PolygonBatch::kLanes) finish(batch);
 }
 
@@ -88,9 +62,7 @@ void KnownPolygons::finish(Batch& batch) {
   std::size_t count = 0;
   for (std::size_t lane = 0; lane < batch.filled; ++lane) {
     const Polygon& polygon = batch.polygons[lane];
-    *polygon.moments = {numbers.mass[lane],
-                        {numbers.first[0][lane], numbers.first[1][lane], numbers.first[2][lane]},
-                        numbers.second[lane]};
+    *polygon.moments = numbers.moments(lane);
     *polygon.fails |= !(numbers.fits[lane] > 0);
     // Of the polygons that meet in a vertex, the one of the lowest slot sees to it; edges compare as greater.
     for (std::size_t k = 0, previous = n - 1; k < n; previous = k++) {

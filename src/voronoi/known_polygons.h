@@ -60,7 +60,7 @@ class KnownPolygons {
   const Neighbours* neighbours_ = nullptr;
   const Index* owner_ = nullptr;
   Screens* screens_ = nullptr;
-  void (*compute_)(PolygonBatch&, bool uniform) = nullptr;
+  ComputePolygons compute_ = nullptr;
   std::vector<Batch> batches_;  // by number of corners
 };
 

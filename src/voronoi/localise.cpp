@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -16,6 +17,7 @@
 #include "core/marks.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
+#include "voronoi/batched_moments.h"
 #include "voronoi/clip.h"
 #include "voronoi/fixed_tree_sum.h"
 #include "voronoi/polygons.h"
@@ -32,7 +34,7 @@ constexpr std::size_t kDivisions = 16;
 constexpr double kSamePoint = 1e-9;
 // Relative; more than rounding makes of squared distances.
 constexpr double kRounding = 1e-12;
-constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 16;  // of a parallel loop
+constexpr std::size_t kCellsAtOnce = 64, kTrianglesAtOnce = 16, kTrianglesInARow = 4096;  // of a parallel loop
 
 using Triangles = std::vector<Index>;  // ascending
 
@@ -124,10 +126,13 @@ class Regions {
 // Memory that loops over triangles or cells use.
 struct Scratch {
   std::vector<Index> place;  // of triangles in the list of one cell; anything for others
-  std::vector<Index> labels, slots;
+  std::vector<Index> labels, slots, beside, kept;
   std::vector<std::array<double, 3>> squares;  // of the distances of slots from a triangle's corners
   std::vector<std::size_t> order;
   RestrictedPolygons found;
+  BatchedMoments batched;
+  std::vector<Moments> moments;  // of the polygons of some cells
+  std::vector<char> unknown;     // which are to be computed one by one
 };
 
 // Half-edges that lie across others, mostly one.
@@ -179,6 +184,7 @@ struct Localiser::Work {
   RestrictedPolygons anew;                         // all that was clipped anew, some of it more than once
   Overlay<Range> clipped;                          // triangles as they are divided now, in `anew`
   Overlay<Triangles> cell_triangles;               // of cells that changed
+  std::vector<Index> met;                          // cells on triangles that were clipped anew, changed or not
   std::map<Index, std::vector<Triangles>> strays;  // components of cells apart from their seeds
   Overlay<Among> among;                            // of triangles where seeds are left out
   Regions regions;
@@ -202,6 +208,10 @@ struct Localiser::Work {
       while (p < end && polygons->pairs[p].cell != cell) ++p;
       return p;
     }
+    std::span<const Index> labels_of(std::size_t polygon) const {
+      return std::span(polygons->labels)
+          .subspan(polygons->offsets[polygon], polygons->offsets[polygon + 1] - polygons->offsets[polygon]);
+    }
     bool has_label(std::size_t polygon, Index label) const {
       const auto& labels = polygons->labels;
       for (std::size_t e = polygons->offsets[polygon]; e < polygons->offsets[polygon + 1]; ++e)
@@ -216,11 +226,15 @@ struct Localiser::Work {
   std::span<const Index> triangles_of(Index cell) const;
 
   Clipper& clipper();
+  std::span<const Index> slot_labels(const Row& on, std::size_t polygon);
   void take(const Row& on, std::size_t polygon, Clipper& clipper);
   double squared_distance(Index triangle, Index cell, Clipper& clipper);
   std::vector<std::size_t> nearest_to_seed(Index cell, std::span<const Index> triangles);
   std::vector<Triangles> find_strays(Index cell);
-  void find_strays(const std::vector<Index>& cells);
+  std::vector<Triangles> apart_from_seed(Index cell, std::span<const Index> triangles, std::span<const Index> parts);
+  template <class Find>
+  void set_strays(const std::vector<Index>& cells, const Find& find);
+  void find_first_strays();
   bool is_left_out(Index triangle, Index cell) const;
   template <class Body>
   void each_cell_beside(Index cell, const Triangles& piece, const Body& body) const;
@@ -229,9 +243,11 @@ struct Localiser::Work {
   Triangles beside(const Triangles& triangles) const;
   std::vector<Index> clip_anew(const Triangles& triangles);
   void find_candidates(Index triangle, Scratch& scratch) const;
+  void keep_polygons(Index triangle, Scratch& scratch) const;
   void clip(Index triangle, Clipper& clipper, RestrictedPolygons& out);
   void change(Index triangle, const Row& before, const Row& after, std::vector<Index>& cells);
   RestrictedPolygons splice() const;
+  void sum_cells(std::span<const Index> cells, CellMoments& result);
   void sum(Diagram& diagram);
 };
 
@@ -283,15 +299,20 @@ Clipper& Localiser::Work::clipper() {
   return mine;
 }
 
-// Has the clipper hold a polygon as its labels say, which is the same whatever computed them.
-void Localiser::Work::take(const Row& on, std::size_t polygon, Clipper& clipper) {
-  const RestrictedPolygons& polygons = *on.polygons;
-  const auto& [triangle, cell] = polygons.pairs[polygon];
+// Of a polygon, with slots for cells.
+std::span<const Index> Localiser::Work::slot_labels(const Row& on, std::size_t polygon) {
   std::vector<Index>& labels = scratches.local().labels;
-  labels.assign(polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon]),
-                polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[polygon + 1]));
+  const std::span<const Index> given = on.labels_of(polygon);
+  labels.assign(given.begin(), given.end());
   for (Index& label : labels)
     if (!is_edge(label)) label = seeds.slot[label];
+  return labels;
+}
+
+// Has the clipper hold a polygon as its labels say, which is the same whatever computed them.
+void Localiser::Work::take(const Row& on, std::size_t polygon, Clipper& clipper) {
+  const auto& [triangle, cell] = on.polygons->pairs[polygon];
+  const std::span<const Index> labels = slot_labels(on, polygon);
   clipper.begin(surface, surface.facet_of[triangle]);
   clipper.take(seeds.slot[cell], labels.data(), labels.size());
 }
@@ -334,7 +355,27 @@ std::vector<std::size_t> Localiser::Work::nearest_to_seed(Index cell, std::span<
   return nearest;
 }
 
-// The components of a cell but for that nearest to its seed, or those that it is on.
+// The components of a cell but for that nearest to its seed, or those that it is on. `parts`: the component of each of
+// its triangles.
+std::vector<Triangles> Localiser::Work::apart_from_seed(Index cell, std::span<const Index> triangles,
+                                                        std::span<const Index> parts) {
+  if (std::ranges::all_of(parts, [&](Index part) { return part == parts[0]; })) return {};
+  std::vector<Index> own;
+  for (const std::size_t i : nearest_to_seed(cell, triangles)) own.push_back(parts[i]);
+  std::vector<Index> piece_of;  // the component of each piece
+  std::vector<Triangles> pieces;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (contains(own, parts[i])) continue;
+    const auto piece = static_cast<std::size_t>(std::ranges::find(piece_of, parts[i]) - piece_of.begin());
+    if (piece == pieces.size()) {
+      piece_of.push_back(parts[i]);
+      pieces.emplace_back();
+    }
+    pieces[piece].push_back(triangles[i]);
+  }
+  return pieces;
+}
+
 std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
   const std::span<const Index> triangles = triangles_of(cell);
   const std::size_t count = triangles.size();
@@ -342,47 +383,66 @@ std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
   std::vector<Index>& place = scratches.local().place;
   place.resize(surface.mesh.triangles.size());
   for (Index i = 0; i < count; ++i) place[triangles[i]] = i;
-  DisjointSets<> parts(count);
+  DisjointSets<Index> sets(count);
   std::size_t components = count;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (Index i = 0; i < count; ++i) {
     const Row on = row(triangles[i]);
-    const std::size_t p = on.find(cell);
-    for (std::size_t e = on.polygons->offsets[p]; e < on.polygons->offsets[p + 1]; ++e) {
-      const Index label = on.polygons->labels[e];
+    for (const Index label : on.labels_of(on.find(cell))) {
       if (!is_edge(label)) continue;
-      const std::size_t h = std::size_t{3} * triangles[i] + (label & ~kEdgeLabel);
-      for (const Index other : across.of(h)) {
+      for (const Index other : across.of(std::size_t{3} * triangles[i] + (label & ~kEdgeLabel))) {
         const Index t = other / 3, at = place[t];
-        if (at < count && triangles[at] == t) components -= parts.join(i, at);
+        if (at < count && triangles[at] == t) components -= sets.join(i, at);
       }
     }
   }
   if (components == 1) return {};
-  const std::vector<std::size_t> nearest = nearest_to_seed(cell, triangles);
-  for (const std::size_t i : nearest) parts.join(i, nearest[0]);
-  const std::size_t own = parts.root(nearest[0]);
-  std::vector<std::size_t> piece_of(count, count);
-  std::vector<Triangles> pieces;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t root = parts.root(i);
-    if (root == own) continue;
-    if (piece_of[root] == count) {
-      piece_of[root] = pieces.size();
-      pieces.emplace_back();
-    }
-    pieces[piece_of[root]].push_back(triangles[i]);
-  }
-  return pieces;
+  std::vector<Index> parts(count);
+  for (Index i = 0; i < count; ++i) parts[i] = sets.root(i);
+  return apart_from_seed(cell, triangles, parts);
 }
 
-void Localiser::Work::find_strays(const std::vector<Index>& cells) {
+template <class Find>
+void Localiser::Work::set_strays(const std::vector<Index>& cells, const Find& find) {
   std::vector<std::vector<Triangles>> found(cells.size());
   parallel_each(
-      cells.size(), [&](std::size_t k) { found[k] = find_strays(cells[k]); }, kCellsAtOnce);
+      cells.size(), [&](std::size_t k) { found[k] = find(cells[k]); }, kCellsAtOnce);
   for (std::size_t k = 0; k < cells.size(); ++k) {
     if (found[k].empty()) strays.erase(cells[k]);
     else strays[cells[k]] = std::move(found[k]);
   }
+}
+
+// Of all cells of the diagram given. What its polygons have in common across mesh edges joins them, and of a cell that
+// is whole as many links join two sets as there are polygons but one.
+void Localiser::Work::find_first_strays() {
+  ConcurrentSets<Index> sets(raw->pairs.size());
+  std::vector<Index> joined(raw_triangles->rows(), 0);
+  parallel_chunks(surface.mesh.triangles.size(), kTrianglesInARow,
+                  [&](std::size_t, std::size_t begin, std::size_t end) {
+                    for (std::size_t p = first[begin]; p < first[end]; ++p) {
+                      const auto& [triangle, cell] = raw->pairs[p];
+                      for (const Index label : row(triangle).labels_of(p)) {
+                        if (!is_edge(label)) continue;
+                        const std::size_t h = std::size_t{3} * triangle + (label & ~kEdgeLabel);
+                        for (const Index other : across.of(h)) {
+                          if (direct[h] && other < h) continue;  // seen from there
+                          const Row there = row(other / 3);
+                          const std::size_t q = there.find(cell);
+                          if (q < there.end && sets.join(static_cast<Index>(p), static_cast<Index>(q)))
+                            std::atomic_ref<Index>(joined[cell]).fetch_add(1, std::memory_order_relaxed);
+                        }
+                      }
+                    }
+                  });
+  std::vector<Index> cells;
+  for (Index cell = 0; cell < joined.size(); ++cell)
+    if (triangles_of(cell).size() > joined[cell] + 1) cells.push_back(cell);
+  set_strays(cells, [&](Index cell) {
+    const std::span<const Index> triangles = triangles_of(cell);
+    std::vector<Index> parts;
+    for (const Index t : triangles) parts.push_back(sets.root(static_cast<Index>(row(t).find(cell))));
+    return apart_from_seed(cell, triangles, parts);
+  });
 }
 
 bool Localiser::Work::is_left_out(Index triangle, Index cell) const {
@@ -570,18 +630,47 @@ void Localiser::Work::find_candidates(Index triangle, Scratch& scratch) const {
   slots.resize(kept);
 }
 
+// Where a triangle is divided anew for the first time, only the cells that border on those left out can win of it, for
+// on it they are convex: what the others have is kept, and they are candidates no more.
+void Localiser::Work::keep_polygons(Index triangle, Scratch& scratch) const {
+  if (clipped.find(triangle) || back.contains(triangle)) return;
+  const std::vector<Index>& left_out = among.find(triangle)->left_out;
+  const Row on = row(triangle);
+  std::vector<Index>& beside = scratch.beside;  // cells
+  beside.clear();
+  for (std::size_t p = on.begin; p < on.end; ++p) {
+    if (!contains(left_out, seeds.slot[raw->pairs[p].cell])) continue;
+    for (std::size_t e = raw->offsets[p]; e < raw->offsets[p + 1]; ++e)
+      if (!is_edge(raw->labels[e])) beside.push_back(raw->labels[e]);
+  }
+  sort_unique(beside);
+  for (std::size_t p = on.begin; p < on.end; ++p) {
+    const Index cell = raw->pairs[p].cell, slot = seeds.slot[cell];
+    if (contains(left_out, slot) || std::binary_search(beside.begin(), beside.end(), cell)) continue;
+    append_polygons(*raw, p, p + 1, scratch.found);
+    scratch.kept.push_back(slot);
+  }
+}
+
 // Appends the division of a triangle among the seeds that are not left out.
 void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons& out) {
   Scratch& scratch = scratches.local();
   find_candidates(triangle, scratch);
-  clipper.begin(surface, surface.facet_of[triangle]);
   RestrictedPolygons& found = scratch.found;
   found.pairs.clear();
   found.offsets.assign(1, 0);
   found.labels.clear();
   found.vertices.clear();
-  for (const Index slot : scratch.slots)
+  scratch.kept.clear();
+  keep_polygons(triangle, scratch);
+  std::sort(scratch.kept.begin(), scratch.kept.end());
+  const bool has_vertices = !raw->vertices.empty();
+  clipper.begin(surface, surface.facet_of[triangle]);
+  for (const Index slot : scratch.slots) {
+    if (std::binary_search(scratch.kept.begin(), scratch.kept.end(), slot)) continue;
     if (clipper.clip(scratch.slots, slot)) append_polygon(clipper, seeds, triangle, slot, found);
+    if (!has_vertices) found.vertices.clear();
+  }
   std::vector<std::size_t>& order = scratch.order;
   order.resize(found.pairs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -590,7 +679,7 @@ void Localiser::Work::clip(Index triangle, Clipper& clipper, RestrictedPolygons&
   for (const std::size_t p : order) append_polygons(found, p, p + 1, out);
 }
 
-// Keeps the lists of triangles of cells that lose or win one, and adds these to `cells`.
+// Keeps the lists of triangles of cells that lose or win one, and adds those and cells with another polygon to `cells`.
 void Localiser::Work::change(Index triangle, const Row& before, const Row& after, std::vector<Index>& cells) {
   const auto list = [&](Index cell) -> Triangles& {
     if (taken.mark(cell)) cells.push_back(cell);
@@ -604,11 +693,17 @@ void Localiser::Work::change(Index triangle, const Row& before, const Row& after
   while (p < before.end || q < after.end) {
     const Index old_cell = p < before.end ? before.polygons->pairs[p].cell : kNone;
     const Index new_cell = q < after.end ? after.polygons->pairs[q].cell : kNone;
-    Triangles& of = list(std::min(old_cell, new_cell));
-    if (old_cell < new_cell) of.erase(std::lower_bound(of.begin(), of.end(), triangle));
-    if (new_cell < old_cell) of.insert(std::lower_bound(of.begin(), of.end(), triangle), triangle);
-    p += old_cell <= new_cell;
-    q += new_cell <= old_cell;
+    const Index cell = std::min(old_cell, new_cell);
+    met.push_back(cell);
+    if (old_cell != new_cell) {
+      Triangles& of = list(cell);
+      if (cell == old_cell) of.erase(std::lower_bound(of.begin(), of.end(), triangle));
+      else of.insert(std::lower_bound(of.begin(), of.end(), triangle), triangle);
+    } else if (!std::ranges::equal(before.labels_of(p), after.labels_of(q))) {
+      list(cell);
+    }
+    p += old_cell == cell;
+    q += new_cell == cell;
   }
 }
 
@@ -654,25 +749,47 @@ RestrictedPolygons Localiser::Work::splice() const {
   return all;
 }
 
+// Sets the moments of these cells, which changed.
+void Localiser::Work::sum_cells(std::span<const Index> cells, CellMoments& result) {
+  Scratch& scratch = scratches.local();
+  std::size_t count = 0;
+  for (const Index cell : cells) count += triangles_of(cell).size();
+  scratch.moments.resize(count);
+  scratch.unknown.resize(count);
+  scratch.batched.begin(surface, seeds);
+  std::size_t k = 0;
+  for (const Index cell : cells)
+    for (const Index t : triangles_of(cell)) {
+      const Row on = row(t);
+      scratch.batched.add(surface.facet_of[t], seeds.slot[cell], slot_labels(on, on.find(cell)), scratch.moments[k],
+                          scratch.unknown[k]);
+      ++k;
+    }
+  scratch.batched.finish();
+  FixedTreeSum sum;
+  k = 0;
+  for (const Index cell : cells) {
+    for (const Index t : triangles_of(cell)) {
+      if (scratch.unknown[k]) {
+        Clipper& mine = clipper();
+        const Row on = row(t);
+        take(on, on.find(cell), mine);
+        scratch.moments[k] = mine.integrate();
+      }
+      sum.add(scratch.moments[k++]);
+    }
+    result.cells[cell] = sum.finish();
+  }
+}
+
 // Sets the moments of the cells that changed, and the triangles of all.
 void Localiser::Work::sum(Diagram& diagram) {
   CellMoments& moments = diagram.moments;
   const std::vector<Index>& cells = cell_triangles.items;
-  parallel_each(
-      cells.size(),
-      [&](std::size_t k) {
-        const Index cell = cells[k];
-        Clipper& mine = clipper();
-        FixedTreeSum sum;
-        for (const Index t : *cell_triangles.find(cell)) {
-          const Row on = row(t);
-          take(on, on.find(cell), mine);
-          sum.add(mine.integrate());
-        }
-        moments.cells[cell] = sum.finish();
-        moments.step_mass[cell] = -1;
-      },
-      kCellsAtOnce);
+  parallel_chunks(cells.size(), kCellsAtOnce, [&](std::size_t, std::size_t begin, std::size_t end) {
+    sum_cells({cells.data() + begin, cells.data() + end}, moments);
+  });
+  for (const Index cell : met) moments.step_mass[cell] = -1;
   Csr<Index>& triangles = moments.triangles;
   std::vector<Index> values;
   std::vector<std::size_t> offsets{0};
@@ -686,7 +803,7 @@ void Localiser::Work::sum(Diagram& diagram) {
   triangles.offsets = std::move(offsets);
   Neighbours neighbours;
   const auto around_seeds = [&]() -> const Neighbours& {
-    neighbours.build(seeds, NeighbourSource::nearest);
+    neighbours.build_on_demand(seeds, 0);
     return neighbours;
   };
   complete_step_masses(seeds, around_seeds, moments);
@@ -702,13 +819,12 @@ std::size_t Localiser::Work::find_all_strays(const std::vector<Vec3>& given, con
   anew = {};
   clipped.reset(surface.mesh.triangles.size());
   cell_triangles.reset(given.size());
+  met.clear();
   strays.clear();
   among.reset(surface.mesh.triangles.size());
   regions.reset(seeds.x.size());
   back.clear();
-  std::vector<Index> cells(given.size());
-  std::iota(cells.begin(), cells.end(), Index{0});
-  find_strays(cells);
+  find_first_strays();
   return strays.size();
 }
 
@@ -720,7 +836,7 @@ std::size_t Localiser::Work::localise(const std::vector<Vec3>& given, Diagram& d
     const Triangles triangles = leave_out();
     divided += triangles.size();
     if (triangles.empty() || divided > kDivisions * surface.facets.size()) break;
-    find_strays(clip_anew(triangles));
+    set_strays(clip_anew(triangles), [&](Index cell) { return find_strays(cell); });
   }
   // What else is torn then lies beside what is clipped anew.
   for (Triangles torn = put_back_torn(among.items); !torn.empty(); torn = put_back_torn(beside(torn))) clip_anew(torn);

@@ -174,6 +174,7 @@ void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
       for (std::size_t i = first; i < last; ++i) list_run(i, i + 1, {seeds.x[i], seeds.x[i]}, search);
     }
   });
+  built_tree_ = tree_;
   built_x_ = seeds.x;
   built_radius_ = radius_;
   built_count_ = count_;
@@ -183,18 +184,21 @@ bool Neighbours::update() {
   const std::vector<Vec3>& x = seeds_->x;
   const std::size_t n = x.size();
   if (use_rings_ || built_x_.size() != n) return false;
-  constexpr std::size_t kBlock = 4096;
-  std::vector<double> farthest((n + kBlock - 1) / kBlock, 0);
-  parallel_chunks(n, kBlock, [&](std::size_t c, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) farthest[c] = std::max(farthest[c], norm2(x[i] - built_x_[i]));
-  });
-  const double any = std::sqrt(*std::max_element(farthest.begin(), farthest.end())) * (1 + 1e-9);
+  std::vector<double> moved(n);
+  parallel_each(n, [&](std::size_t i) { moved[i] = norm(x[i] - built_x_[i]) * (1 + 1e-9); });
+  built_tree_.set_values(moved);
   std::atomic<bool> worth_it = true;
-  parallel_chunks(n, 512, [&](std::size_t, std::size_t begin, std::size_t end) {
+  parallel_chunks(n, 64 * SeedTree::kLeaf, [&](std::size_t, std::size_t begin, std::size_t end) {
     std::uint64_t keys[ListLength::kMost];
     Index sorted[ListLength::kMost];
+    double others = 0;  // how far seeds that are not listed may have come nearer, in the leaf
     for (std::size_t i = begin; i < end && worth_it.load(std::memory_order_relaxed); ++i) {
-      const double lost = norm(x[i] - built_x_[i]) * (1 + 1e-9) + any;
+      if (i % SeedTree::kLeaf == 0) {
+        const auto first = built_radius_.begin() + static_cast<std::ptrdiff_t>(i);
+        const double radius = *std::max_element(first, first + std::min<std::ptrdiff_t>(SeedTree::kLeaf, n - i));
+        others = built_tree_.largest_within(built_tree_.leaf_box(i / SeedTree::kLeaf), radius, 0) * (1 + 1e-9);
+      }
+      const double lost = moved[i] + others;
       if (!(lost <= kMostLost * built_radius_[i])) {
         worth_it.store(false, std::memory_order_relaxed);
         return;
@@ -356,6 +360,18 @@ const Neighbours::LastRung& Neighbours::last_rung() const {
   return *last_rung_;
 }
 
+// An upper bound of the distance of the seed that is the `count`-th nearest, or of the farthest if there are fewer.
+double Neighbours::distance_in_order(Index slot, std::size_t count) const {
+  const std::vector<Vec3>& x = seeds_->x;
+  const std::size_t first = slot - std::min<std::size_t>(slot, count), end = std::min(x.size(), slot + count + 1);
+  if (end - first <= count) return seeds_->extent;
+  std::vector<double> squared;
+  for (std::size_t k = first; k < end; ++k)
+    if (k != slot) squared.push_back(norm2(x[k] - x[slot]));
+  std::nth_element(squared.begin(), squared.begin() + static_cast<std::ptrdiff_t>(count - 1), squared.end());
+  return std::sqrt(squared[count - 1]);
+}
+
 std::size_t Neighbours::nearest_to(Index slot, std::size_t count, Index* slots) const {
   const Vec3 p = seeds_->x[slot];
   const NeighbourList known = list(slot);
@@ -367,8 +383,9 @@ std::size_t Neighbours::nearest_to(Index slot, std::size_t count, Index* slots) 
     for (std::size_t k = 0; k < taken; ++k) slots[k] = seeds_->slot[first[k].second];
     return taken;
   };
-  // The nearest listed seeds bound the distance of the nearest of all.
-  double radius = listed >= count ? norm(seeds_->x[known.begin[count - 1]] - p) * (1 + 1e-9) : seeds_->extent * 1e-3;
+  // The nearest listed seeds bound the distance of the nearest of all, and so do those that are near in their order.
+  double radius = listed >= count ? norm(seeds_->x[known.begin[count - 1]] - p) : distance_in_order(slot, count);
+  radius *= 1 + 1e-9;
   if (!use_rings_ && listed >= count && radius < known.radius) {
     std::array<Near, ListLength::kMost> nearest;
     std::size_t size = 0;

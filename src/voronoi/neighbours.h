@@ -52,7 +52,8 @@ class Neighbours {
   // No lists at first: each is grown on demand, from about `radius` on.
   void build_on_demand(const SortedSeeds& seeds, double radius);
   // For the same slots at new positions: sorts the lists of the last build anew and shortens them and their
-  // certificates by how far seeds have moved since. False if that is not worth it and build() has to be called.
+  // certificates by how far they and seeds around them have moved since. False if that is not worth it and build() has
+  // to be called.
   bool update();
 
   NeighbourList list(Index slot) const;
@@ -74,6 +75,7 @@ class Neighbours {
   bool list_run(std::size_t begin, std::size_t end, const Box& box, Search& search);
   const LastRung& last_rung() const;
   std::unique_ptr<Grown> grow(Index slot, int level, double radius) const;
+  double distance_in_order(Index slot, std::size_t count) const;
   void drop_grown();
   void start(const SortedSeeds& seeds);
 
@@ -83,6 +85,7 @@ class Neighbours {
   std::vector<Index> first_;          // room for length_.most per slot
   std::vector<unsigned char> count_;  // of the lists of first_
   std::vector<double> radius_;
+  SeedTree built_tree_;
   std::vector<Vec3> built_x_;  // positions and radii of the last build
   std::vector<double> built_radius_;
   std::vector<unsigned char> built_count_;

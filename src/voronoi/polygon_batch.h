@@ -1,7 +1,12 @@
-// Polygons with the same number of corners, side by side, for KnownPolygons.
+// Polygons with the same number of corners, side by side.
 #pragma once
 
 #include <cstddef>
+#include <span>
+
+#include "voronoi/moments.h"
+#include "voronoi/neighbours.h"
+#include "voronoi/surface.h"
 
 namespace bisector {
 
@@ -23,6 +28,45 @@ struct PolygonBatch {
   // all are certain to lie within the facet; moments.
   Row at[kMost][3], squared[kMost], slack[kMost], fits;
   Row mass, first[3], second;
+
+  // Puts in the polygon of a cell on a facet, bounded by these labels in cyclic order, the least first: slots or facet
+  // edges. Of no more than kMost corners.
+  void put(std::size_t lane, const Surface& surface, std::size_t facet, const SortedSeeds& seeds, Index slot,
+           std::span<const Index> labels);
+  Moments moments(std::size_t lane) const {
+    return {mass[lane], {first[0][lane], first[1][lane], first[2][lane]}, second[lane]};
+  }
 };
+
+inline void PolygonBatch::put(std::size_t lane, const Surface& surface, std::size_t index, const SortedSeeds& seeds,
+                              Index slot, std::span<const Index> labels) {
+  const auto put_vector = [lane](Row* rows, const Vec3& p) {
+    rows[0][lane] = p.x;
+    rows[1][lane] = p.y;
+    rows[2][lane] = p.z;
+  };
+  const Facet& facet = surface.facets[index];
+  for (int k = 0; k < 3; ++k) {
+    put_vector(corner[k], facet.corners[k]);
+    runs_on[k][lane] = facet.origin[k] == k;
+  }
+  put_vector(normal, facet.normal);
+  anchor[lane] = facet.anchor;
+  put_vector(seed, seeds.x[slot]);
+  if (const FacetDensity* at_corners = surface.density_of(index)) {
+    for (int k = 0; k < 3; ++k) density[k][lane] = at_corners->at[k];
+    put_vector(gradient, at_corners->gradient);
+  }
+  for (std::size_t k = 0; k < labels.size(); ++k) {
+    const bool on_edge = is_edge(labels[k]);
+    edge[k][lane] = on_edge ? static_cast<double>(labels[k] & ~kEdgeLabel) : -1;
+    if (!on_edge) put_vector(other[k], seeds.x[labels[k]]);
+  }
+}
+
+// Sets the results of a batch, of a surface with or without densities.
+using ComputePolygons = void (*)(PolygonBatch&, bool uniform);
+// The one for this processor.
+ComputePolygons widest_compute_polygons();
 
 }  // namespace bisector

@@ -1,4 +1,4 @@
-// Included by known_polygons.cpp, once for each set of instructions (core/lanes.h). The operations are those of
+// Included by polygon_batch.cpp, once for each set of instructions (core/lanes.h). The operations are those of
 // Clipper's start(), begin(), place_lines(), add_line(), meet() and integrate() in their order, lane by lane, so the
 // bits are the same.
 
