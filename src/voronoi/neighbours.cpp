@@ -191,14 +191,20 @@ bool Neighbours::update() {
   parallel_chunks(n, 64 * SeedTree::kLeaf, [&](std::size_t, std::size_t begin, std::size_t end) {
     std::uint64_t keys[ListLength::kMost];
     Index sorted[ListLength::kMost];
-    double others = 0;  // how far seeds that are not listed may have come nearer, in the leaf
+    double others = 0;  // how far any seed that is not listed may have come nearer to the leaf's
     for (std::size_t i = begin; i < end && worth_it.load(std::memory_order_relaxed); ++i) {
+      const auto lost_to = [&](const Box& box, double radius) {
+        return built_tree_.largest_within(box, radius, 0) * (1 + 1e-9);
+      };
       if (i % SeedTree::kLeaf == 0) {
         const auto first = built_radius_.begin() + static_cast<std::ptrdiff_t>(i);
         const double radius = *std::max_element(first, first + std::min<std::ptrdiff_t>(SeedTree::kLeaf, n - i));
-        others = built_tree_.largest_within(built_tree_.leaf_box(i / SeedTree::kLeaf), radius, 0) * (1 + 1e-9);
+        others = lost_to(built_tree_.leaf_box(i / SeedTree::kLeaf), radius);
       }
-      const double lost = moved[i] + others;
+      double lost = moved[i] + others;
+      // A leaf may span a jump of the spatial order.
+      if (!(lost <= kMostLost * built_radius_[i]))
+        lost = moved[i] + lost_to({built_x_[i], built_x_[i]}, built_radius_[i]);
       if (!(lost <= kMostLost * built_radius_[i])) {
         worth_it.store(false, std::memory_order_relaxed);
         return;

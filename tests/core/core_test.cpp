@@ -116,6 +116,7 @@ TEST(ConcurrentSets, AsManyCallsJoinAsThereAreSetsFewer) {
     parallel_each(
         kLinks, [&](std::size_t k) { found += sets.join(links[k][0], links[k][1]); }, 16);
     ASSERT_EQ(found, joins);
+    for (std::size_t i = 0; i < kItems; ++i) ASSERT_EQ(sets.root(i), expected.root(i));
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "backend/cpu_backend.h"
@@ -56,12 +57,14 @@ TEST(LocalisedCells, AreTheCellsWhereTheseAreDisks) {
   EXPECT_TRUE(same_bits(localised.moments.cells, diagram.moments.cells));
 }
 
-// Two sheets that are not joined: on each the diagram is that of the seeds on it alone.
+// Two sheets that are not joined: on each the diagram is that of the seeds on it alone, with triangles smaller than the
+// cells, and such as hold a dozen of them.
 TEST(LocalisedCells, OfTwoSheetsAreThoseOfEachSheetAlone) {
-  for (const double distance : {0.2, 0.05, 0.01}) {
-    const TriangleMesh lower = grid_patch(9, 9);
+  for (const auto& [squares, distance] :
+       {std::pair{9, 0.2}, {9, 0.05}, {9, 0.01}, {2, 0.2}, {2, 0.05}, {1, 0.2}, {1, 0.05}, {1, 0.01}}) {
+    const TriangleMesh lower = grid_patch(squares, squares);
     TriangleMesh upper = lower;
-    for (Vec3& v : upper.vertices) v.z += 9 * distance;
+    for (Vec3& v : upper.vertices) v.z += squares * distance;
     TriangleMesh both = lower;
     both.vertices.insert(both.vertices.end(), upper.vertices.begin(), upper.vertices.end());
     const auto first = static_cast<Index>(lower.vertices.size());

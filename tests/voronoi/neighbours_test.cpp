@@ -247,6 +247,30 @@ TEST_P(Lists, AreCertifiedAfterAnUpdate) {
   }
 }
 
+// With lists and without.
+TEST_P(Lists, OfSoManyNearestAgreeWithBruteForce) {
+  const SortedSeeds seeds = sort_seeds(given);
+  Neighbours listed, on_demand;
+  listed.build(seeds, NeighbourSource::nearest);
+  on_demand.build_on_demand(seeds, 0);
+  SplitMix64 random(17);
+  for (int sample = 0; sample < 100; ++sample) {
+    const auto slot = static_cast<Index>(random.below(seeds.x.size()));
+    std::vector<std::pair<double, Index>> expected;
+    for (Index j = 0; j < seeds.x.size(); ++j)
+      if (j != slot) expected.push_back({norm2(seeds.x[j] - seeds.x[slot]), seeds.id[j]});
+    std::sort(expected.begin(), expected.end());
+    for (const std::size_t count : {1, 6, 50}) {
+      for (const Neighbours* neighbours : {&listed, &on_demand}) {
+        std::vector<Index> found(count);
+        found.resize(neighbours->nearest_to(slot, count, found.data()));
+        ASSERT_EQ(found.size(), std::min(count, expected.size()));
+        for (std::size_t k = 0; k < found.size(); ++k) ASSERT_EQ(seeds.id[found[k]], expected[k].second);
+      }
+    }
+  }
+}
+
 TEST_P(Lists, NearestAndAroundAgreeWithBruteForce) {
   const SortedSeeds seeds = sort_seeds(given);
   Neighbours neighbours;
@@ -309,6 +333,23 @@ INSTANTIATE_TEST_SUITE_P(Neighbours, Lists, testing::ValuesIn(seed_cases()), [](
   std::replace(name.begin(), name.end(), ' ', '_');
   return name;
 });
+
+// Seeds that lie the sparser the farther from a point, by a factor of 150, and move by as much less than their spacing
+// everywhere: what moves far away does not count.
+TEST(Neighbours, FollowGradedSeeds) {
+  SplitMix64 random(16);
+  std::vector<Vec3> given = ball({0, 0, 0}, 1, 4000, 18);
+  for (Vec3& x : given) x = (std::exp(random.range(-5, 0)) / norm(x)) * x;
+  SortedSeeds seeds = sort_seeds(given);
+  Neighbours neighbours;
+  neighbours.build(seeds, NeighbourSource::nearest);
+  for (Vec3& x : seeds.x) x += 0.01 * norm(x) * Vec3{random.range(-1, 1), random.range(-1, 1), random.range(-1, 1)};
+  EXPECT_TRUE(neighbours.update());
+  for (Index slot = 0; slot < seeds.x.size(); slot += 10) {
+    expect_certified(seeds, slot, neighbours.list(slot), true);
+    if (HasFatalFailure()) return;
+  }
+}
 
 // Near the cluster every list is short of the far seeds, and the far seeds' lists are full of the cluster.
 TEST(Neighbours, SurviveAHeavyCluster) {

@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@
 #include "support/diagram.h"
 #include "support/models.h"
 #include "support/oracle.h"
+#include "voronoi/batched_moments.h"
+#include "voronoi/clip.h"
 #include "voronoi/fixed_tree_sum.h"
 
 namespace bisector::test {
@@ -241,6 +244,48 @@ TEST_P(Medium, EverySourceAndThreadCountGivesTheSameBits) {
   used.evaluate(random_seeds(mesh, 6000, 28), NeighbourSource::delaunay, Want::moments, last);
   used.evaluate(seeds, NeighbourSource::nearest, Want::moments, last);
   expect_same_moments(last.moments, reference.moments);
+}
+
+// Of polygons by their labels, with a density and without.
+TEST_P(Medium, MomentsInBatchesAreThoseOfTheClipper) {
+  std::vector<double> density;
+  for (const Vec3& v : mesh.vertices) density.push_back(1.5 + std::sin(v.x + 2 * v.y));
+  for (const Surface& surface : {Surface(mesh), Surface(mesh, density)}) {
+    const RestrictedPolygons polygons = diagram_of(surface, seeds, NeighbourSource::nearest).polygons;
+    const SortedSeeds sorted = sort_seeds(seeds);
+    Clipper clipper;
+    clipper.reset(sorted);
+    const std::size_t count = polygons.pairs.size();
+    std::vector<Moments> expected, found(count);
+    std::vector<char> unknown(count);
+    BatchedMoments batched;
+    batched.begin(surface, sorted);
+    for (std::size_t p = 0; p < count; ++p) {
+      std::vector<Index> labels(polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[p]),
+                                polygons.labels.begin() + static_cast<std::ptrdiff_t>(polygons.offsets[p + 1]));
+      for (Index& label : labels)
+        if (!is_edge(label)) label = sorted.slot[label];
+      const Index facet = surface.facet_of[polygons.pairs[p].triangle], slot = sorted.slot[polygons.pairs[p].cell];
+      clipper.begin(surface, facet);
+      clipper.take(slot, labels.data(), labels.size());
+      expected.push_back(clipper.integrate());
+      batched.add(facet, slot, labels, found[p], unknown[p]);
+    }
+    batched.finish();
+    for (std::size_t p = 0; p < count; ++p) {
+      if (!unknown[p]) {
+        ASSERT_TRUE(same_bits(found[p], expected[p])) << p;
+      }
+    }
+    // Whole facets are never unknown.
+    for (std::size_t p = 0; p < count; ++p) {
+      const auto labels =
+          std::span(polygons.labels).subspan(polygons.offsets[p], polygons.offsets[p + 1] - polygons.offsets[p]);
+      if (std::ranges::all_of(labels, is_edge)) {
+        EXPECT_FALSE(unknown[p]);
+      }
+    }
+  }
 }
 
 // The optimiser's use: seeds that move a little, or jump, change their number, coincide, and come back.
