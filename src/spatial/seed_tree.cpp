@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/parallel.h"
 
@@ -100,7 +101,8 @@ void SeedTree::descend(std::size_t level, std::size_t node, const Vec3& q, doubl
     if (order[k].first <= squared * kMargin) descend(level - 1, order[k].second, q, squared, best);
 }
 
-void SeedTree::set_values(const std::vector<double>& values) {
+void SeedTree::set_values(std::vector<double> values) {
+  values_ = std::move(values);
   largest_.resize(levels_.size());
   const auto set_level = [&](std::size_t level, const std::vector<double>& below, std::size_t arity) {
     largest_[level].resize(levels_[level].size());
@@ -110,24 +112,25 @@ void SeedTree::set_values(const std::vector<double>& values) {
       largest_[level][i] = *std::max_element(first, end);
     });
   };
-  set_level(0, values, kLeaf);
+  set_level(0, values_, kLeaf);
   for (std::size_t level = 1; level < levels_.size(); ++level) set_level(level, largest_[level - 1], kArity);
 }
 
-double SeedTree::largest_within(const Box& box, double radius, double least) const {
-  double largest = std::max(least, 0.0);
+double SeedTree::largest_within(const Box& box, double radius) const {
+  double largest = 0;
   descend(levels_.size() - 1, 0, box, radius, largest);
   return largest;
 }
 
 void SeedTree::descend(std::size_t level, std::size_t node, const Box& box, double radius, double& largest) const {
-  const double value = largest_[level][node];
-  if (value <= largest) return;
-  const double between = std::sqrt(squared_distance(levels_[level][node], box)) / kMargin - radius;
-  const double within = value - std::max(0.0, between);
-  if (within <= largest) return;
+  const auto within = [&](double value, const Box& of) {
+    return value - std::max(0.0, std::sqrt(squared_distance(of, box)) / kMargin - radius);
+  };
+  if (largest_[level][node] <= largest || within(largest_[level][node], levels_[level][node]) <= largest) return;
   if (level == 0) {
-    largest = within;
+    const std::size_t end = std::min(points_->size(), (node + 1) * kLeaf);
+    for (std::size_t i = node * kLeaf; i < end; ++i)
+      largest = std::max(largest, within(values_[i], {(*points_)[i], (*points_)[i]}));
     return;
   }
   const std::size_t end = std::min(levels_[level - 1].size(), (node + 1) * kArity);

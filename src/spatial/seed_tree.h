@@ -23,10 +23,9 @@ class SeedTree {
   Index nearest(const Vec3& q) const;
 
   // Gives each point a value of at least 0.
-  void set_values(const std::vector<double>& values);
-  // An upper bound of the largest value among the points less what is between the point and the `radius` around the
-  // box; at least `least`, and 0.
-  double largest_within(const Box& box, double radius, double least) const;
+  void set_values(std::vector<double> values);
+  // The largest value of a point less what is between the point and the `radius` around the box, up to rounding; or 0.
+  double largest_within(const Box& box, double radius) const;
 
  private:
   static constexpr std::size_t kArity = 4;
@@ -36,7 +35,8 @@ class SeedTree {
   void descend(std::size_t level, std::size_t node, const Box& box, double radius, double& largest) const;
 
   const std::vector<Vec3>* points_ = nullptr;
-  std::vector<std::vector<Box>> levels_;      // from the leaves up to the root; node i has the children kArity i, ...
+  std::vector<std::vector<Box>> levels_;  // from the leaves up to the root; node i has the children kArity i, ...
+  std::vector<double> values_;
   std::vector<std::vector<double>> largest_;  // value below each node
 };
 

@@ -174,8 +174,8 @@ void Neighbours::build(const SortedSeeds& seeds, NeighbourSource source) {
       for (std::size_t i = first; i < last; ++i) list_run(i, i + 1, {seeds.x[i], seeds.x[i]}, search);
     }
   });
-  built_tree_ = tree_;
   built_x_ = seeds.x;
+  built_tree_.build(built_x_);
   built_radius_ = radius_;
   built_count_ = count_;
 }
@@ -194,7 +194,7 @@ bool Neighbours::update() {
     double others = 0;  // how far any seed that is not listed may have come nearer to the leaf's
     for (std::size_t i = begin; i < end && worth_it.load(std::memory_order_relaxed); ++i) {
       const auto lost_to = [&](const Box& box, double radius) {
-        return built_tree_.largest_within(box, radius, 0) * (1 + 1e-9);
+        return built_tree_.largest_within(box, radius) * (1 + 1e-9);
       };
       if (i % SeedTree::kLeaf == 0) {
         const auto first = built_radius_.begin() + static_cast<std::ptrdiff_t>(i);

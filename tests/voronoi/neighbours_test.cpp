@@ -351,6 +351,25 @@ TEST(Neighbours, FollowGradedSeeds) {
   }
 }
 
+// A few seeds beyond the lists of others, which reach as far as a cluster on the other side, come nearer.
+TEST(Neighbours, AreCertifiedWhereOthersComeNearer) {
+  const std::vector<Vec3> middle = ball({0, 0, 0}, 1e-3, 6, 19), cluster = ball({1, 0, 0}, 1e-3, 60, 20);
+  SortedSeeds seeds = sort_seeds(joined(joined(middle, cluster), ball({-1.15, 0, 0}, 1e-3, 6, 21)));
+  Neighbours neighbours;
+  neighbours.build(seeds, NeighbourSource::nearest);
+  for (const Index slot : seeds.slot)
+    if (norm(seeds.x[slot]) < 0.1) {
+      ASSERT_LT(neighbours.list(slot).radius, 1.1);
+    }
+  for (Vec3& x : seeds.x)
+    if (x.x < -1) x.x += 0.25;
+  ASSERT_TRUE(neighbours.update());
+  for (Index slot = 0; slot < seeds.x.size(); ++slot) {
+    expect_certified(seeds, slot, neighbours.list(slot), true);
+    if (HasFatalFailure()) return;
+  }
+}
+
 // Near the cluster every list is short of the far seeds, and the far seeds' lists are full of the cluster.
 TEST(Neighbours, SurviveAHeavyCluster) {
   const SortedSeeds seeds = sort_seeds(joined(ball({0.3, 0.2, 0.1}, 1e-6, 10'000, 21), ball({0, 0, 0}, 1, 100, 22)));
