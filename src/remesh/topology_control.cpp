@@ -259,7 +259,7 @@ class Control {
       }
       if (holds()) {
         trim();
-        polish(before);
+        polish();
         smooth(before);
       } else {
         // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show.
@@ -505,18 +505,18 @@ class Control {
     return held;
   }
 
-  // The optimiser's steps, around what has changed.
-  void polish(const SeedsBefore& given) {
+  // The optimiser's steps, of all seeds.
+  void polish() {
     const PlacedSeeds before = run_.seeds;
     options_.iterations = kPolishingSteps;
     options_.phase = "topology, polishing";
-    optimise_around(run_, given, options_);
+    optimise(run_, options_);
     const std::vector<Vec3> next = run_.seeds.positions();
     std::vector<char> held = held_seeds();
     move(before, next, held);
   }
 
-  // Lloyd's steps, for they move a seed by its own cell alone.
+  // Lloyd's steps around what has changed, for they move a seed by its own cell alone.
   void smooth(const SeedsBefore& given) {
     std::vector<char> held = held_seeds();
     for (int round = 0; round < kSmoothingRounds; ++round) {
