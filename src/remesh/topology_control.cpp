@@ -540,7 +540,7 @@ class Control {
       if (options_.constrained) project_to_cells(part.surface(), moments.triangles, {}, next, normals);
       const std::span<Vec3> positions = part.seeds.edit_positions();
       for (std::size_t i = 0; i < next.size(); ++i)
-        if (part.seeds.on_surface(static_cast<Index>(i)) && !held[seeds[i]]) positions[i] = next[i];
+        if (part.seeds.on_surface(i) && !held[seeds[i]]) positions[i] = next[i];
     }
   }
 

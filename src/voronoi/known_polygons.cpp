@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
-#include <cstdint>
 #include <limits>
 
 #include "voronoi/error_bounds.h"
-#include "voronoi/polygon_batch.h"
 
 namespace bisector {
 namespace {
@@ -17,10 +14,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-KnownPolygons::KnownPolygons() : batches_(PolygonBatch::kMost + 1) {
-  for (std::size_t n = 0; n < batches_.size(); ++n) batches_[n].numbers.corners = n;
-}
-
 void KnownPolygons::begin(const Surface& surface, const SortedSeeds& seeds, const Neighbours& neighbours,
                           const Index* owner, Screens& screens) {
   surface_ = &surface;
@@ -28,13 +21,13 @@ void KnownPolygons::begin(const Surface& surface, const SortedSeeds& seeds, cons
   neighbours_ = &neighbours;
   owner_ = owner;
   screens_ = &screens;
-  compute_ = widest_compute_polygons();
+  batches_.begin(surface, seeds);
 }
 
 void KnownPolygons::add(Index index, Index slot, std::span<const Index> labels, Moments& moments, char& fails) {
   const std::size_t count = labels.size();
   if (fails) return;
-  fails = count < 3 || count > PolygonBatch::kMost;
+  fails = !Batches::takes(count);
   const FacetSummary& summary = surface_->summaries[index];
   for (std::size_t k = 0, previous = count - 1; k < count; previous = k++) {
     if (!is_edge(labels[k]) || !is_edge(labels[previous])) continue;
@@ -42,26 +35,21 @@ void KnownPolygons::add(Index index, Index slot, std::span<const Index> labels, 
     if ((labels[previous] & ~kEdgeLabel) != (corner + 2) % 3 || owner_[summary.vertex[corner]] != slot) fails = 1;
   }
   if (fails) return;
-  Batch& batch = batches_[count];
-  const std::size_t lane = batch.filled++;
-  batch.polygons[lane] = {slot, labels.data(), &moments, &fails};
-  batch.numbers.put(lane, *surface_, index, *seeds_, slot, labels);
-  if (batch.filled == PolygonBatch::kLanes) finish(batch);
+  batches_.add(index, slot, labels, {slot, labels.data(), &moments, &fails},
+               [this](const Batch& batch) { take(batch); });
 }
 
 void KnownPolygons::finish() {
-  for (Batch& batch : batches_)
-    if (batch.filled) finish(batch);
+  batches_.finish([this](const Batch& batch) { take(batch); });
 }
 
-void KnownPolygons::finish(Batch& batch) {
+void KnownPolygons::take(const Batch& batch) const {
   const PolygonBatch& numbers = batch.numbers;
-  compute_(batch.numbers, surface_->density.empty());
   const std::size_t n = numbers.corners;
   std::array<Vertex, PolygonBatch::kLanes * PolygonBatch::kMost> vertices;
   std::size_t count = 0;
   for (std::size_t lane = 0; lane < batch.filled; ++lane) {
-    const Polygon& polygon = batch.polygons[lane];
+    const Polygon& polygon = batch.items[lane];
     *polygon.moments = numbers.moments(lane);
     *polygon.fails |= !(numbers.fits[lane] > 0);
     // Of the polygons that meet in a vertex, the one of the lowest slot sees to it; edges compare as greater.
@@ -72,17 +60,16 @@ void KnownPolygons::finish(Batch& batch) {
     }
   }
   for (std::size_t v = 0; v < count; ++v) {
-    char& fails = *batch.polygons[vertices[v].lane].fails;
+    char& fails = *batch.items[vertices[v].lane].fails;
     if (!fails && !is_certain(batch, vertices[v])) fails = 1;
   }
-  batch.filled = 0;
 }
 
 // Whether every other seed is certain to be farther from the vertex than those whose cells meet there.
 bool KnownPolygons::is_certain(const Batch& batch, const Vertex& vertex) const {
   const PolygonBatch& numbers = batch.numbers;
   const std::size_t lane = vertex.lane;
-  const Index slot = batch.polygons[lane].slot;
+  const Index slot = batch.items[lane].slot;
   const PolygonBatch::Row* row = numbers.at[vertex.corner];
   const Vec3 at{row[0][lane], row[1][lane], row[2][lane]};
   const double slack = numbers.slack[vertex.corner][lane], scale = screens_->scale();

@@ -21,8 +21,6 @@ namespace bisector {
 
 class KnownPolygons {
  public:
-  KnownPolygons();
-
   // Starts a set of polygons of these seeds. `owner`: the slot of each used vertex. All must outlive the set.
   void begin(const Surface& surface, const SortedSeeds& seeds, const Neighbours& neighbours, const Index* owner,
              Screens& screens);
@@ -40,11 +38,8 @@ class KnownPolygons {
     Moments* moments;
     char* fails;
   };
-  struct Batch {
-    PolygonBatch numbers;
-    Polygon polygons[PolygonBatch::kLanes];
-    std::size_t filled = 0;
-  };
+  using Batches = PolygonBatches<Polygon>;
+  using Batch = Batches::Batch;
 
   // A vertex between two lines of a polygon.
   struct Vertex {
@@ -52,7 +47,7 @@ class KnownPolygons {
     unsigned char lane, corner;
   };
 
-  void finish(Batch& batch);
+  void take(const Batch& batch) const;
   bool is_certain(const Batch& batch, const Vertex& vertex) const;
 
   const Surface* surface_ = nullptr;
@@ -60,8 +55,7 @@ class KnownPolygons {
   const Neighbours* neighbours_ = nullptr;
   const Index* owner_ = nullptr;
   Screens* screens_ = nullptr;
-  ComputePolygons compute_ = nullptr;
-  std::vector<Batch> batches_;  // by number of corners
+  Batches batches_;
 };
 
 }  // namespace bisector

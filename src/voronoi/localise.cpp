@@ -17,9 +17,9 @@
 #include "core/marks.h"
 #include "core/parallel.h"
 #include "mesh/topology.h"
-#include "voronoi/batched_moments.h"
 #include "voronoi/clip.h"
 #include "voronoi/fixed_tree_sum.h"
+#include "voronoi/polygon_batch.h"
 #include "voronoi/polygons.h"
 #include "voronoi/step_mass.h"
 #include "voronoi/totals.h"
@@ -130,9 +130,9 @@ struct Scratch {
   std::vector<std::array<double, 3>> squares;  // of the distances of slots from a triangle's corners
   std::vector<std::size_t> order;
   RestrictedPolygons found;
-  BatchedMoments batched;
-  std::vector<Moments> moments;  // of the polygons of some cells
-  std::vector<char> unknown;     // which are to be computed one by one
+  PolygonBatches<std::size_t> batches;  // of polygons of some cells, by number
+  std::vector<Moments> moments;         // of these
+  std::vector<char> unknown;            // 1 where that may take exact arithmetic
 };
 
 // Half-edges that lie across others, mostly one.
@@ -376,6 +376,7 @@ std::vector<Triangles> Localiser::Work::apart_from_seed(Index cell, std::span<co
   return pieces;
 }
 
+// The same of a cell as its triangles are divided now.
 std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
   const std::span<const Index> triangles = triangles_of(cell);
   const std::size_t count = triangles.size();
@@ -401,6 +402,7 @@ std::vector<Triangles> Localiser::Work::find_strays(Index cell) {
   return apart_from_seed(cell, triangles, parts);
 }
 
+// To what `find(cell)` returns for each.
 template <class Find>
 void Localiser::Work::set_strays(const std::vector<Index>& cells, const Find& find) {
   std::vector<std::vector<Triangles>> found(cells.size());
@@ -755,17 +757,24 @@ void Localiser::Work::sum_cells(std::span<const Index> cells, CellMoments& resul
   std::size_t count = 0;
   for (const Index cell : cells) count += triangles_of(cell).size();
   scratch.moments.resize(count);
-  scratch.unknown.resize(count);
-  scratch.batched.begin(surface, seeds);
+  scratch.unknown.assign(count, 1);
+  scratch.batches.begin(surface, seeds);
+  const auto take_moments = [&](const PolygonBatches<std::size_t>::Batch& batch) {
+    for (std::size_t lane = 0; lane < batch.filled; ++lane) {
+      scratch.moments[batch.items[lane]] = batch.numbers.moments(lane);
+      scratch.unknown[batch.items[lane]] = !(batch.numbers.fits[lane] > 0);
+    }
+  };
   std::size_t k = 0;
   for (const Index cell : cells)
     for (const Index t : triangles_of(cell)) {
       const Row on = row(t);
-      scratch.batched.add(surface.facet_of[t], seeds.slot[cell], slot_labels(on, on.find(cell)), scratch.moments[k],
-                          scratch.unknown[k]);
+      const std::span<const Index> labels = slot_labels(on, on.find(cell));
+      if (scratch.batches.takes(labels.size()))
+        scratch.batches.add(surface.facet_of[t], seeds.slot[cell], labels, k, take_moments);
       ++k;
     }
-  scratch.batched.finish();
+  scratch.batches.finish(take_moments);
   FixedTreeSum sum;
   k = 0;
   for (const Index cell : cells) {

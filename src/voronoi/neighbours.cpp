@@ -366,16 +366,19 @@ const Neighbours::LastRung& Neighbours::last_rung() const {
   return *last_rung_;
 }
 
-// An upper bound of the distance of the seed that is the `count`-th nearest, or of the farthest if there are fewer.
+// A distance within which there are `count` seeds, of those that are near in their order; or fewer, if these are few.
 double Neighbours::distance_in_order(Index slot, std::size_t count) const {
   const std::vector<Vec3>& x = seeds_->x;
-  const std::size_t first = slot - std::min<std::size_t>(slot, count), end = std::min(x.size(), slot + count + 1);
-  if (end - first <= count) return seeds_->extent;
-  std::vector<double> squared;
+  const std::size_t near = std::min(count, ListLength::kMost);
+  const std::size_t first = slot - std::min<std::size_t>(slot, near), end = std::min(x.size(), slot + near + 1);
+  if (end - first <= near) return seeds_->extent;
+  std::array<double, 2 * ListLength::kMost> squared{};
+  auto last = squared.begin();
   for (std::size_t k = first; k < end; ++k)
-    if (k != slot) squared.push_back(norm2(x[k] - x[slot]));
-  std::nth_element(squared.begin(), squared.begin() + static_cast<std::ptrdiff_t>(count - 1), squared.end());
-  return std::sqrt(squared[count - 1]);
+    if (k != slot) *last++ = norm2(x[k] - x[slot]);
+  const auto nth = squared.begin() + static_cast<std::ptrdiff_t>(near - 1);
+  std::nth_element(squared.begin(), nth, last);
+  return std::sqrt(*nth);
 }
 
 std::size_t Neighbours::nearest_to(Index slot, std::size_t count, Index* slots) const {

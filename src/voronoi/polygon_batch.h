@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "voronoi/moments.h"
 #include "voronoi/neighbours.h"
@@ -68,5 +69,56 @@ inline void PolygonBatch::put(std::size_t lane, const Surface& surface, std::siz
 using ComputePolygons = void (*)(PolygonBatch&, bool uniform);
 // The one for this processor.
 ComputePolygons widest_compute_polygons();
+
+// Any polygons, in batches of those with the same number of corners, each with an item of what belongs to it.
+template <class Item>
+class PolygonBatches {
+ public:
+  struct Batch {
+    PolygonBatch numbers;
+    Item items[PolygonBatch::kLanes];
+    std::size_t filled = 0;
+  };
+
+  PolygonBatches() : batches_(PolygonBatch::kMost + 1) {
+    for (std::size_t n = 0; n < batches_.size(); ++n) batches_[n].numbers.corners = n;
+  }
+
+  // Starts a set of polygons of these seeds. Both must outlive it.
+  void begin(const Surface& surface, const SortedSeeds& seeds) {
+    surface_ = &surface;
+    seeds_ = &seeds;
+    compute_ = widest_compute_polygons();
+  }
+  static bool takes(std::size_t corners) { return corners >= 3 && corners <= PolygonBatch::kMost; }
+  // Adds a polygon, of a number of corners that it takes, as PolygonBatch::put() does. What is full goes, with results,
+  // to `take(batch)`.
+  template <class Take>
+  void add(std::size_t facet, Index slot, std::span<const Index> labels, const Item& item, const Take& take) {
+    Batch& batch = batches_[labels.size()];
+    batch.numbers.put(batch.filled, *surface_, facet, *seeds_, slot, labels);
+    batch.items[batch.filled++] = item;
+    if (batch.filled == PolygonBatch::kLanes) compute(batch, take);
+  }
+  // The same for all that are left.
+  template <class Take>
+  void finish(const Take& take) {
+    for (Batch& batch : batches_)
+      if (batch.filled) compute(batch, take);
+  }
+
+ private:
+  template <class Take>
+  void compute(Batch& batch, const Take& take) {
+    compute_(batch.numbers, surface_->density.empty());
+    take(batch);
+    batch.filled = 0;
+  }
+
+  const Surface* surface_ = nullptr;
+  const SortedSeeds* seeds_ = nullptr;
+  ComputePolygons compute_ = nullptr;
+  std::vector<Batch> batches_;  // by number of corners
+};
 
 }  // namespace bisector

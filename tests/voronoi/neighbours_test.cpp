@@ -334,8 +334,8 @@ INSTANTIATE_TEST_SUITE_P(Neighbours, Lists, testing::ValuesIn(seed_cases()), [](
   return name;
 });
 
-// Seeds that lie the sparser the farther from a point, by a factor of 150, and move by as much less than their spacing
-// everywhere: what moves far away does not count.
+// Seeds are the sparser the farther they are from a point, by a factor of 150, and each moves by a hundredth of its
+// distance from there: what moves far away does not count.
 TEST(Neighbours, FollowGradedSeeds) {
   SplitMix64 random(16);
   std::vector<Vec3> given = ball({0, 0, 0}, 1, 4000, 18);
