@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/grouping.h"
+#include "core/parallel.h"
 #include "core/shortest_ways.h"
 #include "features/candidates.h"
 #include "features/curves.h"
@@ -26,14 +27,17 @@ constexpr double kLoopEdges = 4;
 // What two curves may share at a corner, and how near to each other they may be, in widths: edges are at least twice as
 // long.
 constexpr double kShared = 0.25;
+// Vertices that a search for links reaches at most, and searches at once.
+constexpr std::size_t kMostOnWays = 256, kCornersAtOnce = 16;
 // Two curves at a corner where no other ends are one if they turn by less than this, in radians.
 constexpr double kStraight = 50 * kRadiansPerDegree;
 
-// The corners as nodes of a graph, the open curves as its edges.
+// The corners as nodes of a graph, the open curves as its edges. Those from `links` on are links.
 class CornerGraph {
  public:
-  CornerGraph(const FeatureCurves& curves, const std::vector<double>& weights)
-      : curves_(curves), weights_(weights), at_(group_into_rows<Arm>(curves.graph().corners.size(), [&](auto put) {
+  CornerGraph(const FeatureCurves& curves, const std::vector<double>& weights, std::size_t links)
+      : curves_(curves), weights_(weights), links_(links),
+        at_(group_into_rows<Arm>(curves.graph().corners.size(), [&](auto put) {
           for (Index c = 0; c < curves.size(); ++c) {
             if (curves.closed(c)) continue;
             const auto [first, last] = curves.ends(c);
@@ -80,10 +84,10 @@ class CornerGraph {
   // Branchings first, then ends, then turns; among these the corner of the most important curves.
   std::array<double, 2> rank_of(Index corner) const {
     double weight = 0;
-    std::size_t arms = 0;  // but for links, which weigh nothing
+    std::size_t arms = 0;
     for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm) {
       weight += weights_[arm->curve];
-      arms += weights_[arm->curve] > 0;
+      arms += arm->curve < links_;
     }
     return {arms > 2 ? 2.0 : arms == 2 ? 0.0 : 1.0, weight};
   }
@@ -91,13 +95,18 @@ class CornerGraph {
   // Whether three or more curves meet that are not all creases.
   bool is_branching_of_others(Index corner) const {
     bool others = false;
-    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm)
+    std::size_t arms = 0;
+    for (const Arm* arm = at_.begin(corner); arm != at_.end(corner); ++arm) {
+      if (arm->curve >= links_) continue;
       others |= !is_crease(curves_.graph().curves[arm->curve]);
-    return others && at_.size(corner) > 2;
+      ++arms;
+    }
+    return others && arms > 2;
   }
 
   const FeatureCurves& curves_;
   const std::vector<double>& weights_;
+  std::size_t links_;
   Csr<Arm> at_;
 };
 
@@ -363,9 +372,13 @@ void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& v
 }
 
 // Divides curves where they turn back: what of its seeds is on one arm would own the other arm as well. A way that
-// leads a curve to another corner may leave the way that it came.
+// leads a curve to another corner may leave the way that it came. An end that is shorter than the width and that no
+// other curve meets goes, for the corner where it turns would be nearer to its own end than edges are long.
 void divide_where_they_turn_back(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices, double width) {
   const double limit = kShared * width;
+  std::map<Index, std::size_t> uses;
+  for (const FeatureCurve& curve : curves)
+    for (const Index v : curve.vertices) ++uses[v];
   std::vector<FeatureCurve> parts;
   for (FeatureCurve& curve : curves) {
     if (curve.closed) {
@@ -389,7 +402,13 @@ void divide_where_they_turn_back(std::vector<FeatureCurve>& curves, const std::v
                        [&, k = turn.second](std::size_t cut) { return std::abs(at[cut] - at[k]) < width; }))
         cuts.push_back(turn.second);
     std::sort(cuts.begin(), cuts.end());
-    for (std::vector<Index>& part : divided(chain, cuts)) parts.push_back({std::move(part), false, curve.kind});
+    const bool may_go = !cuts.empty() && is_crease(curve);
+    const bool first_goes = may_go && at[cuts.front()] < width && uses[chain.front()] == 1;
+    const bool last_goes = may_go && at.back() - at[cuts.back()] < width && uses[chain.back()] == 1;
+    std::vector<std::vector<Index>> pieces = divided(chain, cuts);
+    for (std::size_t k = 0; k < pieces.size(); ++k)
+      if (!(k == 0 && first_goes) && !(k + 1 == pieces.size() && last_goes))
+        parts.push_back({std::move(pieces[k]), false, curve.kind});
   }
   curves = std::move(parts);
 }
@@ -427,27 +446,48 @@ std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<T
   return weights;
 }
 
-std::vector<std::array<Index, 2>> corner_links(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
-                                               std::size_t vertex_count) {
-  std::vector<char> is_corner(vertex_count, 0);
-  for (const Index v : graph.corners) is_corner[v] = 1;
-  std::vector<std::array<Index, 2>> links;
-  for (const Triangle& t : triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
-      if (a != b && is_corner[a] && is_corner[b]) links.push_back({a, b});
-    }
-  std::sort(links.begin(), links.end());
-  links.erase(std::unique(links.begin(), links.end()), links.end());
-  std::erase_if(links, [&](const std::array<Index, 2>& link) {
-    return std::binary_search(graph.edges.begin(), graph.edges.end(), link);
-  });
-  return links;
+std::vector<std::vector<Index>> corner_links(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
+                                             const Csr<Index>& neighbours, double reach) {
+  enum : char { plain, on_curve, corner };
+  std::vector<char> kinds(vertices.size(), plain);
+  for (const FeatureCurve& curve : graph.curves)
+    for (const Index v : curve.vertices) kinds[v] = on_curve;
+  for (const Index v : graph.corners) kinds[v] = corner;
+  std::vector<std::vector<std::vector<Index>>> from(graph.corners.size());
+  parallel_each(
+      from.size(),
+      [&](std::size_t c) {
+        const Index start = graph.corners[c];
+        for (const Index* other = neighbours.begin(start); other != neighbours.end(start); ++other)
+          if (start < *other && kinds[*other] == corner) from[c].push_back({start, *other});
+        std::map<Index, Index> before;
+        const auto links = [&](Index v, const auto& link) {
+          for (const Index* other = neighbours.begin(v); other != neighbours.end(v); ++other)
+            if (kinds[*other] != on_curve) link(*other, norm(vertices[*other] - vertices[v]), kNone);
+        };
+        shortest_ways(start, reach, links, [&](Index v, double, Index previous, Index) {
+          if (!before.try_emplace(v, previous).second) return false;
+          if (v == start) return true;
+          if (kinds[v] != corner) return before.size() < kMostOnWays;
+          if (start > v || previous == start) return false;
+          std::vector<Index> way;
+          for (Index at = v; at != kNone; at = before.at(at)) way.push_back(at);
+          from[c].push_back(reversed_vertices(std::move(way)));
+          return false;
+        });
+      },
+      kCornersAtOnce);
+  std::vector<std::vector<Index>> ways;
+  for (std::vector<std::vector<Index>>& some : from)
+    for (std::vector<Index>& way : some)
+      if (way.size() > 2 || !std::binary_search(graph.edges.begin(), graph.edges.end(), std::array{way[0], way[1]}))
+        ways.push_back(std::move(way));
+  return ways;
 }
 
 SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
                                      const std::vector<double>& given_weights, double width,
-                                     const std::vector<std::array<Index, 2>>& links, const Csr<Index>& neighbours) {
+                                     const std::vector<std::vector<Index>>& links, const Csr<Index>& neighbours) {
   SimplifiedFeatures result;
   if (!(width > 0)) {
     result.graph = graph;
@@ -455,12 +495,12 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   }
   FeatureGraph linked = graph;
   std::vector<double> weights = given_weights;
-  for (const auto& [a, b] : links) {
-    linked.curves.push_back({{a, b}, false, FeatureKind::crease});
+  for (const std::vector<Index>& way : links) {
+    linked.curves.push_back({way, false, FeatureKind::crease});
     weights.push_back(0);
   }
   const FeatureCurves curves(linked, vertices);
-  const CornerGraph::Forest forest = CornerGraph(curves, weights).merge(width);
+  const CornerGraph::Forest forest = CornerGraph(curves, weights, graph.curves.size()).merge(width);
   std::vector<Candidate> candidates =
       led_to_representatives(curves, graph.curves.size(), vertices, weights, forest, width, result);
   SelectedCreases apart = select_creases(std::move(candidates), vertices, width, neighbours);

@@ -29,16 +29,18 @@ std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<T
 //     chamfer become one. What is left of a curve is led to what stays along edges of the mesh.
 //   - Closed creases shorter than 4 `width` go.
 //   - What is left of open curves gets corners where it turns back, at acute angles between its arms of `width`.
-// Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing. `links` are edges of the
-// mesh between two corners that are no features: corners may be led along them, too (corner_links). `neighbours` are
-// the vertices at the other ends of each vertex's edges; without them stretches stay that others would have to be led
+// Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing. `links` are ways from one
+// corner to another that are no features: corners may be led along them, too (corner_links). `neighbours` are the
+// vertices at the other ends of each vertex's edges; without them stretches stay that others would have to be led
 // across.
 SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
                                      const std::vector<double>& weights, double width,
-                                     const std::vector<std::array<Index, 2>>& links = {},
+                                     const std::vector<std::vector<Index>>& links = {},
                                      const Csr<Index>& neighbours = {});
 
-std::vector<std::array<Index, 2>> corner_links(const FeatureGraph& graph, const std::vector<Triangle>& triangles,
-                                               std::size_t vertex_count);
+// Edges of the mesh between two corners, and shortest ways of several no longer than `reach` over vertices that are on
+// no curve, such as those between the ends of two curves that all but meet. Each from its lower corner to the higher.
+std::vector<std::vector<Index>> corner_links(const FeatureGraph& graph, const std::vector<Vec3>& vertices,
+                                             const Csr<Index>& neighbours, double reach);
 
 }  // namespace bisector

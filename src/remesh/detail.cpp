@@ -59,11 +59,11 @@ class Planner {
           std::size_t vertices)
       : mesh_(mesh), features_(features), edge_length_(edge_length), vertices_(static_cast<double>(vertices)),
         weights_(curve_weights(features, mesh.triangles, mesh.vertices)),
-        links_(corner_links(features, mesh.triangles, mesh.vertices.size())),
         neighbours_(vertex_neighbours(mesh.triangles, mesh.vertices.size())) {
     double sum = 0;
     for (const double h : edge_length) sum += h;
     mean_ = sum / static_cast<double>(edge_length.size());
+    links_ = corner_links(features, mesh.vertices, neighbours_, mean_);
     find_limbs();
   }
 
@@ -263,7 +263,7 @@ class Planner {
   double vertices_;
   double mean_ = 0;
   std::vector<double> weights_;
-  std::vector<std::array<Index, 2>> links_;
+  std::vector<std::vector<Index>> links_;
   Csr<Index> neighbours_;
   std::vector<Limb> limbs_;
 };

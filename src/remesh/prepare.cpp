@@ -17,6 +17,7 @@
 #include "features/wedges.h"
 #include "mesh/corefine.h"
 #include "mesh/joining.h"
+#include "mesh/short_edges.h"
 #include "mesh/spatial_order.h"
 #include "mesh/topology.h"
 #include "mesh/touching.h"
@@ -159,6 +160,13 @@ void check_kept(const TriangleMesh& mesh, const RemeshOptions& options) {
                               v < used.size() ? "on no triangle" : "none of the mesh's"));
 }
 
+// Those that are left when vertices have become others.
+void rename_edges(const std::vector<Index>& vertex_of, std::vector<std::array<Index, 2>>& edges) {
+  for (auto& edge : edges)
+    for (Index& v : edge) v = vertex_of[v];
+  std::erase_if(edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+}
+
 SizingTarget target_of(const RemeshOptions& options) {
   if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
   return {options.vertices, options.edge_length};
@@ -224,14 +232,11 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   const RemeshOptions& options = ordered.options;
   const std::vector<Index>& vertex_of = welded_.vertex_of;
 
-  const std::size_t vertices = mesh_.vertices.size();
   FeatureOptions features = options.features;
   std::vector<std::array<Index, 2>> keep_edges = options.keep_edges;
-  for (auto* edges : {&features.given, &keep_edges}) {
-    for (auto& edge : *edges)
-      for (Index& v : edge) v = vertex_of[v];
-    std::erase_if(*edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
-  }
+  for (auto* edges : {&features.given, &keep_edges}) rename_edges(vertex_of, *edges);
+  if (!options.weld && options.keep_vertices.empty() && keep_edges.empty()) collapse_rounded(features.given, context);
+  const std::size_t vertices = mesh_.vertices.size();
   const Separation separation(mesh_, branches, context);
   features.given = separation.edges(mesh_, features.given);
   keep_edges = separation.edges(mesh_, keep_edges);
@@ -254,6 +259,19 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   if (options.detail == DetailMode::off) return;
   resolves_all_ = options.detail == DetailMode::all;
   if (!plan_with_intersections()) plan(std::move(lengths));
+}
+
+// Points that rounding left apart are one, if the surface stays of the same kind. `edges` follow.
+void Preparation::collapse_rounded(std::vector<std::array<Index, 2>>& edges, const Context& context) {
+  const ShortEdges shortest = collapse_short_edges(mesh_, kRounding * bounding_box(mesh_).diagonal(), edges);
+  if (shortest.collapsed == 0) return;
+  rename_edges(shortest.vertex_of, edges);
+  for (Index& v : welded_.vertex_of)
+    if (v != kNone) v = shortest.vertex_of[v];
+  welded_.merged_vertices += shortest.collapsed;
+  welded_.degenerate_triangles += shortest.removed_triangles;
+  context.warn(fmt::format("collapsed {} shorter than a {:.0f}th of the size of the surface, as rounding leaves them",
+                           plural(shortest.collapsed, "edge"), 1 / kRounding));
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,

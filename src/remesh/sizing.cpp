@@ -25,11 +25,12 @@ namespace {
 constexpr double kSmallestFeature = 0.25;  // of the uniform edge length: smaller ones do not show in the result
 constexpr double kSamplesPerVertex = 32;   // of the surface for lfs: their spacing is then that smallest feature
 constexpr double kMostSamples = 300'000;
-constexpr double kSteepest = 6;              // ratio of densities above which an edge is bisected
+constexpr double kSteepest = 10;             // ratio of densities above which an edge is bisected
+constexpr double kSteepestUnknown = 6;       // the same where what they are between its ends is not known
 constexpr double kShortest = 0.7;            // edge length by h below which it is not for the sake of that ratio
 constexpr double kLong = 2;                  // edge length by h above which h is looked at between the ends
 constexpr double kLongest = 32;              // edge length by h above which an edge is bisected whatever h is there
-constexpr double kFarthest = 1.5;            // ratio of the density to the linear one above which an edge is bisected
+constexpr double kFarthest = 2.5;            // ratio of the density to the linear one above which an edge is bisected
 constexpr std::size_t kTriangles = 400'000;  // refinement stops there
 constexpr double kMostVertices = 1e8;        // that an edge length may ask for
 constexpr int kRounds = 8;                   // of refinement and calibration
@@ -413,7 +414,8 @@ class Refiner {
     const Edge e = edge(a, b);
     const double length = std::sqrt(std::get<0>(e));
     const auto [least, largest] = std::minmax(lengths_[a], lengths_[b]);
-    const bool steep = fourth_power(largest / least) > kSteepest && length > kShortest * least;
+    const double steepest = field_.measured() ? kSteepestUnknown : kSteepest;
+    const bool steep = fourth_power(largest / least) > steepest && length > kShortest * least;
     if (steep || length > kLongest * least || (length > kLong * least && differs_along(a, b, length / least)))
       queue_.push(e);
   }

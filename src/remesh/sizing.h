@@ -64,13 +64,13 @@ struct SizedMesh {
   EdgeSplits splits;
 };
 
-// Bisects edges over which rho changes by more than a factor of 6 unless they are shorter than 0.7 h, and those longer
-// than 2 h if rho between vertices is not known (lfs) or, because of `bound`, not within a factor of 1.5 of the linear
-// one, as far as points about h apart tell, along the edge or in its triangles; longer than 32 h, all. Longer edges of
-// the triangles at such an edge go first (Rivara 1984), and all triangles at an edge are bisected with it, so no
-// T-junction and no ever thinner triangle appears. New vertices are middles as rounded; lfs is measured there, other
-// fields are linear. Stops at 400,000 triangles or the input's number, if that is larger; a uniform density bisects
-// nothing. Throws as compute_sizing.
+// Bisects edges over which rho changes by more than a factor of 10, or of 6 if rho between vertices is not known (lfs),
+// unless they are shorter than 0.7 h, and those longer than 2 h if it is not known or, because of `bound`, not within a
+// factor of 2.5 of the linear one, as far as points about h apart tell, along the edge or in its triangles; longer than
+// 32 h, all. Longer edges of the triangles at such an edge go first (Rivara 1984), and all triangles at an edge are
+// bisected with it, so no T-junction and no ever thinner triangle appears. New vertices are middles as rounded; lfs is
+// measured there, other fields are linear. Stops at 400,000 triangles or the input's number, if that is larger; a
+// uniform density bisects nothing. Throws as compute_sizing.
 //
 // `bounds` are not scaled with the field.
 SizedMesh refine_for_density(const TriangleMesh& mesh, const SizingOptions& options, const SizingTarget& target,

@@ -329,6 +329,74 @@ TEST(SimplifiedFeatures, HaveCornersWhereTheyTurnBack) {
   }
 }
 
+// Where nothing else meets such a way, the curve ends where it would turn back.
+TEST(SimplifiedFeatures, EndWhereTheyTurnBackToACornerOfTheirOwn) {
+  for (const bool from_far : {false, true})
+    for (const int degrees : {10, 40, 80, 100, 170}) {
+      Chains net;
+      const double angle = degrees * std::numbers::pi / 180;
+      const Index a = net.corner({0, 0, 0}), b = net.corner({0.3, 0, 0});
+      const Index far = net.corner({0.3 - 4 * std::cos(angle), 4 * std::sin(angle), 0});
+      net.curve(a, b);
+      from_far ? net.curve(far, b) : net.curve(b, far);
+      const SimplifiedFeatures led = simplify_features(net.graph, net.points, {0.1, 1}, 0.5);
+      expect_sound(led.graph, net.graph);
+      ASSERT_EQ(led.graph.curves.size(), 1u) << degrees << " " << from_far << " merged " << led.merged;
+      EXPECT_EQ(led.graph.corners, (degrees < 90 ? std::vector<Index>{b, far} : std::vector<Index>{a, far})) << degrees;
+    }
+}
+
+// A plane of squares on which two curves end near each other, at right angles, with a vertex in between.
+TEST(SimplifiedFeatures, MeetWhereTheyAllButDo) {
+  const int n = 20;
+  const TriangleMesh plane = grid_patch(n, n);
+  const auto at = [&](int x, int y) {
+    return static_cast<Index>(std::find(plane.vertices.begin(), plane.vertices.end(), Vec3{double(x), double(y), 0}) -
+                              plane.vertices.begin());
+  };
+  FeatureGraph graph;
+  for (const bool first : {true, false}) {
+    FeatureCurve curve{{}, false, FeatureKind::crease};
+    for (int k = 0; k <= 8; ++k) curve.vertices.push_back(first ? at(10, 10 - k) : at(12 + k, 10));
+    graph.corners.insert(graph.corners.end(), {curve.vertices.front(), curve.vertices.back()});
+    for (std::size_t k = 1; k < curve.vertices.size(); ++k)
+      graph.edges.push_back(sorted_edge(curve.vertices[k - 1], curve.vertices[k]));
+    graph.curves.push_back(std::move(curve));
+  }
+  std::sort(graph.corners.begin(), graph.corners.end());
+  std::sort(graph.edges.begin(), graph.edges.end());
+  const Csr<Index> neighbours = vertex_neighbours(plane.triangles, plane.vertices.size());
+  EXPECT_TRUE(corner_links(graph, plane.vertices, neighbours, 1.9).empty());
+  const std::vector<std::vector<Index>> links = corner_links(graph, plane.vertices, neighbours, 3);
+  ASSERT_EQ(links.size(), 1u);
+  EXPECT_EQ(std::set<Index>({links[0].front(), links[0].back()}), std::set<Index>({at(10, 10), at(12, 10)}));
+  EXPECT_EQ(links[0][1], at(11, 10));
+  for (const double width : {1.5, 2.5}) {
+    const SimplifiedFeatures met = simplify_features(graph, plane.vertices, {8, 8}, width, links, neighbours);
+    EXPECT_EQ(met.graph.curves.size(), 2u);
+    EXPECT_EQ(met.graph.corners.size(), width > 2 ? 3u : 4u);
+  }
+}
+
+// What lies on a curve leads to no other corner: the curve does.
+TEST(CornerLinks, DoNotRunAlongCurves) {
+  const TriangleMesh plane = grid_patch(4, 1);
+  FeatureGraph graph;
+  FeatureCurve curve{{}, false, FeatureKind::crease};
+  for (int x = 0; x <= 4; ++x)
+    for (Index v = 0; v < plane.vertices.size(); ++v)
+      if (plane.vertices[v] == Vec3{double(x), 0, 0}) curve.vertices.push_back(v);
+  for (std::size_t k = 1; k < curve.vertices.size(); ++k)
+    graph.edges.push_back(sorted_edge(curve.vertices[k - 1], curve.vertices[k]));
+  std::sort(graph.edges.begin(), graph.edges.end());
+  graph.corners = {curve.vertices.front(), curve.vertices.back()};
+  std::sort(graph.corners.begin(), graph.corners.end());
+  graph.curves = {curve};
+  for (const std::vector<Index>& way :
+       corner_links(graph, plane.vertices, vertex_neighbours(plane.triangles, plane.vertices.size()), 10))
+    for (std::size_t k = 1; k + 1 < way.size(); ++k) EXPECT_EQ(plane.vertices[way[k]].y, 1);
+}
+
 TEST(SimplifiedFeatures, DoNotDependOnWhichWayCurvesRun) {
   const TriangleMesh slab = prism({{0, 0}, {2, 0}, {2, 0.02}, {0, 0.02}});
   const FeatureGraph graph = sharp_graph(slab);

@@ -13,6 +13,7 @@
 #include "bisector/quality.h"
 #include "bisector/remesh.h"
 #include "bisector/repair.h"
+#include "support/divided_vertex.h"
 #include "support/models.h"
 
 namespace bisector::test {
@@ -95,6 +96,39 @@ TEST(Preparation, SolidsThatTouchAlongAnEdgeAreMeshedApart) {
   EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find("along 4 edges"), std::string::npos) << warnings[0];
+}
+
+// A box with corners that rounding made two.
+TEST(Preparation, CornersThatRoundingMadeTwoAreOne) {
+  TriangleMesh mesh = box(1);
+  const std::size_t vertices = mesh.vertices.size();
+  for (const Index v : {0u, 3u, 6u}) divide_vertex(mesh, v, 1, 2, {1e-14, 0, 0});
+  RemeshOptions options;
+  options.vertices = 600;
+  options.sizing.kind = DensityKind::attribute;
+  options.sizing.attribute.assign(mesh.vertices.size(), 1.0);
+  std::vector<std::string> warnings;
+  Context context;
+  context.warning = [&](const std::string& line) { warnings.push_back(line); };
+  const Preparation preparation(OrderedInput(mesh, options), context);
+  EXPECT_EQ(preparation.mesh().vertices.size(), vertices);
+  ASSERT_EQ(preparation.welded().vertex_of.size(), mesh.vertices.size());
+  for (const Index v : preparation.welded().vertex_of) EXPECT_LT(v, vertices);
+  EXPECT_EQ(preparation.welded().merged_vertices, 3u);
+  EXPECT_EQ(preparation.welded().degenerate_triangles, 6u);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("collapsed 3 edges"), std::string::npos) << warnings[0];
+  const RemeshResult result = remesh(mesh, options);
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_EQ(result.features.corners, 8u);
+  EXPECT_EQ(result.features.broken, 0u);
+  EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
+  // With a tolerance of its own, and around what is kept, the surface stays as it is.
+  options.weld = 0;
+  EXPECT_EQ(Preparation(OrderedInput(mesh, options), {}).mesh().vertices.size(), mesh.vertices.size());
+  options.weld.reset();
+  options.keep_vertices = {1};
+  EXPECT_EQ(Preparation(OrderedInput(mesh, options), {}).mesh().vertices.size(), mesh.vertices.size());
 }
 
 // Bounds of edge lengths that are found where components are set apart hold there, not where nothing is in the input.

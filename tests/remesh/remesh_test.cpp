@@ -504,7 +504,7 @@ TEST(RemeshHard, ARunAgainMovesSeedsAroundWhatItMends) {
   std::vector<std::string> phases;
   Context context;
   context.progress = [&](const Progress& p) { phases.push_back(p.phase); };
-  RemeshOptions options = options_for(100);
+  RemeshOptions options = options_for(132);
   const RemeshResult result = remesh(mesh, options, context);
   const auto mentions = [](const char* words) {
     return [words](const std::string& phase) { return phase.find(words) != std::string::npos; };
