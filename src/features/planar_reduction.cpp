@@ -9,6 +9,7 @@
 #include "core/geometry.h"
 #include "core/grouping.h"
 #include "core/parallel.h"
+#include "mesh/stars.h"
 
 namespace bisector {
 namespace {
@@ -22,8 +23,6 @@ constexpr double kMostTilt = 0.01;
 constexpr double kLeastAspect = 0.02;
 // Triangles at a vertex, at most.
 constexpr std::size_t kMostAtVertex = 64;
-
-std::uint64_t key_of(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
 
 double aspect_of(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double longest = std::max({norm2(b - a), norm2(c - b), norm2(a - c)});
@@ -211,9 +210,9 @@ class PlanarReduction::Work {
       inner.erase(inner.begin());
       inner.insert(inner.end(), rest.begin() + 1, rest.end() - 1);
       if (to > spoke.end) std::reverse(inner.begin(), inner.end());
-      chains.erase(key_of(to, v));
-      chains.erase(key_of(v, spoke.end));
-      chains[key_of(to, spoke.end)] = std::move(inner);
+      chains.erase(edge_key(to, v));
+      chains.erase(edge_key(v, spoke.end));
+      chains[edge_key(to, spoke.end)] = std::move(inner);
     }
     for (const Index t : around_[v]) {
       Triangle& w = out_.triangles[t];
@@ -249,7 +248,7 @@ std::vector<Index> PlanarReduction::chain(Index a, Index b) const { return chain
 
 std::vector<Index> PlanarReduction::chain_of(const Chains& chains, Index a, Index b) {
   std::vector<Index> all{a};
-  if (const auto inner = chains.find(key_of(a, b)); inner != chains.end())
+  if (const auto inner = chains.find(edge_key(a, b)); inner != chains.end())
     all.insert(all.end(), inner->second.begin(), inner->second.end());
   if (a > b) std::reverse(all.begin() + 1, all.end());
   all.push_back(b);

@@ -9,14 +9,11 @@
 #include <utility>
 
 #include "core/geometry.h"
+#include "mesh/stars.h"
 #include "mesh/topology.h"
 
 namespace bisector {
 namespace {
-
-std::uint64_t key_of(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
-
-bool has_corner(const Triangle& t, Index v) { return t[0] == v || t[1] == v || t[2] == v; }
 
 class Collapse {
  public:
@@ -59,7 +56,7 @@ class Collapse {
     const EdgeTable table = edge_table(mesh_.triangles, mesh_.vertices.size());
     on_line_.assign(mesh_.vertices.size(), 0);
     const auto add = [&](const std::array<Index, 2>& e) {
-      lines_.insert(key_of(e[0], e[1]));
+      lines_.insert(edge_key(e[0], e[1]));
       on_line_[e[0]] = on_line_[e[1]] = 1;
     };
     for (std::size_t e = 0; e < table.edges.size(); ++e) {
@@ -71,17 +68,9 @@ class Collapse {
     for (const auto& edge : mesh_.feature_edges) add(edge);
   }
 
-  bool is_line(Index a, Index b) const { return lines_.contains(key_of(a, b)); }
+  bool is_line(Index a, Index b) const { return lines_.contains(edge_key(a, b)); }
 
-  std::vector<Index> neighbours(Index v) const {
-    std::vector<Index> found;
-    for (const Index t : at_[v])
-      for (const Index w : mesh_.triangles[t])
-        if (w != v) found.push_back(w);
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
-  }
+  std::vector<Index> neighbours(Index v) const { return neighbours_in_star(mesh_.triangles, at_[v], v); }
 
   bool may_go(Index a, Index b) const {
     std::vector<Index> opposite;
@@ -98,7 +87,7 @@ class Collapse {
     std::vector<Index> common;
     std::set_intersection(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(), std::back_inserter(common));
     if (common != opposite) return false;
-    // Of two ends of an edge between the opposite corners, both triangles would become the same.
+    // Nor may both ends have a triangle over the same edge, as those of a tetrahedron do.
     return std::none_of(at_[a].begin(), at_[a].end(), [&](Index t) {
       Triangle moved = mesh_.triangles[t];
       if (has_corner(moved, b)) return false;
@@ -114,8 +103,8 @@ class Collapse {
 
   void collapse(Index stays, Index goes) {
     for (const Index v : neighbours(goes)) {
-      if (lines_.erase(key_of(goes, v)) == 0 || v == stays) continue;
-      lines_.insert(key_of(stays, v));
+      if (lines_.erase(edge_key(goes, v)) == 0 || v == stays) continue;
+      lines_.insert(edge_key(stays, v));
       on_line_[stays] = 1;
     }
     for (const Index t : at_[goes]) {

@@ -18,8 +18,8 @@ struct ShortEdges {
 // Collapses edges shorter than `length`, the shortest first, where the surface stays of the same kind: the two ends
 // have no neighbours in common but the corners opposite to the edge (the link condition of Dey, Edelsbrunner, Guha and
 // Nekhayev 1999), and the edge is a border if both ends are on borders. Edges between labels, of more than two
-// triangles, and those `given`, sorted with the lower vertex first, count as borders do; and no edge is collapsed by
-// which a triangle would come to lie on another. The end on such a line stays, else that of the lower index; so
+// triangles, those `given` and the mesh's feature edges count as borders do; and no edge is collapsed by which a
+// triangle would come to lie on another. The end on such a line stays, else that of the lower index; so
 // vertices move by `length` at most, but for chains of such edges. Vertices and triangles keep their order; labels and
 // face_of_triangle follow, feature_edges too.
 ShortEdges collapse_short_edges(TriangleMesh& mesh, double length, const std::vector<std::array<Index, 2>>& given);

@@ -17,6 +17,7 @@
 #include "features/curvature.h"
 #include "features/local_feature_size.h"
 #include "features/size_field.h"
+#include "mesh/stars.h"
 #include "mesh/topology.h"
 
 namespace bisector {
@@ -359,7 +360,7 @@ class Refiner {
     if (queue_.empty()) return false;
     triangles_at_.reserve(2 * table.edges.size());
     for (std::size_t e = 0; e < table.edges.size(); ++e) {
-      std::vector<Index>& list = triangles_at_[key(table.edges[e][0], table.edges[e][1])];
+      std::vector<Index>& list = triangles_at_[edge_key(table.edges[e][0], table.edges[e][1])];
       for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h)
         if (list.empty() || list.back() != *h / 3) list.push_back(static_cast<Index>(*h / 3));
     }
@@ -385,8 +386,6 @@ class Refiner {
     }
   };
 
-  static std::uint64_t key(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
-
   Edge edge(Index a, Index b) const {
     return {norm2(mesh_.vertices[b] - mesh_.vertices[a]), std::min(a, b), std::max(a, b)};
   }
@@ -396,7 +395,7 @@ class Refiner {
   Edge longest_beyond(Edge longest) const {
     for (bool moved = true; moved;) {
       moved = false;
-      const auto found = triangles_at_.find(key(std::get<1>(longest), std::get<2>(longest)));
+      const auto found = triangles_at_.find(edge_key(std::get<1>(longest), std::get<2>(longest)));
       if (found == triangles_at_.end()) break;
       for (const Index t : found->second)
         for (int k = 0; k < 3; ++k) {
@@ -487,7 +486,7 @@ class Refiner {
   bool bisect(Index a, Index b) {
     const Vec3 middle = 0.5 * mesh_.vertices[a] + 0.5 * mesh_.vertices[b];
     if (middle == mesh_.vertices[a] || middle == mesh_.vertices[b]) return false;
-    const auto found = triangles_at_.find(key(a, b));
+    const auto found = triangles_at_.find(edge_key(a, b));
     if (found == triangles_at_.end()) return false;  // triangles on each other queue their edges more than once
     const std::vector<Index> around = std::move(found->second);
     triangles_at_.erase(found);
@@ -507,13 +506,13 @@ class Refiner {
       std::replace(second.begin(), second.end(), a, m);
       mesh_.triangles.push_back(second);
       sized_.parent.push_back(sized_.parent[t]);
-      triangles_at_[key(a, m)].push_back(t);
-      triangles_at_[key(m, b)].push_back(added);
+      triangles_at_[edge_key(a, m)].push_back(t);
+      triangles_at_[edge_key(m, b)].push_back(added);
       if (c == kNone) continue;
       relax(m, c);
-      std::vector<Index>& beyond = triangles_at_[key(b, c)];
+      std::vector<Index>& beyond = triangles_at_[edge_key(b, c)];
       std::replace(beyond.begin(), beyond.end(), t, added);
-      std::vector<Index>& between = triangles_at_[key(m, c)];
+      std::vector<Index>& between = triangles_at_[edge_key(m, c)];
       between.insert(between.end(), {t, added});
       push(m, c);
       push_longest(mesh_.triangles[t]);

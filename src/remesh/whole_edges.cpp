@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/geometry.h"
+#include "mesh/stars.h"
 #include "mesh/topology.h"
 #include "remesh/improve_patch.h"
 
@@ -105,15 +106,7 @@ class Mender {
     return std::min({angle_at(a, b, c), angle_at(b, c, a), angle_at(c, a, b)});
   }
 
-  std::vector<Index> neighbours(Index v) const {
-    std::vector<Index> found;
-    for (const Index t : stars_[v])
-      for (const Index w : mesh_.triangles[t])
-        if (w != v) found.push_back(w);
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
-  }
+  std::vector<Index> neighbours(Index v) const { return neighbours_in_star(mesh_.triangles, stars_[v], v); }
 
   std::vector<Index> ring(std::vector<Index> from, int rings) const {
     for (int k = 0; k < rings; ++k) {

@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "mesh/stars.h"
+
 namespace bisector {
 namespace {
 
@@ -42,26 +44,12 @@ class Collapser {
  private:
   using Entry = std::tuple<double, Index, Index>;  // squared length, from, to
 
-  bool has_corner(Index t, Index v) const {
-    const Triangle& c = mesh_.triangles[t];
-    return c[0] == v || c[1] == v || c[2] == v;
-  }
-
-  // Ascending.
-  std::vector<Index> neighbours(Index v) const {
-    std::vector<Index> found;
-    for (const Index t : at_vertex_[v])
-      for (const Index w : mesh_.triangles[t])
-        if (w != v) found.push_back(w);
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
-  }
+  std::vector<Index> neighbours(Index v) const { return neighbours_in_star(mesh_.triangles, at_vertex_[v], v); }
 
   std::array<Index, 2> triangles_at_edge(Index v, Index u) const {
     std::array<Index, 2> found{kNone, kNone};
     for (const Index t : at_vertex_[v])
-      if (has_corner(t, u)) found[found[0] != kNone] = t;
+      if (has_corner(mesh_.triangles[t], u)) found[found[0] != kNone] = t;
     return found;
   }
 
@@ -105,7 +93,7 @@ class Collapser {
 
   bool keeps_all_sides(Index v, Index u) const {
     for (const Index t : at_vertex_[v]) {
-      if (has_corner(t, u)) continue;
+      if (has_corner(mesh_.triangles[t], u)) continue;
       std::array<Vec3, 3> corners;
       for (std::size_t k = 0; k < 3; ++k) {
         const Index w = mesh_.triangles[t][k];
@@ -118,7 +106,7 @@ class Collapser {
 
   void collapse(Index v, Index u) {
     for (const Index t : at_vertex_[v]) {
-      if (has_corner(t, u)) {
+      if (has_corner(mesh_.triangles[t], u)) {
         alive_[t] = 0;
         --sizes_[mesh_.labels[t]];
         for (const Index w : mesh_.triangles[t])

@@ -18,6 +18,7 @@
 #include "core/parallel.h"
 #include "features/size_field.h"
 #include "mesh/locate.h"
+#include "mesh/stars.h"
 #include "mesh/used_vertices.h"
 
 namespace bisector {
@@ -269,7 +270,7 @@ class Refiner {
     for (Index t = 0; t < mesh_.tets.size(); ++t) index_tet(t);
     for (Index t = 0; t < mesh_.boundary.size(); ++t) index_triangle(mesh_.boundary[t], t, marked_);
     for (Index t = 0; t < boundary_.triangles.size(); ++t) index_triangle(boundary_.triangles[t], t, outer_);
-    for (const auto& [a, b] : mesh_.feature_edges) features_.insert({key(a, b), 1});
+    for (const auto& [a, b] : mesh_.feature_edges) features_.insert({edge_key(a, b), 1});
   }
 
   // False if nothing had to be bisected.
@@ -302,8 +303,6 @@ class Refiner {
     }
   };
 
-  static std::uint64_t key(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
-
   Edge edge(Index a, Index b) const {
     return {norm2(mesh_.vertices[b] - mesh_.vertices[a]), std::min(a, b), std::max(a, b)};
   }
@@ -311,10 +310,10 @@ class Refiner {
   void index_tet(Index t) {
     const Tetrahedron& v = mesh_.tets[t];
     for (int i = 0; i < 4; ++i)
-      for (int j = i + 1; j < 4; ++j) tets_[key(v[i], v[j])].push_back(t);
+      for (int j = i + 1; j < 4; ++j) tets_[edge_key(v[i], v[j])].push_back(t);
   }
   static void index_triangle(const Triangle& v, Index t, Around& around) {
-    for (int k = 0; k < 3; ++k) around[key(v[k], v[(k + 1) % 3])].push_back(t);
+    for (int k = 0; k < 3; ++k) around[edge_key(v[k], v[(k + 1) % 3])].push_back(t);
   }
 
   // From edge to longer edge of the same tetrahedron, up to one that is the longest of all its tetrahedra (Rivara
@@ -322,7 +321,7 @@ class Refiner {
   Edge longest_beyond(Edge longest) const {
     for (bool moved = true; moved;) {
       moved = false;
-      const auto found = tets_.find(key(std::get<1>(longest), std::get<2>(longest)));
+      const auto found = tets_.find(edge_key(std::get<1>(longest), std::get<2>(longest)));
       if (found == tets_.end()) break;
       for (const Index t : found->second)
         for (int i = 0; i < 4; ++i)
@@ -349,7 +348,7 @@ class Refiner {
   bool bisect(Index a, Index b) {
     const Vec3 middle = 0.5 * mesh_.vertices[a] + 0.5 * mesh_.vertices[b];
     if (middle == mesh_.vertices[a] || middle == mesh_.vertices[b]) return false;
-    const auto found = tets_.find(key(a, b));
+    const auto found = tets_.find(edge_key(a, b));
     if (found == tets_.end()) return false;  // queued by several tetrahedra and bisected already
     const std::vector<Index> around = std::move(found->second);
     tets_.erase(found);
@@ -360,9 +359,9 @@ class Refiner {
     for (const Index t : around) split_tet(a, b, m, t);
     split_triangles(a, b, m, mesh_.boundary, mesh_.boundary_labels, marked_);
     split_triangles(a, b, m, boundary_.triangles, boundary_.labels, outer_);
-    if (features_.erase(key(a, b))) {
-      features_.insert({key(a, m), 1});
-      features_.insert({key(m, b), 1});
+    if (features_.erase(edge_key(a, b))) {
+      features_.insert({edge_key(a, m), 1});
+      features_.insert({edge_key(m, b), 1});
     }
     push(a, m);
     push(m, b);
@@ -380,13 +379,13 @@ class Refiner {
       if (v != a && v != m) others.push_back(v);
     mesh_.tets.push_back(second);
     if (!mesh_.regions.empty()) mesh_.regions.push_back(mesh_.regions[t]);
-    tets_[key(a, m)].push_back(t);
-    tets_[key(m, b)].push_back(added);
-    tets_[key(others[0], others[1])].push_back(added);
+    tets_[edge_key(a, m)].push_back(t);
+    tets_[edge_key(m, b)].push_back(added);
+    tets_[edge_key(others[0], others[1])].push_back(added);
     for (Index c : others) {
-      std::vector<Index>& beyond = tets_[key(b, c)];
+      std::vector<Index>& beyond = tets_[edge_key(b, c)];
       std::replace(beyond.begin(), beyond.end(), t, added);
-      std::vector<Index>& between = tets_[key(m, c)];
+      std::vector<Index>& between = tets_[edge_key(m, c)];
       const bool fresh = between.empty();
       between.insert(between.end(), {t, added});
       if (fresh) push(m, c);
@@ -395,7 +394,7 @@ class Refiner {
 
   static void split_triangles(Index a, Index b, Index m, std::vector<Triangle>& triangles,
                               std::vector<std::int32_t>& labels, Around& at) {
-    const auto found = at.find(key(a, b));
+    const auto found = at.find(edge_key(a, b));
     if (found == at.end()) return;
     const std::vector<Index> around = std::move(found->second);
     at.erase(found);
@@ -407,11 +406,11 @@ class Refiner {
       std::replace(second.begin(), second.end(), a, m);
       triangles.push_back(second);
       if (!labels.empty()) labels.push_back(labels[t]);
-      at[key(a, m)].push_back(t);
-      at[key(m, b)].push_back(added);
-      std::vector<Index>& beyond = at[key(b, c)];
+      at[edge_key(a, m)].push_back(t);
+      at[edge_key(m, b)].push_back(added);
+      std::vector<Index>& beyond = at[edge_key(b, c)];
       std::replace(beyond.begin(), beyond.end(), t, added);
-      std::vector<Index>& between = at[key(m, c)];
+      std::vector<Index>& between = at[edge_key(m, c)];
       between.insert(between.end(), {t, added});
     }
   }
