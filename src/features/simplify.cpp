@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -196,12 +197,18 @@ std::vector<FeatureCurve> without_shared_edges(const std::vector<FeatureCurve>& 
   return own;
 }
 
-// Divides curves where others meet them, more than `limit` from their ends.
-std::vector<FeatureCurve> divided_where_they_meet(const std::vector<FeatureCurve>& curves,
-                                                  const std::vector<Vec3>& vertices, double limit) {
+// How many times curves run over each vertex.
+std::map<Index, std::size_t> uses_of(const std::vector<FeatureCurve>& curves) {
   std::map<Index, std::size_t> uses;
   for (const FeatureCurve& curve : curves)
     for (const Index v : curve.vertices) ++uses[v];
+  return uses;
+}
+
+// Divides curves where others meet them, more than `limit` from their ends.
+std::vector<FeatureCurve> divided_where_they_meet(const std::vector<FeatureCurve>& curves,
+                                                  const std::vector<Vec3>& vertices, double limit) {
+  std::map<Index, std::size_t> uses = uses_of(curves);
   const auto meets = [&](Index v) { return uses[v] > 1; };
   std::vector<FeatureCurve> parts;
   for (const FeatureCurve& curve : curves) {
@@ -376,9 +383,7 @@ void join_straight(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& v
 // other curve meets goes, for the corner where it turns would be nearer to its own end than edges are long.
 void divide_where_they_turn_back(std::vector<FeatureCurve>& curves, const std::vector<Vec3>& vertices, double width) {
   const double limit = kShared * width;
-  std::map<Index, std::size_t> uses;
-  for (const FeatureCurve& curve : curves)
-    for (const Index v : curve.vertices) ++uses[v];
+  std::map<Index, std::size_t> uses = uses_of(curves);
   std::vector<FeatureCurve> parts;
   for (FeatureCurve& curve : curves) {
     if (curve.closed) {
@@ -458,30 +463,23 @@ std::vector<std::vector<Index>> corner_links(const FeatureGraph& graph, const st
       from.size(),
       [&](std::size_t c) {
         const Index start = graph.corners[c];
-        for (const Index* other = neighbours.begin(start); other != neighbours.end(start); ++other)
-          if (start < *other && kinds[*other] == corner) from[c].push_back({start, *other});
-        std::map<Index, Index> before;
-        const auto links = [&](Index v, const auto& link) {
-          for (const Index* other = neighbours.begin(v); other != neighbours.end(v); ++other)
-            if (kinds[*other] != on_curve) link(*other, norm(vertices[*other] - vertices[v]), kNone);
-        };
-        shortest_ways(start, reach, links, [&](Index v, double, Index previous, Index) {
-          if (!before.try_emplace(v, previous).second) return false;
-          if (v == start) return true;
-          if (kinds[v] != corner) return before.size() < kMostOnWays;
-          if (start > v || previous == start) return false;
-          std::vector<Index> way;
-          for (Index at = v; at != kNone; at = before.at(at)) way.push_back(at);
-          from[c].push_back(reversed_vertices(std::move(way)));
-          return false;
+        std::size_t reached = 0;
+        from[c] = shortest_edge_ways(start, reach, vertices, neighbours, graph.corners.size(), [&](Index v, double) {
+          if (v == start) return EdgeWay::goes_on;
+          if (kinds[v] == corner) return start < v ? EdgeWay::arrives : EdgeWay::ends;
+          return kinds[v] == plain && ++reached < kMostOnWays ? EdgeWay::goes_on : EdgeWay::ends;
         });
+        // Single edges may be longer.
+        std::erase_if(from[c], [](const std::vector<Index>& way) { return way.size() == 2; });
+        for (const Index* other = neighbours.begin(start); other != neighbours.end(start); ++other)
+          if (start < *other && kinds[*other] == corner &&
+              !std::binary_search(graph.edges.begin(), graph.edges.end(), std::array{start, *other}))
+            from[c].push_back({start, *other});
       },
       kCornersAtOnce);
   std::vector<std::vector<Index>> ways;
   for (std::vector<std::vector<Index>>& some : from)
-    for (std::vector<Index>& way : some)
-      if (way.size() > 2 || !std::binary_search(graph.edges.begin(), graph.edges.end(), std::array{way[0], way[1]}))
-        ways.push_back(std::move(way));
+    ways.insert(ways.end(), std::move_iterator(some.begin()), std::move_iterator(some.end()));
   return ways;
 }
 

@@ -28,7 +28,8 @@ std::vector<double> curve_weights(const FeatureGraph& graph, const std::vector<T
 //     there by a corner (curve_gaps): as a whole, or in stretches of at least two widths. So the two curves of a
 //     chamfer become one. What is left of a curve is led to what stays along edges of the mesh.
 //   - Closed creases shorter than 4 `width` go.
-//   - What is left of open curves gets corners where it turns back, at acute angles between its arms of `width`.
+//   - What is left of open curves gets corners where it turns back, at acute angles between its arms of `width`; ends
+//     of creases beyond such a corner that are shorter, and that no other curve meets, go.
 // Curves that are not creases stay, and so do their branchings. A width of 0 changes nothing. `links` are ways from one
 // corner to another that are no features: corners may be led along them, too (corner_links). `neighbours` are the
 // vertices at the other ends of each vertex's edges; without them stretches stay that others would have to be led
