@@ -167,6 +167,24 @@ void rename_edges(const std::vector<Index>& vertex_of, std::vector<std::array<In
   std::erase_if(edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
 }
 
+// Points that rounding left apart are one, too, if the surface stays of the same kind.
+WeldResult weld_and_collapse(const OrderedInput& input, const Context& context) {
+  const RemeshOptions& options = input.options;
+  WeldResult welded = weld_and_orient(input.mesh, options.weld, context);
+  if (options.weld || !options.keep_vertices.empty() || !options.keep_edges.empty()) return welded;
+  std::vector<std::array<Index, 2>> given = options.features.given;
+  rename_edges(welded.vertex_of, given);
+  const double length = kRounding * bounding_box(welded.mesh).diagonal();
+  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given);
+  if (shortest.collapsed == 0) return welded;
+  for (Index& v : welded.vertex_of) v = shortest.vertex_of[v];
+  welded.merged_vertices += shortest.collapsed;
+  welded.degenerate_triangles += shortest.removed_triangles;
+  context.warn(fmt::format("collapsed {} shorter than {:g}, {:g} of the diagonal, as rounding leaves them",
+                           plural(shortest.collapsed, "edge"), length, kRounding));
+  return welded;
+}
+
 SizingTarget target_of(const RemeshOptions& options) {
   if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
   return {options.vertices, options.edge_length};
@@ -226,7 +244,7 @@ WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double
 }
 
 Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches)
-    : welded_(weld_and_orient(ordered.mesh, ordered.options.weld, context)), mesh_(std::exchange(welded_.mesh, {})),
+    : welded_(weld_and_collapse(ordered, context)), mesh_(std::exchange(welded_.mesh, {})),
       sizing_(ordered.options.sizing), target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
   const TriangleMesh& input = ordered.mesh;
   const RemeshOptions& options = ordered.options;
@@ -235,7 +253,6 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   FeatureOptions features = options.features;
   std::vector<std::array<Index, 2>> keep_edges = options.keep_edges;
   for (auto* edges : {&features.given, &keep_edges}) rename_edges(vertex_of, *edges);
-  if (!options.weld && options.keep_vertices.empty() && keep_edges.empty()) collapse_rounded(features.given, context);
   const std::size_t vertices = mesh_.vertices.size();
   const Separation separation(mesh_, branches, context);
   features.given = separation.edges(mesh_, features.given);
@@ -259,19 +276,6 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   if (options.detail == DetailMode::off) return;
   resolves_all_ = options.detail == DetailMode::all;
   if (!plan_with_intersections()) plan(std::move(lengths));
-}
-
-// Points that rounding left apart are one, if the surface stays of the same kind. `edges` follow.
-void Preparation::collapse_rounded(std::vector<std::array<Index, 2>>& edges, const Context& context) {
-  const ShortEdges shortest = collapse_short_edges(mesh_, kRounding * bounding_box(mesh_).diagonal(), edges);
-  if (shortest.collapsed == 0) return;
-  rename_edges(shortest.vertex_of, edges);
-  for (Index& v : welded_.vertex_of)
-    if (v != kNone) v = shortest.vertex_of[v];
-  welded_.merged_vertices += shortest.collapsed;
-  welded_.degenerate_triangles += shortest.removed_triangles;
-  context.warn(fmt::format("collapsed {} shorter than a {:.0f}th of the size of the surface, as rounding leaves them",
-                           plural(shortest.collapsed, "edge"), 1 / kRounding));
 }
 
 void Preparation::keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,

@@ -75,7 +75,6 @@ class Preparation {
   bool lets_cross() const { return lets_cross_; }
 
  private:
-  void collapse_rounded(std::vector<std::array<Index, 2>>& edges, const Context& context);
   void find_noise(FeatureOptions& features);
   // Vertices of the input, and edges of mesh(); `original` is of each of its vertices the welded one, kNone: none.
   void keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,

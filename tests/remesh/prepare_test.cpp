@@ -19,6 +19,21 @@
 namespace bisector::test {
 namespace {
 
+// With values at all vertices, which have to follow what is done to these.
+RemeshOptions with_density(const TriangleMesh& mesh) {
+  RemeshOptions options;
+  options.vertices = 600;
+  options.sizing.kind = DensityKind::attribute;
+  options.sizing.attribute.assign(mesh.vertices.size(), 1.0);
+  return options;
+}
+
+Context collecting(std::vector<std::string>& warnings) {
+  Context context;
+  context.warning = [&](const std::string& line) { warnings.push_back(line); };
+  return context;
+}
+
 TEST(JoinBorders, ClosesWhatRoundingOpens) {
   const TriangleMesh sphere = icosphere(3);
   for (const double size : {0.0, 5e-8, 5e-7, 5e-6}) {
@@ -81,14 +96,9 @@ TEST(JoinBorders, MovesNothingOfAClosedSurface) {
 TEST(Preparation, SolidsThatTouchAlongAnEdgeAreMeshedApart) {
   const TriangleMesh boxes = weld(joined(box(4), box(4), {1, 1, 0}), 0).mesh;
   ASSERT_EQ(topology_of(boxes).non_manifold_edges, 4u);
-  RemeshOptions options;
-  options.vertices = 600;
-  options.sizing.kind = DensityKind::attribute;
-  options.sizing.attribute.assign(boxes.vertices.size(), 1.0);
   std::vector<std::string> warnings;
-  Context context;
-  context.warning = [&](const std::string& line) { warnings.push_back(line); };
-  const RemeshResult result = remesh(boxes, options, context);
+  const Context context = collecting(warnings);
+  const RemeshResult result = remesh(boxes, with_density(boxes), context);
   EXPECT_TRUE(result.topology_matches);
   EXPECT_TRUE(result.topology.manifold);
   EXPECT_EQ(result.topology.components, 2u);
@@ -103,13 +113,9 @@ TEST(Preparation, CornersThatRoundingMadeTwoAreOne) {
   TriangleMesh mesh = box(1);
   const std::size_t vertices = mesh.vertices.size();
   for (const Index v : {0u, 3u, 6u}) divide_vertex(mesh, v, 1, 2, {1e-14, 0, 0});
-  RemeshOptions options;
-  options.vertices = 600;
-  options.sizing.kind = DensityKind::attribute;
-  options.sizing.attribute.assign(mesh.vertices.size(), 1.0);
+  RemeshOptions options = with_density(mesh);
   std::vector<std::string> warnings;
-  Context context;
-  context.warning = [&](const std::string& line) { warnings.push_back(line); };
+  const Context context = collecting(warnings);
   const Preparation preparation(OrderedInput(mesh, options), context);
   EXPECT_EQ(preparation.mesh().vertices.size(), vertices);
   ASSERT_EQ(preparation.welded().vertex_of.size(), mesh.vertices.size());

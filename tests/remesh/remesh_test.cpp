@@ -497,7 +497,6 @@ TEST(RemeshHard, AThinTipKeepsTheTopology) {
   EXPECT_EQ(result.features.curves, 1u);
 }
 
-// Bounds that hold for samples and for the known distance of a chord.
 // So few vertices for a cube with engraved letters leave slivers in the first result.
 TEST(RemeshHard, ARunAgainMovesSeedsAroundWhatItMends) {
   const TriangleMesh mesh = read_mesh(BISECTOR_SOURCE_DIR "/examples/engraved.off");
@@ -519,6 +518,7 @@ TEST(RemeshHard, ARunAgainMovesSeedsAroundWhatItMends) {
   EXPECT_TRUE(same_mesh(remesh(mesh, options).mesh, result.mesh));
 }
 
+// Bounds that hold for samples and for the known distance of a chord.
 TEST(RemeshDistance, IsBroughtDownToWhatIsAskedFor) {
   const TriangleMesh ball = icosphere(4);
   RemeshOptions options = options_for(60);
