@@ -204,6 +204,7 @@ class Pipeline {
   const MeshTopology input_topology_;
   // Not where seeds were given without places: they are the start of as many as the surface needs.
   const bool localises_;
+  bool placed_around_ = false;  // where there was need of more seeds; the others are those of a finished result
   CvtRun run_;
   OptimiseOptions step_;
   FeatureReport features_;
@@ -373,7 +374,7 @@ void Pipeline::mend_features_and_topology() {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
-    topology_ = enforce_topology(run_, trace_, input_topology_, step_, plan_.branches);
+    topology_ = enforce_topology(run_, trace_, input_topology_, step_, {plan_.branches, placed_around_});
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
       step_.iterations = kFreedSteps;
       optimise(run_, step_);
@@ -558,6 +559,7 @@ bool Pipeline::place_around(const PlacedSeeds& earlier) {
     run_.localise(false);
     return false;
   }
+  placed_around_ = true;
   step_.constrained = plan_.constrained;
   step_.phase = "around shorter edges";
   step_.iterations = share_of(plan_.iterations, kFinestShare);

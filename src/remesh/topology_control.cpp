@@ -227,8 +227,8 @@ std::vector<char> failing_seeds(const BallReport& report, std::size_t count) {
 
 class Control {
  public:
-  Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, OptimiseOptions options)
-      : run_(run), trace_(trace), is_sound_(is_sound),
+  Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, bool polishes_around, OptimiseOptions options)
+      : run_(run), trace_(trace), is_sound_(is_sound), polishes_around_(polishes_around),
         most_work_(is_sound ? kInfinity : run.totals.work + kMostFutileSteps * run.step_work()),
         options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_), most_(std::max(budget(), kGrown)),
         lost_(run.curves().size(), 0) {
@@ -259,7 +259,7 @@ class Control {
       }
       if (holds()) {
         trim();
-        polish();
+        polish(before);
         smooth(before);
       } else {
         // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show.
@@ -505,12 +505,12 @@ class Control {
     return held;
   }
 
-  // The optimiser's steps, of all seeds.
-  void polish() {
+  // The optimiser's steps.
+  void polish(const SeedsBefore& given) {
     const PlacedSeeds before = run_.seeds;
     options_.iterations = kPolishingSteps;
     options_.phase = "topology, polishing";
-    optimise(run_, options_);
+    polishes_around_ ? optimise_around(run_, given, options_) : optimise(run_, options_);
     const std::vector<Vec3> next = run_.seeds.positions();
     std::vector<char> held = held_seeds();
     move(before, next, held);
@@ -553,8 +553,9 @@ class Control {
 
   CvtRun& run_;
   const FeatureTrace& trace_;
-  const bool is_sound_;     // the input is a manifold and oriented, or branches on purpose
-  const double most_work_;  // of the run
+  const bool is_sound_;         // the input is a manifold and oriented, or branches on purpose
+  const bool polishes_around_;  // what has changed, and not everywhere
+  const double most_work_;      // of the run
   OptimiseOptions options_;
   std::size_t wanted_;      // vertices
   std::size_t given_;       // seeds before those inserted by refining
@@ -618,8 +619,9 @@ std::vector<TopologyFault> topology_faults(const BallReport& report, const std::
 }
 
 TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
-                                 OptimiseOptions options, bool branches) {
-  return Control(run, trace, branches || (input.manifold && input.oriented), std::move(options)).run();
+                                 OptimiseOptions options, const TopologyControlOptions& control) {
+  const bool is_sound = control.branches || (input.manifold && input.oriented);
+  return Control(run, trace, is_sound, control.polish_around, std::move(options)).run();
 }
 
 }  // namespace bisector

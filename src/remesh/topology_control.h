@@ -33,13 +33,18 @@ struct TopologyOutcome {
   double gap = 0;            // at which cells were divided: to do the same again for the diagram of changed seeds
 };
 
+struct TopologyControlOptions {
+  bool branches = false;       // the surface branches on purpose
+  bool polish_around = false;  // all but the seeds around what changes are as they should be
+};
+
 // Inserts seeds until the topological ball property holds:
 // - While an eighth of the cells fail there are too few seeds, and the optimisation runs again after each round (thesis
 //   4.4.4).
 // - Then without optimising, for a density that makes cells larger than the surface is thick would draw the new seeds
 //   away; it ends if a dozen rounds in a row have not led to fewer failures.
-// - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all are
-//   optimised as far as the property goes on holding.
+// - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all, or those
+//   around what has changed, are optimised as far as the property goes on holding.
 // A curve that no cell of a seed on the surface cuts at the beginning stays so: such a cut counts as a failure, and the
 // seed goes on the curve there, or another one does, as segments are split in Delaunay refinement when a point
 // encroaches upon them (Ruppert 1995). `trace` is that of the run's curves.
@@ -48,9 +53,9 @@ struct TopologyOutcome {
 //
 // Seeds that are not free are never removed. Gives up after a bounded number of rounds and seeds, and then returns to
 // the seeds with the fewest failures, which topology_faults lists, or to those given if an eighth of the cells fail
-// with any. Where the input is not manifold and oriented, and does not branch on purpose, it may take as much work as
-// the run has until then, and seeds are as given if that does not do.
+// with any. Where the input is not manifold and oriented, and does not branch on purpose, it may take the work of a few
+// dozen steps, and seeds are as given if that does not do.
 TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
-                                 OptimiseOptions options, bool branches = false);
+                                 OptimiseOptions options, const TopologyControlOptions& control = {});
 
 }  // namespace bisector
