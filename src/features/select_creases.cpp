@@ -20,9 +20,6 @@ constexpr double kBeside = 0.5;
 // So long, in widths, are parts of curves that go by themselves: two curves that leave a corner at less than 30 degrees
 // are nearer to each other than the width as far as that.
 constexpr double kStretch = 2;
-// A curve runs beside itself where it is nearer than this part of the way along it: where it turns back at less than
-// 17 degrees.
-constexpr double kHairpin = 0.15;
 
 // A run of samples that are all beside something, or all not.
 struct Stretch {
@@ -156,8 +153,17 @@ class Selection {
     bool divided;  // where it runs beside itself
   };
   struct Dropped {
-    Candidate candidate;
+    Candidate candidate;  // without vertices once it has come back
     std::size_t origin;
+
+    bool ends_at(Index v) const {
+      const std::vector<Index>& chain = candidate.curve.vertices;
+      return !chain.empty() && (chain.front() == v || chain.back() == v);
+    }
+    Index end_beyond(Index v) const {
+      const std::vector<Index>& chain = candidate.curve.vertices;
+      return chain.front() == v ? chain.back() : chain.front();
+    }
   };
 
   void keep(const Candidate& candidate, std::size_t origin) {
@@ -229,27 +235,23 @@ class Selection {
     for (std::size_t k = 0; k < chain.size(); ++k) at_[chain[k]].push_back({c, k});
   }
 
-  // Leads what ends where its continuation went to what stays.
+  // Leads what ends where its continuation went to what stays. Where there is no way the continuation comes back, for
+  // what it joined at its other end as well.
   void attach_ends() {
     for (std::size_t c = 0; c < chosen_.size(); ++c) put(c);
     std::vector<Index> open(cuts_.begin(), cuts_.end());
     while (!open.empty()) {
       const Index v = open.back();
       open.pop_back();
-      const auto uses = at_.find(v);
-      if (uses == at_.end() || uses->second.size() != 1) continue;
-      const std::size_t c = uses->second[0].curve;
-      const bool from_start = chosen_[c].curve.vertices.front() == v;
-      if (chosen_[c].curve.closed || (!from_start && chosen_[c].curve.vertices.back() != v)) continue;
-      const std::vector<Index> way = way_to_kept(v, c, from_start);
-      if (!way.empty()) {
-        extend(c, from_start, way);
+      std::vector<Index> way;
+      if (!is_open(v, way)) continue;
+      if (!way.empty() && !is_wanted_beyond(v)) {
+        extend(v, way);
         continue;
       }
       for (Dropped& dropped : dropped_) {
-        const std::vector<Index>& chain = dropped.candidate.curve.vertices;
-        if (chain.empty() || (chain.front() != v && chain.back() != v)) continue;
-        const Index other = chain.front() == v ? chain.back() : chain.front();
+        if (!dropped.ends_at(v)) continue;
+        const Index other = dropped.end_beyond(v);
         keep(dropped.candidate, dropped.origin);
         put(chosen_.size() - 1);
         dropped.candidate.curve.vertices.clear();
@@ -258,9 +260,32 @@ class Selection {
     }
   }
 
-  void extend(std::size_t c, bool from_start, const std::vector<Index>& way) {
+  // Whether a single curve ends at this vertex, and the way from there to what stays, empty if there is none.
+  bool is_open(Index v, std::vector<Index>& way) const {
+    const auto uses = at_.find(v);
+    if (uses == at_.end() || uses->second.size() != 1) return false;
+    const std::size_t c = uses->second[0].curve;
+    const bool from_start = chosen_[c].curve.vertices.front() == v;
+    if (chosen_[c].curve.closed || (!from_start && chosen_[c].curve.vertices.back() != v)) return false;
+    way = way_to_kept(v, c, from_start);
+    return true;
+  }
+
+  // Whether what went at this vertex leads to an end that has no other way.
+  bool is_wanted_beyond(Index v) const {
+    return std::any_of(dropped_.begin(), dropped_.end(), [&](const Dropped& dropped) {
+      std::vector<Index> way;
+      return dropped.ends_at(v) && cuts_.contains(dropped.end_beyond(v)) && is_open(dropped.end_beyond(v), way) &&
+             way.empty();
+    });
+  }
+
+  // The curve that ends at v, by a way from there.
+  void extend(Index v, const std::vector<Index>& way) {
+    const std::size_t c = at_.at(v)[0].curve;
     std::vector<Index>& chain = chosen_[c].curve.vertices;
-    for (const Index v : chain) std::erase_if(at_.at(v), [&](const Where& where) { return where.curve == c; });
+    const bool from_start = chain.front() == v;
+    for (const Index u : chain) std::erase_if(at_.at(u), [&](const Where& where) { return where.curve == c; });
     if (from_start) std::reverse(chain.begin(), chain.end());
     for (std::size_t k = 1; k < way.size(); ++k) chain.push_back(way[k]);
     chosen_[c].length = length_of(chain, false, vertices_);

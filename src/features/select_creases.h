@@ -18,6 +18,10 @@ struct SelectedCreases {
 // A curve that comes back to its corner is one if it is longer than so many widths.
 inline constexpr double kLoopWidths = 3;
 
+// A curve runs beside itself where it is nearer than this part of the way along it: where it turns back at less than
+// 17 degrees.
+inline constexpr double kHairpin = 0.15;
+
 // Of creases within `width` of each other (simplify_features) the heavier stays; candidates that are no creases stay
 // all. `vertices` must outlive the result. `neighbours` are the vertices at the other ends of each vertex's edges, or
 // empty.

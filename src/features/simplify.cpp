@@ -123,11 +123,34 @@ std::vector<Index> way_of(const FeatureGraph& graph, const CornerGraph::Forest& 
   return way;
 }
 
+// Cuts off tips where a chain turns back at less than 17 degrees along the edges of a needle, narrower than `limit`,
+// and spurs where it comes back along the same edge.
+void cut_needle_tips(std::vector<Index>& chain, const std::vector<Vec3>& vertices, const Csr<Index>& neighbours,
+                     double limit) {
+  const auto is_tip = [&](Index a, Index m, Index b) {
+    if (std::find(neighbours.begin(a), neighbours.end(a), b) == neighbours.end(a)) return false;
+    const double to_a = norm(vertices[a] - vertices[m]), to_b = norm(vertices[b] - vertices[m]);
+    const Vec3 &near = vertices[to_a < to_b ? a : b], &far = vertices[to_a < to_b ? b : a];
+    const double width = norm(near - nearest_on_segment(near, vertices[m], far));
+    return width < limit && width < 2 * kHairpin * std::min(to_a, to_b);
+  };
+  for (std::size_t k = 1; k + 1 < chain.size();) {
+    const bool is_spur = chain[k - 1] == chain[k + 1];
+    if (!is_spur && !is_tip(chain[k - 1], chain[k], chain[k + 1])) {
+      ++k;
+      continue;
+    }
+    const auto at = chain.begin() + static_cast<std::ptrdiff_t>(k);
+    chain.erase(at, at + (is_spur ? 2 : 1));
+    k = std::max<std::size_t>(k - 1, 1);
+  }
+}
+
 // Of the first `count` curves; the others are links.
 std::vector<Candidate> led_to_representatives(const FeatureCurves& curves, std::size_t count,
                                               const std::vector<Vec3>& vertices, const std::vector<double>& weights,
                                               const CornerGraph::Forest& forest, double width,
-                                              SimplifiedFeatures& result) {
+                                              const Csr<Index>& neighbours, SimplifiedFeatures& result) {
   const FeatureGraph& graph = curves.graph();
   std::vector<char> between(curves.size(), 0);
   for (const Index c : forest.curve)
@@ -149,6 +172,12 @@ std::vector<Candidate> led_to_representatives(const FeatureCurves& curves, std::
     chain.insert(chain.end(), candidate.curve.vertices.begin() + 1, candidate.curve.vertices.end());
     const std::vector<Index> onwards = way_of(graph, forest, last);
     chain.insert(chain.end(), onwards.begin() + 1, onwards.end());
+    if (is_crease(candidate.curve) && neighbours.rows() > 0)
+      cut_needle_tips(chain, vertices, neighbours, kShared * width);
+    if (chain.size() < 2) {
+      ++result.merged;
+      continue;
+    }
     candidate.curve.vertices = std::move(chain);
     candidate.length = length_of(candidate.curve.vertices, false, vertices);
     if (is_loop(candidate.curve) && is_crease(candidate.curve) && candidate.length < kLoopWidths * width) {
@@ -500,7 +529,7 @@ SimplifiedFeatures simplify_features(const FeatureGraph& graph, const std::vecto
   const FeatureCurves curves(linked, vertices);
   const CornerGraph::Forest forest = CornerGraph(curves, weights, graph.curves.size()).merge(width);
   std::vector<Candidate> candidates =
-      led_to_representatives(curves, graph.curves.size(), vertices, weights, forest, width, result);
+      led_to_representatives(curves, graph.curves.size(), vertices, weights, forest, width, neighbours, result);
   SelectedCreases apart = select_creases(std::move(candidates), vertices, width, neighbours);
   // What runs beside others for less than two widths is still there, however near it is; and the nearer it is, the
   // shorter is what goes.

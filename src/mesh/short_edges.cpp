@@ -1,6 +1,7 @@
 #include "mesh/short_edges.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <numeric>
 #include <queue>
@@ -8,6 +9,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "core/disjoint_sets.h"
 #include "core/geometry.h"
 #include "mesh/stars.h"
 #include "mesh/topology.h"
@@ -17,13 +19,12 @@ namespace {
 
 class Collapse {
  public:
-  Collapse(TriangleMesh& mesh, double length, const std::vector<std::array<Index, 2>>& given)
-      : mesh_(mesh), length_(length) {
+  Collapse(TriangleMesh& mesh, double length, const std::vector<std::array<Index, 2>>& given, double flat_part)
+      : mesh_(mesh), length_(length), flat_part_(flat_part) {
     result_.vertex_of.resize(mesh.vertices.size());
     std::iota(result_.vertex_of.begin(), result_.vertex_of.end(), Index{0});
     for (const Triangle& t : mesh.triangles)
       for (std::size_t k = 0; k < 3; ++k) push_if_short(t[k], t[(k + 1) % 3]);
-    if (queue_.empty()) return;
     at_.resize(mesh.vertices.size());
     for (Index t = 0; t < mesh.triangles.size(); ++t)
       for (const Index v : mesh.triangles[t]) at_[v].push_back(t);
@@ -38,7 +39,8 @@ class Collapse {
       if (result_.vertex_of[a] != a || result_.vertex_of[b] != b || !may_go(a, b)) continue;
       on_line_[b] && !on_line_[a] ? collapse(b, a) : collapse(a, b);
     }
-    if (result_.collapsed > 0) collect();
+    remove_small_parts();
+    if (result_.collapsed + result_.removed_parts > 0) collect();
     return std::move(result_);
   }
 
@@ -127,6 +129,69 @@ class Collapse {
       for (const Index w : neighbours(v)) push_if_short(v, w);
   }
 
+  // Parts hang together through edges of two triangles; they may touch others elsewhere.
+  void remove_small_parts() {
+    std::vector<Index> left;
+    std::vector<Triangle> triangles;
+    for (Index t = 0; t < gone_.size(); ++t)
+      if (!gone_[t]) {
+        left.push_back(t);
+        triangles.push_back(mesh_.triangles[t]);
+      }
+    const EdgeTable table = edge_table(triangles, mesh_.vertices.size());
+    DisjointSets<Index> sets(left.size());
+    for (std::size_t e = 0; e < table.edges.size(); ++e)
+      if (const std::size_t* h = table.half_edges.begin(e); table.half_edges.size(e) == 2)
+        sets.join(static_cast<Index>(h[0] / 3), static_cast<Index>(h[1] / 3));
+    std::vector<std::vector<Triangle>> parts(left.size());  // by their first triangle
+    for (Index k = 0; k < left.size(); ++k) parts[sets.root(k)].push_back(triangles[k]);
+    std::vector<char> goes(left.size(), 0);
+    bool all_go = true;
+    for (Index k = 0; k < left.size(); ++k)
+      if (sets.is_root(k)) all_go &= (goes[k] = is_small(parts[k])) != 0;
+    // Lines stay, and parts at them.
+    for (std::size_t e = 0; e < table.edges.size(); ++e) {
+      const auto& [a, b] = table.edges[e];
+      const std::size_t* const h = table.half_edges.begin(e);
+      const std::size_t count = table.half_edges.size(e);
+      if (count != 2 || is_line(a, b))
+        for (std::size_t k = 0; k < count; ++k) goes[sets.root(static_cast<Index>(h[k] / 3))] = 0;
+    }
+    if (all_go) return;
+    is_removed_.assign(at_.size(), 0);
+    for (Index k = 0; k < left.size(); ++k) {
+      if (!goes[sets.root(k)]) continue;
+      result_.removed_parts += sets.is_root(k);
+      ++result_.removed_triangles;
+      gone_[left[k]] = 1;
+      for (const Index v : triangles[k]) is_removed_[v] = 1;
+    }
+    for (Index k = 0; k < left.size(); ++k)
+      if (!gone_[left[k]])
+        for (const Index v : triangles[k]) is_removed_[v] = 0;
+  }
+
+  bool is_small(const std::vector<Triangle>& part) const {
+    const double size = bounding_box(mesh_.vertices, part).diagonal();
+    return size < length_ || (size < flat_part_ && is_flat(part));
+  }
+
+  // Whether no corner is farther than the length from the plane of the largest triangle.
+  bool is_flat(const std::vector<Triangle>& triangles) const {
+    const auto normal = [&](const Triangle& v) {
+      return twice_area_normal(mesh_.vertices[v[0]], mesh_.vertices[v[1]], mesh_.vertices[v[2]]);
+    };
+    Triangle largest = triangles[0];
+    for (const Triangle& v : triangles)
+      if (norm2(normal(v)) > norm2(normal(largest))) largest = v;
+    const Vec3 up = normal(largest), origin = mesh_.vertices[largest[0]];
+    return std::all_of(triangles.begin(), triangles.end(), [&](const Triangle& v) {
+      return std::all_of(v.begin(), v.end(), [&](Index corner) {
+        return std::abs(dot(mesh_.vertices[corner] - origin, up)) <= length_ * norm(up);
+      });
+    });
+  }
+
   // What is left of the mesh.
   void collect() {
     std::vector<Index>& became = result_.vertex_of;
@@ -135,7 +200,7 @@ class Collapse {
     std::vector<Index> place(became.size(), kNone);
     Index vertices = 0;
     for (Index v = 0; v < became.size(); ++v) {
-      if (became[v] != v) continue;
+      if (became[v] != v || (!is_removed_.empty() && is_removed_[v])) continue;
       mesh_.vertices[vertices] = mesh_.vertices[v];
       place[v] = vertices++;
     }
@@ -164,18 +229,19 @@ class Collapse {
   }
 
   TriangleMesh& mesh_;
-  const double length_;
+  const double length_, flat_part_;
   std::priority_queue<Edge, std::vector<Edge>, std::greater<>> queue_;
   std::vector<std::vector<Index>> at_;       // triangles of each vertex
   std::unordered_set<std::uint64_t> lines_;  // edges that count as borders
-  std::vector<char> on_line_, gone_;
+  std::vector<char> on_line_, gone_, is_removed_;
   ShortEdges result_;
 };
 
 }  // namespace
 
-ShortEdges collapse_short_edges(TriangleMesh& mesh, double length, const std::vector<std::array<Index, 2>>& given) {
-  return Collapse(mesh, length, given).run();
+ShortEdges collapse_short_edges(TriangleMesh& mesh, double length, const std::vector<std::array<Index, 2>>& given,
+                                double flat_part) {
+  return Collapse(mesh, length, given, flat_part).run();
 }
 
 }  // namespace bisector

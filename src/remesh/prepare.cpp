@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "bisector/repair.h"
+#include "core/degenerate.h"
 #include "core/geometry.h"
 #include "features/normals.h"
 #include "features/wedges.h"
@@ -167,6 +169,16 @@ void rename_edges(const std::vector<Index>& vertex_of, std::vector<std::array<In
   std::erase_if(edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
 }
 
+// Of a uniform result.
+double mean_edge(const TriangleMesh& mesh, const RemeshOptions& options) {
+  if (options.edge_length > 0) return options.edge_length;
+  double area = 0;
+  for (const auto& [a, b, c] : mesh.triangles)
+    area += triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+  const std::size_t count = std::max({options.vertices, options.seeds.size(), std::size_t{1}});
+  return std::sqrt(2 / std::numbers::sqrt3 * area / static_cast<double>(count));
+}
+
 // Points that rounding left apart are one, too, if the surface stays of the same kind.
 WeldResult weld_and_collapse(const OrderedInput& input, const Context& context) {
   const RemeshOptions& options = input.options;
@@ -175,13 +187,18 @@ WeldResult weld_and_collapse(const OrderedInput& input, const Context& context) 
   std::vector<std::array<Index, 2>> given = options.features.given;
   rename_edges(welded.vertex_of, given);
   const double length = kRounding * bounding_box(welded.mesh).diagonal();
-  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given);
-  if (shortest.collapsed == 0) return welded;
-  for (Index& v : welded.vertex_of) v = shortest.vertex_of[v];
+  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given, mean_edge(welded.mesh, options));
+  if (shortest.collapsed + shortest.removed_parts == 0) return welded;
+  for (Index& v : welded.vertex_of)
+    if (v != kNone) v = shortest.vertex_of[v];
   welded.merged_vertices += shortest.collapsed;
   welded.degenerate_triangles += shortest.removed_triangles;
-  context.warn(fmt::format("collapsed {} shorter than {:g}, {:g} of the diagonal, as rounding leaves them",
-                           plural(shortest.collapsed, "edge"), length, kRounding));
+  if (shortest.collapsed > 0)
+    context.warn(fmt::format("collapsed {} shorter than {:g}, {:g} of the diagonal, as rounding leaves them",
+                             plural(shortest.collapsed, "edge"), length, kRounding));
+  if (shortest.removed_parts > 0)
+    context.warn(fmt::format("left out {} smaller than edges, with nothing inside but for rounding, {:g}",
+                             plural(shortest.removed_parts, "closed part"), length));
   return welded;
 }
 
@@ -448,7 +465,12 @@ void Preparation::bound(const SizeBounds& bounds) {
   if (!bounds.points.empty()) unbounded_.reset();
   const std::size_t before = bounds_.points.size();
   bounds_.add(bounds);
-  for (std::size_t k = before; k < bounds_.points.size(); ++k) bounds_.points[k] = apart_.back(bounds_.points[k]);
+  // Cells that hold next to nothing ask for next to nothing.
+  const double least = kRounding * bounding_box(mesh_).diagonal();
+  for (std::size_t k = before; k < bounds_.points.size(); ++k) {
+    bounds_.points[k] = apart_.back(bounds_.points[k]);
+    bounds_.lengths[k] = std::max(bounds_.lengths[k], least);
+  }
 }
 
 bool Preparation::divide_intersections_again() {

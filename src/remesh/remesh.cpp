@@ -745,12 +745,13 @@ bool has_many_slivers(const JudgedResult& judged) {
 }
 
 // Whether a result in which components share vertices where they meet is to be preferred to one in which they do not:
-// slivers are few, and fewer triangles cross, if these are no more than those of the input.
+// slivers are few, nothing crosses or no more than in the input, and then slivers are fewer.
 bool shares_well(const JudgedResult& shared, const JudgedResult& apart, const TriangleMesh& input) {
-  const std::size_t too_many = count_self_intersections(input) + 1;
+  const std::size_t allowed = count_self_intersections(input);
   const auto rank = [&](const JudgedResult& j) {
-    return std::tuple(!j.result.topology_matches, has_many_slivers(j),
-                      std::min(count_self_intersections(j.result.mesh), too_many), slivers_of(j));
+    const std::size_t crossings = count_self_intersections(j.result.mesh);
+    return std::tuple(!j.result.topology_matches, has_many_slivers(j), (crossings > 0) + (crossings > allowed),
+                      slivers_of(j), crossings);
   };
   return rank(shared) < rank(apart);
 }

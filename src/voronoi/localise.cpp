@@ -260,28 +260,43 @@ Localiser::Work::Work(const Surface& s) : surface(s) {
     for (const std::size_t* h = table.half_edges.begin(e); h != table.half_edges.end(e); ++h)
       edge_of[*h] = static_cast<Index>(e);
   const auto has_facet = [&](std::size_t half_edge) { return s.facet_of[half_edge / 3] != kNone; };
+  // Collinear triangles that hang together, and the half-edges of facets around them.
+  DisjointSets<Index> collinear(triangles.size());
+  for (std::size_t e = 0; e < table.edges.size(); ++e) {
+    const std::span at(table.half_edges.begin(e), table.half_edges.end(e));
+    const auto flat = std::find_if_not(at.begin(), at.end(), has_facet);
+    for (auto h = flat; h != at.end(); ++h)
+      if (!has_facet(*h)) collinear.join(static_cast<Index>(*flat / 3), static_cast<Index>(*h / 3));
+  }
+  const auto around_collinear = group_into_rows<Index>(triangles.size(), [&](const auto& put) {
+    for (std::size_t h = 0; h < half_edges; ++h) {
+      if (has_facet(h)) continue;
+      const Index edge = edge_of[h];
+      for (const std::size_t* other = table.half_edges.begin(edge); other != table.half_edges.end(edge); ++other)
+        if (has_facet(*other)) put(collinear.root(static_cast<Index>(h / 3)), static_cast<Index>(*other));
+    }
+  });
   direct.assign(half_edges, 1);
   across.resize(half_edges);
-  std::vector<std::size_t> behind;  // half-edges of collinear triangles
   std::vector<Index> others;
   for (std::size_t from = 0; from < half_edges; ++from) {
     if (!has_facet(from)) continue;
-    behind.assign(1, from);
     others.clear();
-    for (std::size_t i = 0; i < behind.size(); ++i) {
-      const Index edge = edge_of[behind[i]];
-      for (const std::size_t* h = table.half_edges.begin(edge); h != table.half_edges.end(edge); ++h) {
-        if (*h / 3 == behind[i] / 3 || *h / 3 == from / 3) continue;
-        if (has_facet(*h)) {
-          others.push_back(static_cast<Index>(*h));
-          continue;
-        }
-        direct[from] = 0;
-        for (std::size_t next = *h - *h % 3, k = 0; k < 3; ++k)
-          if (next + k != *h && std::find(behind.begin(), behind.end(), next + k) == behind.end())
-            behind.push_back(next + k);
+    const Index edge = edge_of[from];
+    for (const std::size_t* h = table.half_edges.begin(edge); h != table.half_edges.end(edge); ++h) {
+      if (has_facet(*h)) {
+        others.push_back(static_cast<Index>(*h));
+        continue;
       }
+      direct[from] = 0;
+      const Index behind = collinear.root(static_cast<Index>(*h / 3));
+      others.insert(others.end(), around_collinear.begin(behind), around_collinear.end(behind));
     }
+    if (!direct[from]) {
+      std::sort(others.begin(), others.end());
+      others.erase(std::unique(others.begin(), others.end()), others.end());
+    }
+    std::erase_if(others, [&](Index h) { return h / 3 == from / 3; });
     across.set(from, others);
   }
 }

@@ -346,6 +346,28 @@ TEST(SimplifiedFeatures, EndWhereTheyTurnBackToACornerOfTheirOwn) {
     }
 }
 
+// A crease that goes along both long edges of a needle takes the short way across it. Beside a wider
+// triangle it stays.
+TEST(SimplifiedFeatures, HaveNoTipsOfNeedles) {
+  for (const double height : {0.01, 1.0}) {
+    Chains net;
+    const Index a = net.corner({0, 0, 0}), d = net.corner({5, height + 1, 0}), b = 2, c = 3;
+    net.points.insert(net.points.end(), {{2, 0, 0}, {1.3, height, 0}});
+    net.graph.curves.push_back({{a, b, c, d}, false, FeatureKind::crease});
+    net.graph.edges = edges_of(net.graph.curves);
+    const bool is_needle = height < 0.1;
+    const std::vector<Triangle> needle{{a, b, c}};
+    const SimplifiedFeatures cut =
+        simplify_features(net.graph, net.points, {1}, 0.5, {}, vertex_neighbours(needle, net.points.size()));
+    if (is_needle) {
+      ASSERT_EQ(cut.graph.curves.size(), 1u);
+      EXPECT_EQ(cut.graph.curves[0].vertices, (std::vector<Index>{a, c, d}));
+    } else {
+      EXPECT_EQ(cut.graph.edges, net.graph.edges);
+    }
+  }
+}
+
 // A plane of squares on which two curves end near each other, at right angles, with a vertex in between.
 TEST(SimplifiedFeatures, MeetWhereTheyAllButDo) {
   const int n = 20;

@@ -96,6 +96,40 @@ TEST(ShortEdges, SmallPartStaysClosed) {
   EXPECT_EQ(topology.euler, 2);
 }
 
+// Beside others it is a point but for rounding.
+TEST(ShortEdges, SmallPartsGoBesideOthers) {
+  TriangleMesh small = icosphere(2);
+  for (Vec3& p : small.vertices) p *= kTiny;
+  const TriangleMesh large = icosphere(2);
+  TriangleMesh mesh = joined(small, large, {3, 0, 0});
+  const ShortEdges result = collapse_short_edges(mesh, kShort, {});
+  EXPECT_EQ(result.removed_parts, 1u);
+  EXPECT_EQ(result.removed_triangles, small.triangles.size());
+  EXPECT_EQ(mesh.triangles.size(), large.triangles.size());
+  ASSERT_EQ(mesh.vertices.size(), large.vertices.size());
+  for (Index v = 0; v < small.vertices.size(); ++v) EXPECT_EQ(result.vertex_of[v], kNone);
+  for (Index v = 0; v < large.vertices.size(); ++v) EXPECT_EQ(result.vertex_of[small.vertices.size() + v], v);
+  // A label's border is a line that nothing takes away, however short.
+  mesh = joined(small, large, {3, 0, 0});
+  mesh.labels.assign(mesh.triangles.size(), 0);
+  mesh.labels[0] = 1;
+  EXPECT_EQ(collapse_short_edges(mesh, kShort, {}).removed_parts, 0u);
+}
+
+// What is left of a fold has two sides and no inside.
+TEST(ShortEdges, FlatPartsGoIfTheyAreSmallerThanEdges) {
+  for (const double height : {0.1 * kShort, 100 * kShort})
+    for (const double flat_part : {0.1, 10.0}) {
+      TriangleMesh fold;
+      fold.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, height}, {0, 1, 0}};
+      fold.triangles = {{0, 1, 2}, {0, 2, 3}, {1, 0, 3}, {1, 3, 2}};
+      TriangleMesh mesh = joined(fold, icosphere(2), {5, 0, 0});
+      const bool goes = height < kShort && flat_part > 1;
+      EXPECT_EQ(collapse_short_edges(mesh, kShort, {}, flat_part).removed_parts, goes ? 1u : 0u);
+      EXPECT_EQ(topology_of(mesh).components, goes ? 1u : 2u);
+    }
+}
+
 // A strip narrower than rounding, in a square or alone.
 TriangleMesh strip() {
   TriangleMesh mesh;

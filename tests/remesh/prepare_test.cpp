@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -155,6 +156,19 @@ TEST(Preparation, BoundsFollowWhatIsSetApart) {
   EXPECT_GT(*densest, 100 * *std::min_element(prepared.density.begin(), prepared.density.end()));
   const Vec3& there = prepared.mesh.vertices[static_cast<std::size_t>(densest - prepared.density.begin())];
   EXPECT_LT(norm(preparation.apart().back(there) - preparation.apart().back(at)), 0.02);
+}
+
+// A cell of next to no area asks for edges of next to no length, which would take as many facets as there may be.
+TEST(Preparation, BoundsAreNoShorterThanRounding) {
+  RemeshOptions options;
+  options.vertices = 600;
+  const TriangleMesh sphere = icosphere(3);
+  Preparation preparation(OrderedInput(sphere, options), {});
+  preparation.bound({{sphere.vertices[0]}, {1e-30}});
+  const PreparedInput prepared = preparation.lay_down();
+  EXPECT_LT(prepared.mesh.triangles.size(), 20 * sphere.triangles.size());
+  const double highest = *std::max_element(prepared.density.begin(), prepared.density.end());
+  EXPECT_NEAR(prepared.unit_edge / std::pow(highest, 0.25), 1e-5 * bounding_box(sphere).diagonal(), 1e-8);
 }
 
 }  // namespace

@@ -57,6 +57,28 @@ TEST(LocalisedCells, AreTheCellsWhereTheseAreDisks) {
   EXPECT_TRUE(same_bits(localised.moments.cells, diagram.moments.cells));
 }
 
+// Triangles that meet in a row of collinear ones are neighbours, however many there are of these.
+TEST(LocalisedCells, GoOnBehindCollinearTriangles) {
+  constexpr Index kPoints = 600;
+  TriangleMesh plate;
+  plate.vertices = {{-1, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
+  plate.triangles = {{0, 1, 2}};
+  Index last = 0;
+  for (Index k = 1; k <= kPoints; ++k) {
+    const Index next = k == kPoints ? 1 : static_cast<Index>(plate.vertices.size());
+    if (next != 1) plate.vertices.push_back({-1 + 2.0 * k / kPoints, 0, 0});
+    if (last != 0) plate.triangles.push_back({0, last, next});
+    plate.triangles.push_back({next, last, 3});
+    last = next;
+  }
+  const Surface surface(plate);
+  const std::vector<Vec3> seeds = random_seeds(plate, 60, 5);
+  const Diagram diagram = diagram_of(surface, seeds, NeighbourSource::nearest);
+  Diagram localised = diagram;
+  EXPECT_EQ(Localiser(surface).localise(seeds, localised), 0u);
+  EXPECT_EQ(localised.polygons.labels, diagram.polygons.labels);
+}
+
 // Two sheets that are not joined: on each the diagram is that of the seeds on it alone, with triangles smaller than the
 // cells, and such as hold a dozen of them.
 TEST(LocalisedCells, OfTwoSheetsAreThoseOfEachSheetAlone) {
