@@ -25,8 +25,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Rounds of inserting seeds: with an optimisation of so many steps after each (thesis 4.4.4), while more than one cell
 // in kTooFew fails; then without. Every kFarRounds-th round of the latter inserts far points.
 constexpr int kGrowingRounds = 12, kGrowingSteps = 30, kRefiningRounds = 80, kFarRounds = 3;
-// Refining ends if so many rounds in a row have not led to fewer failures.
-constexpr int kPatience = 12;
+// Refining ends if so many rounds in a row have not led to fewer failures. Towards a hole of a hundredth of an edge the
+// distances of seeds are halved seven times, in two or three rounds each, and more and more cells fail until the last.
+constexpr int kPatience = 24;
 constexpr std::size_t kTooFew = 8;
 // Refining has no end if there are so many times the failures of the beginning, and kMostAdded more.
 constexpr std::size_t kDivergence = 2;
@@ -54,21 +55,35 @@ struct Place {
   double squared;
 };
 
-// A place to insert a seed at. Where its cell would reach a feature curve there, the other point may be better.
+// A place to insert a seed at. Where its cell would reach a feature curve there, the other point may be better, or a
+// corner of what fails.
 struct Candidate {
   Place place;
   Vec3 other;
+  std::vector<Vec3> corners;
+
+  const Vec3& farthest_from(const Vec3& p) const {
+    return *std::max_element(corners.begin(), corners.end(),
+                             [&](const Vec3& a, const Vec3& b) { return norm2(a - p) < norm2(b - p); });
+  }
 };
 
-// Nearest and farthest points of some part of a cell from its seed.
+// Nearest and farthest points of some part of a cell from its seed, and the corners of that part.
 struct Extremes {
   Place nearest{{}, kInfinity}, farthest{{}, -1};
+  std::vector<Vec3> corners;
 
   void near(const Vec3& p, const Vec3& seed) {
     if (const double d = norm2(p - seed); d < nearest.squared) nearest = {p, d};
   }
   void far(const Vec3& p, const Vec3& seed) {
     if (const double d = norm2(p - seed); d > farthest.squared) farthest = {p, d};
+    corners.push_back(p);
+  }
+  void add(const Extremes& x) {
+    if (x.nearest.squared < nearest.squared) nearest = x.nearest;
+    if (x.farthest.squared > farthest.squared) farthest = x.farthest;
+    corners.insert(corners.end(), x.corners.begin(), x.corners.end());
   }
 };
 
@@ -110,11 +125,7 @@ class Repair {
 
   Extremes extremes(const std::vector<std::size_t>& polygons, const Vec3& seed) const {
     Extremes all;
-    for (const std::size_t p : polygons) {
-      const Extremes x = extremes_of_polygon(p, seed);
-      if (x.nearest.squared < all.nearest.squared) all.nearest = x.nearest;
-      if (x.farthest.squared > all.farthest.squared) all.farthest = x.farthest;
-    }
+    for (const std::size_t p : polygons) all.add(extremes_of_polygon(p, seed));
     return all;
   }
 
@@ -130,11 +141,11 @@ class Repair {
     return x;
   }
 
-  void add(const Place& place, const Place& other) {
-    if (place.squared > 0 && place.squared < kInfinity) candidates_.push_back({place, other.point});
+  void add(const Place& place, const Place& other, std::vector<Vec3> corners) {
+    if (place.squared > 0 && place.squared < kInfinity) candidates_.push_back({place, other.point, std::move(corners)});
   }
-  void add(const Place& place) { add(place, place); }
-  void add(const Extremes& x) { far_ ? add(x.farthest, x.nearest) : add(x.nearest, x.farthest); }
+  void add(const Place& place) { add(place, place, {place.point}); }
+  void add(const Extremes& x) { far_ ? add(x.farthest, x.nearest, x.corners) : add(x.nearest, x.farthest, x.corners); }
 
   // All of the groups but that nearest to the seed.
   void add_others(const std::vector<Extremes>& groups) {
@@ -170,9 +181,7 @@ class Repair {
       for (const std::size_t p : part) {
         const Extremes x = extremes_of_polygon(p, seed);
         if (x.farthest.squared > all.farthest.squared) all.farthest = x.farthest;
-        if (dot(normal(p), facing) >= kTurned) continue;
-        if (x.nearest.squared < away.nearest.squared) away.nearest = x.nearest;
-        if (x.farthest.squared > away.farthest.squared) away.farthest = x.farthest;
+        if (dot(normal(p), facing) < kTurned) away.add(x);
       }
     if (away.farthest.squared >= 0) return add(away);
     if (c.loops > 1)
@@ -192,7 +201,7 @@ class Repair {
     for (const std::size_t e : v.places) {
       places.emplace_back();
       places.back().near(polygons_.vertices[e], seeds_[v.seeds[0]]);
-      places.back().farthest = places.back().nearest;
+      places.back().far(polygons_.vertices[e], seeds_[v.seeds[0]]);
     }
     add_others(places);
   }
@@ -340,8 +349,9 @@ class Control {
   }
 
   // Seeds from `first` on are new, at these points. Those whose cells cut a curve go to their other points, or, if they
-  // do so there as well, on the curve. Else the edges of two curves at a corner of a thin plate would be halved again
-  // and again, for the middle between their first seeds is nearer to the curves than to these.
+  // do so there as well, to the corners farthest from there, or at last on the curve. Else the edges of two curves at a
+  // corner of a thin plate would be halved again and again, for the middle between their first seeds is nearer to the
+  // curves than to these.
   void keep_off_curves(std::size_t first, const std::vector<Candidate>& points) {
     const auto cuts_of_new = [&] {
       std::vector<Cut> cuts = find_cuts();
@@ -350,8 +360,10 @@ class Control {
     };
     const std::vector<Cut> cuts = cuts_of_new();
     if (cuts.empty()) return;
-    const std::span<Vec3> positions = run_.seeds.edit_positions();
-    for (const Cut& cut : cuts) positions[cut.cell] = points[cut.cell - first].other;
+    const auto move_to = [&](const Cut& cut, const Vec3& p) { run_.seeds.edit_positions()[cut.cell] = p; };
+    for (const Cut& cut : cuts) move_to(cut, points[cut.cell - first].other);
+    for (const Cut& cut : cuts_of_new())
+      move_to(cut, points[cut.cell - first].farthest_from(run_.curves().point(cut.curve, cut.position)));
     for (const Cut& cut : cuts_of_new()) put_on_curve(cut.cell, cut);
   }
 

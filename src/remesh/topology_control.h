@@ -42,7 +42,7 @@ struct TopologyControlOptions {
 // - While an eighth of the cells fail there are too few seeds, and the optimisation runs again after each round (thesis
 //   4.4.4).
 // - Then without optimising, for a density that makes cells larger than the surface is thick would draw the new seeds
-//   away; it ends if a dozen rounds in a row have not led to fewer failures.
+//   away; it ends if two dozen rounds in a row have not led to fewer failures.
 // - When the property holds, seeds are removed elsewhere, as far as that gives the number asked for, and all, or those
 //   around what has changed, are optimised as far as the property goes on holding.
 // A curve that no cell of a seed on the surface cuts at the beginning stays so: such a cut counts as a failure, and the
