@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <queue>
 #include <set>
 #include <utility>
@@ -243,10 +244,10 @@ class Selection {
     while (!open.empty()) {
       const Index v = open.back();
       open.pop_back();
-      std::vector<Index> way;
-      if (!is_open(v, way)) continue;
-      if (!way.empty() && !is_wanted_beyond(v)) {
-        extend(v, way);
+      const std::optional<std::vector<Index>> way = way_from(v);
+      if (!way) continue;
+      if (!way->empty() && !is_wanted_beyond(v)) {
+        extend(v, *way);
         continue;
       }
       for (Dropped& dropped : dropped_) {
@@ -260,23 +261,22 @@ class Selection {
     }
   }
 
-  // Whether a single curve ends at this vertex, and the way from there to what stays, empty if there is none.
-  bool is_open(Index v, std::vector<Index>& way) const {
+  // Where a single curve ends, the way from there to what stays, empty if there is none.
+  std::optional<std::vector<Index>> way_from(Index v) const {
     const auto uses = at_.find(v);
-    if (uses == at_.end() || uses->second.size() != 1) return false;
+    if (uses == at_.end() || uses->second.size() != 1) return std::nullopt;
     const std::size_t c = uses->second[0].curve;
     const bool from_start = chosen_[c].curve.vertices.front() == v;
-    if (chosen_[c].curve.closed || (!from_start && chosen_[c].curve.vertices.back() != v)) return false;
-    way = way_to_kept(v, c, from_start);
-    return true;
+    if (chosen_[c].curve.closed || (!from_start && chosen_[c].curve.vertices.back() != v)) return std::nullopt;
+    return way_to_kept(v, c, from_start);
   }
 
   // Whether what went at this vertex leads to an end that has no other way.
   bool is_wanted_beyond(Index v) const {
     return std::any_of(dropped_.begin(), dropped_.end(), [&](const Dropped& dropped) {
-      std::vector<Index> way;
-      return dropped.ends_at(v) && cuts_.contains(dropped.end_beyond(v)) && is_open(dropped.end_beyond(v), way) &&
-             way.empty();
+      if (!dropped.ends_at(v) || !cuts_.contains(dropped.end_beyond(v))) return false;
+      const std::optional<std::vector<Index>> way = way_from(dropped.end_beyond(v));
+      return way && way->empty();
     });
   }
 

@@ -123,8 +123,7 @@ std::vector<Index> way_of(const FeatureGraph& graph, const CornerGraph::Forest& 
   return way;
 }
 
-// Cuts off tips where a chain turns back at less than 17 degrees along the edges of a needle, narrower than `limit`,
-// and spurs where it comes back along the same edge.
+// Cuts off tips where a chain turns back at less than 17 degrees along the edges of a needle, narrower than `limit`.
 void cut_needle_tips(std::vector<Index>& chain, const std::vector<Vec3>& vertices, const Csr<Index>& neighbours,
                      double limit) {
   const auto is_tip = [&](Index a, Index m, Index b) {
@@ -135,13 +134,11 @@ void cut_needle_tips(std::vector<Index>& chain, const std::vector<Vec3>& vertice
     return width < limit && width < 2 * kHairpin * std::min(to_a, to_b);
   };
   for (std::size_t k = 1; k + 1 < chain.size();) {
-    const bool is_spur = chain[k - 1] == chain[k + 1];
-    if (!is_spur && !is_tip(chain[k - 1], chain[k], chain[k + 1])) {
+    if (!is_tip(chain[k - 1], chain[k], chain[k + 1])) {
       ++k;
       continue;
     }
-    const auto at = chain.begin() + static_cast<std::ptrdiff_t>(k);
-    chain.erase(at, at + (is_spur ? 2 : 1));
+    chain.erase(chain.begin() + static_cast<std::ptrdiff_t>(k));
     k = std::max<std::size_t>(k - 1, 1);
   }
 }
@@ -174,10 +171,6 @@ std::vector<Candidate> led_to_representatives(const FeatureCurves& curves, std::
     chain.insert(chain.end(), onwards.begin() + 1, onwards.end());
     if (is_crease(candidate.curve) && neighbours.rows() > 0)
       cut_needle_tips(chain, vertices, neighbours, kShared * width);
-    if (chain.size() < 2) {
-      ++result.merged;
-      continue;
-    }
     candidate.curve.vertices = std::move(chain);
     candidate.length = length_of(candidate.curve.vertices, false, vertices);
     if (is_loop(candidate.curve) && is_crease(candidate.curve) && candidate.length < kLoopWidths * width) {

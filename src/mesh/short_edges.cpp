@@ -25,11 +25,12 @@ class Collapse {
     std::iota(result_.vertex_of.begin(), result_.vertex_of.end(), Index{0});
     for (const Triangle& t : mesh.triangles)
       for (std::size_t k = 0; k < 3; ++k) push_if_short(t[k], t[(k + 1) % 3]);
+    find_lines(given);
+    gone_.assign(mesh.triangles.size(), 0);
+    if (queue_.empty()) return;
     at_.resize(mesh.vertices.size());
     for (Index t = 0; t < mesh.triangles.size(); ++t)
       for (const Index v : mesh.triangles[t]) at_[v].push_back(t);
-    find_lines(given);
-    gone_.assign(mesh.triangles.size(), 0);
   }
 
   ShortEdges run() {
@@ -149,16 +150,8 @@ class Collapse {
     bool all_go = true;
     for (Index k = 0; k < left.size(); ++k)
       if (sets.is_root(k)) all_go &= (goes[k] = is_small(parts[k])) != 0;
-    // Lines stay, and parts at them.
-    for (std::size_t e = 0; e < table.edges.size(); ++e) {
-      const auto& [a, b] = table.edges[e];
-      const std::size_t* const h = table.half_edges.begin(e);
-      const std::size_t count = table.half_edges.size(e);
-      if (count != 2 || is_line(a, b))
-        for (std::size_t k = 0; k < count; ++k) goes[sets.root(static_cast<Index>(h[k] / 3))] = 0;
-    }
     if (all_go) return;
-    is_removed_.assign(at_.size(), 0);
+    is_removed_.assign(mesh_.vertices.size(), 0);
     for (Index k = 0; k < left.size(); ++k) {
       if (!goes[sets.root(k)]) continue;
       result_.removed_parts += sets.is_root(k);
@@ -171,7 +164,10 @@ class Collapse {
         for (const Index v : triangles[k]) is_removed_[v] = 0;
   }
 
+  // Not if there is a line at it.
   bool is_small(const std::vector<Triangle>& part) const {
+    for (const Triangle& v : part)
+      if (on_line_[v[0]] || on_line_[v[1]] || on_line_[v[2]]) return false;
     const double size = bounding_box(mesh_.vertices, part).diagonal();
     return size < length_ || (size < flat_part_ && is_flat(part));
   }

@@ -12,7 +12,7 @@ namespace bisector {
 struct ShortEdges {
   std::vector<Index> vertex_of;       // of each vertex, the one that it has become, kNone if it went with its part
   std::size_t collapsed = 0;          // edges, each with one vertex
-  std::size_t removed_parts = 0;      // each a point but for rounding
+  std::size_t removed_parts = 0;      // closed, without an inside but for rounding
   std::size_t removed_triangles = 0;  // those that had one of these edges, or were of such a part
 };
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,7 +12,6 @@
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "bisector/repair.h"
-#include "core/degenerate.h"
 #include "core/geometry.h"
 #include "features/normals.h"
 #include "features/wedges.h"
@@ -169,14 +167,9 @@ void rename_edges(const std::vector<Index>& vertex_of, std::vector<std::array<In
   std::erase_if(edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
 }
 
-// Of a uniform result.
-double mean_edge(const TriangleMesh& mesh, const RemeshOptions& options) {
-  if (options.edge_length > 0) return options.edge_length;
-  double area = 0;
-  for (const auto& [a, b, c] : mesh.triangles)
-    area += triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
-  const std::size_t count = std::max({options.vertices, options.seeds.size(), std::size_t{1}});
-  return std::sqrt(2 / std::numbers::sqrt3 * area / static_cast<double>(count));
+SizingTarget target_of(const RemeshOptions& options) {
+  if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
+  return {options.vertices, options.edge_length};
 }
 
 // Points that rounding left apart are one, too, if the surface stays of the same kind.
@@ -187,7 +180,8 @@ WeldResult weld_and_collapse(const OrderedInput& input, const Context& context) 
   std::vector<std::array<Index, 2>> given = options.features.given;
   rename_edges(welded.vertex_of, given);
   const double length = kRounding * bounding_box(welded.mesh).diagonal();
-  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given, mean_edge(welded.mesh, options));
+  const double edge = compute_sizing(welded.mesh, {}, target_of(options)).unit_edge;
+  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given, edge);
   if (shortest.collapsed + shortest.removed_parts == 0) return welded;
   for (Index& v : welded.vertex_of)
     if (v != kNone) v = shortest.vertex_of[v];
@@ -200,11 +194,6 @@ WeldResult weld_and_collapse(const OrderedInput& input, const Context& context) 
     context.warn(fmt::format("left out {} smaller than edges, with nothing inside but for rounding, {:g}",
                              plural(shortest.removed_parts, "closed part"), length));
   return welded;
-}
-
-SizingTarget target_of(const RemeshOptions& options) {
-  if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
-  return {options.vertices, options.edge_length};
 }
 
 }  // namespace

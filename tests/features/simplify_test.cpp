@@ -346,8 +346,8 @@ TEST(SimplifiedFeatures, EndWhereTheyTurnBackToACornerOfTheirOwn) {
     }
 }
 
-// A crease that goes along both long edges of a needle takes the short way across it. Beside a wider
-// triangle it stays.
+// A crease that goes along both long edges of a needle takes the short way across it. Beside a wider triangle it
+// stays.
 TEST(SimplifiedFeatures, HaveNoTipsOfNeedles) {
   for (const double height : {0.01, 1.0}) {
     Chains net;
