@@ -16,6 +16,7 @@
 #include "features/normals.h"
 #include "features/wedges.h"
 #include "mesh/corefine.h"
+#include "mesh/face_contacts.h"
 #include "mesh/joining.h"
 #include "mesh/short_edges.h"
 #include "mesh/spatial_order.h"
@@ -35,6 +36,8 @@ constexpr std::size_t kLeastForDensity = 3000;
 constexpr std::size_t kMostVertices = 100'000'000;
 // Of the diagonal: how far vertices are moved that would be at the same point.
 constexpr double kApart = 1e-7;
+// Of the diagonal: what is put between faces in contact. Files in single precision keep it.
+constexpr double kFacesApart = 2e-6;
 // Of triangles that cross, from which on they are more of a soup than components.
 constexpr std::size_t kMostPairs = 100'000;
 // Of the vertices wanted, for each edge that two components have in common: with fewer, nothing is left for the rest.
@@ -143,6 +146,15 @@ class Separation {
   std::size_t vertices_;
   std::vector<Index> original_;
 };
+
+// Triangles of two faces that coincide all intersect, and the more, the finer they are.
+void open_contacts(TriangleMesh& mesh, const Context& context) {
+  const double diagonal = bounding_box(mesh).diagonal();
+  const std::size_t count = open_face_contacts(mesh, kRounding * diagonal, kFacesApart * diagonal);
+  if (count > 0)
+    context.warn(fmt::format("parts of the surface lie on each other with {}; these are moved {:g} apart",
+                             plural(count, "triangle"), kFacesApart * diagonal));
+}
 
 void check_edges(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& edges, const char* what) {
   if (edges.empty()) return;
@@ -263,6 +275,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   const Separation separation(mesh_, branches, context);
   features.given = separation.edges(mesh_, features.given);
   keep_edges = separation.edges(mesh_, keep_edges);
+  if (!branches && options.keep_vertices.empty() && options.keep_edges.empty()) open_contacts(mesh_, context);
   features.given.insert(features.given.end(), keep_edges.begin(), keep_edges.end());
   if (options.energy == Energy::automatic) find_noise(features);
   features_ = detect_features(mesh_, features);
@@ -387,7 +400,9 @@ bool Preparation::plan_with_intersections() {
     const std::size_t vertices = unbounded_->sizing.vertices;
     plan(std::move(lengths));
     const std::vector<std::array<Index, 2>> crowded = divide_intersection_curves();
-    if (kLeastPerEdge * kept_lengths_.points.size() > vertices) break;
+    const std::size_t edges = kept_lengths_.points.size();
+    // Half of the edges may turn out to be crowded.
+    if (kLeastPerEdge * edges > (crowded.empty() ? vertices : 2 * vertices)) break;
     if (crowded.empty()) {
       lets_cross_ = !left_out.empty();
       uncut_ = std::move(uncut);
