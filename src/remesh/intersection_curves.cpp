@@ -216,6 +216,12 @@ IntersectionCurves::IntersectionCurves(const Corefinement& cut, const std::vecto
   edges_ = edges_of(copies());
 }
 
+double IntersectionCurves::length(const TriangleMesh& mesh) const {
+  double sum = 0;
+  for (const auto& [a, b] : edges_) sum += norm(mesh.vertices[b] - mesh.vertices[a]);
+  return sum;
+}
+
 void IntersectionCurves::put_into(FeatureGraph& simplified) const {
   std::set<Index> ends;
   std::vector<FeatureCurve> others;

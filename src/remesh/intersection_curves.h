@@ -30,6 +30,8 @@ class IntersectionCurves {
 
   bool empty() const { return curves_.empty(); }
   std::size_t size() const { return curves_.size(); }
+  // On the mesh as it was cut, all components together.
+  double length(const TriangleMesh& mesh) const;
 
   // To be told of features that were simplified for a coarse mesh (features/simplify.h), which get these curves as they
   // are, with their corners.

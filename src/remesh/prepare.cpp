@@ -42,6 +42,8 @@ constexpr double kFacesApart = 2e-6;
 constexpr std::size_t kMostPairs = 100'000;
 // Of the vertices wanted, for each edge that two components have in common: with fewer, nothing is left for the rest.
 constexpr std::size_t kLeastPerEdge = 8;
+// Of the curves in which components cross, by length: where more has no room they cross anyway.
+constexpr double kLeastShared = 0.5;
 // Plans without what there is no room for.
 constexpr int kMostRounds = 10;
 // Of the diagonal, from no rounding to that of six digits.
@@ -391,10 +393,13 @@ bool Preparation::plan_with_intersections() {
   features_ = split_features(features_, corefined->splits);
   const Preparation cut = *this;
   std::vector<std::array<Index, 2>> left_out;
+  double whole = 0;
   for (int round = 0; round < kMostRounds; ++round) {
     *this = cut;
     meeting_ = IntersectionCurves(*corefined, left_out, features_);
-    if (meeting_.empty()) break;
+    const double length = meeting_.length(mesh_);
+    whole = std::max(whole, length);
+    if (meeting_.empty() || length < kLeastShared * whole) break;
     sizing_.sharp = features_.edges;
     std::vector<double> lengths = lay_down_plain();
     const std::size_t vertices = unbounded_->sizing.vertices;
