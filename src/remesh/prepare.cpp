@@ -16,14 +16,12 @@
 #include "features/normals.h"
 #include "features/wedges.h"
 #include "mesh/corefine.h"
-#include "mesh/face_contacts.h"
 #include "mesh/joining.h"
-#include "mesh/short_edges.h"
 #include "mesh/spatial_order.h"
 #include "mesh/topology.h"
-#include "mesh/touching.h"
 #include "mesh/used_vertices.h"
 #include "remesh/detail.h"
+#include "remesh/mend_input.h"
 #include "remesh/sizing.h"
 #include "spatial/kd_tree.h"
 
@@ -34,10 +32,6 @@ namespace {
 // then is one that a mesh of so many vertices could follow.
 constexpr std::size_t kLeastForDensity = 3000;
 constexpr std::size_t kMostVertices = 100'000'000;
-// Of the diagonal: how far vertices are moved that would be at the same point.
-constexpr double kApart = 1e-7;
-// Of the diagonal: what is put between faces in contact. Files in single precision keep it.
-constexpr double kFacesApart = 2e-6;
 // Of triangles that cross, from which on they are more of a soup than components.
 constexpr std::size_t kMostPairs = 100'000;
 // Of the vertices wanted, for each edge that two components have in common: with fewer, nothing is left for the rest.
@@ -50,10 +44,6 @@ constexpr int kMostRounds = 10;
 constexpr double kRoundings[] = {0, 1e-7, 1e-6, kRounding};
 
 MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
-
-std::string plural(std::size_t count, const char* word) {
-  return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
-}
 
 void warn_of_weld(const WeldResult& welded, bool has_tolerance, const Context& context) {
   const std::size_t removed = welded.degenerate_triangles + welded.duplicate_triangles;
@@ -82,82 +72,6 @@ void orient_with_warning(TriangleMesh& mesh, const Context& context) {
   context.warn(fmt::format("turned {} over, to run the same way round as most", plural(count, "triangle")));
 }
 
-// Moves vertices that were one towards their own triangles, so that seeds there are not at the same point.
-void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
-  std::vector<char> is_split(mesh.vertices.size(), 0);
-  for (Index v = 0; v < original.size(); ++v)
-    if (original[v] != v) is_split[v] = is_split[original[v]] = 1;
-  std::vector<Vec3> inwards(mesh.vertices.size());
-  for (const Triangle& t : mesh.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!is_split[t[k]]) continue;
-      const Vec3 across = 0.5 * (mesh.vertices[t[(k + 1) % 3]] + mesh.vertices[t[(k + 2) % 3]]) - mesh.vertices[t[k]];
-      if (const double length = norm(across); length > 0) inwards[t[k]] += (1 / length) * across;
-    }
-  const double step = kApart * bounding_box(mesh).diagonal();
-  for (Index v = 0; v < original.size(); ++v)
-    if (const double length = norm(inwards[v]); is_split[v] && length > 0)
-      mesh.vertices[v] += (step / length) * inwards[v];
-}
-
-// Where parts of the surface touch in points, or solids along edges, they are meshed as if they did not: the surface is
-// a manifold then.
-class Separation {
- public:
-  Separation(TriangleMesh& mesh, bool branches, const Context& context)
-      : given_(mesh.vertices.size()), vertices_(given_) {
-    if (branches) return;
-    const MeshTopology touching = topology_of(mesh);
-    if (touching.manifold) return;
-    halved_ = halve_touching_edges(mesh);
-    vertices_ = mesh.vertices.size();
-    original_ = separate_touching(mesh);
-    if (original_.size() == vertices_) return;
-    part_fans(mesh, original_);
-    const std::size_t edges = touching.non_manifold_edges - topology_of(mesh).non_manifold_edges;
-    std::vector<std::string> where;
-    if (touching.non_manifold_vertices > 0) where.push_back("in " + plural(touching.non_manifold_vertices, "point"));
-    if (edges > 0) where.push_back("along " + plural(edges, "edge"));
-    context.warn(
-        fmt::format("parts of the surface touch {}; they are meshed as if they did not", fmt::join(where, " and ")));
-  }
-
-  std::vector<std::array<Index, 2>> edges(const TriangleMesh& mesh,
-                                          const std::vector<std::array<Index, 2>>& given) const {
-    if (mesh.vertices.size() == given_) return given;
-    return edges_after_separating(mesh, original_, edges_after_halving(given, halved_, vertices_));
-  }
-  // Of each vertex of a mesh, the one that it was; kNone of middles of edges.
-  std::vector<Index> originals(std::size_t vertices) const {
-    std::vector<Index> of = original_;
-    for (std::size_t v = of.size(); v < vertices; ++v) of.push_back(static_cast<Index>(v));
-    for (Index& v : of)
-      if (v >= given_) v = kNone;
-    return of;
-  }
-  // Of each vertex, from those that were given.
-  std::vector<double> values(std::vector<double> given) const {
-    for (const auto& [a, b] : halved_) given.push_back(0.5 * (given[a] + given[b]));
-    for (std::size_t v = vertices_; v < original_.size(); ++v) given.push_back(double{given[original_[v]]});
-    return given;
-  }
-
- private:
-  std::size_t given_;
-  std::vector<std::array<Index, 2>> halved_;
-  std::size_t vertices_;
-  std::vector<Index> original_;
-};
-
-// Triangles of two faces that coincide all intersect, and the more, the finer they are.
-void open_contacts(TriangleMesh& mesh, const Context& context) {
-  const double diagonal = bounding_box(mesh).diagonal();
-  const std::size_t count = open_face_contacts(mesh, kRounding * diagonal, kFacesApart * diagonal);
-  if (count > 0)
-    context.warn(fmt::format("parts of the surface lie on each other with {}; these are moved {:g} apart",
-                             plural(count, "triangle"), kFacesApart * diagonal));
-}
-
 void check_edges(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& edges, const char* what) {
   if (edges.empty()) return;
   const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
@@ -174,39 +88,17 @@ void check_kept(const TriangleMesh& mesh, const RemeshOptions& options) {
                               v < used.size() ? "on no triangle" : "none of the mesh's"));
 }
 
-// Those that are left when vertices have become others.
-void rename_edges(const std::vector<Index>& vertex_of, std::vector<std::array<Index, 2>>& edges) {
-  for (auto& edge : edges)
-    for (Index& v : edge) v = vertex_of[v];
-  std::erase_if(edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
-}
-
 SizingTarget target_of(const RemeshOptions& options) {
   if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
   return {options.vertices, options.edge_length};
 }
 
-// Points that rounding left apart are one, too, if the surface stays of the same kind.
-WeldResult weld_and_collapse(const OrderedInput& input, const Context& context) {
+WeldResult weld_and_mend(const OrderedInput& input, const Context& context) {
   const RemeshOptions& options = input.options;
   WeldResult welded = weld_and_orient(input.mesh, options.weld, context);
-  if (options.weld || !options.keep_vertices.empty() || !options.keep_edges.empty()) return welded;
-  std::vector<std::array<Index, 2>> given = options.features.given;
-  rename_edges(welded.vertex_of, given);
-  const double length = kRounding * bounding_box(welded.mesh).diagonal();
-  const double edge = compute_sizing(welded.mesh, {}, target_of(options)).unit_edge;
-  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given, edge);
-  if (shortest.collapsed + shortest.removed_parts == 0) return welded;
-  for (Index& v : welded.vertex_of)
-    if (v != kNone) v = shortest.vertex_of[v];
-  welded.merged_vertices += shortest.collapsed;
-  welded.degenerate_triangles += shortest.removed_triangles;
-  if (shortest.collapsed > 0)
-    context.warn(fmt::format("collapsed {} shorter than {:g}, {:g} of the diagonal, as rounding leaves them",
-                             plural(shortest.collapsed, "edge"), length, kRounding));
-  if (shortest.removed_parts > 0)
-    context.warn(fmt::format("left out {} smaller than edges, with nothing inside but for rounding, {:g}",
-                             plural(shortest.removed_parts, "closed part"), length));
+  if (!options.weld && options.keep_vertices.empty() && options.keep_edges.empty())
+    mend_rounding(welded, options.features.given, compute_sizing(welded.mesh, {}, target_of(options)).unit_edge,
+                  context);
   return welded;
 }
 
@@ -264,8 +156,8 @@ WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double
 }
 
 Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches)
-    : welded_(weld_and_collapse(ordered, context)), mesh_(std::exchange(welded_.mesh, {})),
-      sizing_(ordered.options.sizing), target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
+    : welded_(weld_and_mend(ordered, context)), mesh_(std::exchange(welded_.mesh, {})), sizing_(ordered.options.sizing),
+      target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
   const TriangleMesh& input = ordered.mesh;
   const RemeshOptions& options = ordered.options;
   const std::vector<Index>& vertex_of = welded_.vertex_of;
@@ -274,7 +166,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   std::vector<std::array<Index, 2>> keep_edges = options.keep_edges;
   for (auto* edges : {&features.given, &keep_edges}) rename_edges(vertex_of, *edges);
   const std::size_t vertices = mesh_.vertices.size();
-  const Separation separation(mesh_, branches, context);
+  const Separation separation = branches ? Separation(std::as_const(mesh_)) : Separation(mesh_, context);
   features.given = separation.edges(mesh_, features.given);
   keep_edges = separation.edges(mesh_, keep_edges);
   if (!branches && options.keep_vertices.empty() && options.keep_edges.empty()) open_contacts(mesh_, context);

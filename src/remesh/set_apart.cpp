@@ -124,6 +124,10 @@ void SetApart::move_back(const std::vector<Vec3>& corners, RemeshResult& result)
     Vec3& p = result.mesh.vertices[v];
     p = corner == kNone ? back(p) : corners[corner];
   }
+  report_back(result);
+}
+
+void SetApart::report_back(RemeshResult& result) const {
   for (TopologyFault& fault : result.faults) fault.position = back(fault.position);
   // What is in percent of the diagonal.
   FeatureDistance& off = result.features.distance;

@@ -34,6 +34,9 @@ class SetApart {
   // Where a point near the surface was before it was moved. Points that were not moved stay.
   Vec3 back(const Vec3& p) const;
 
+  // What a result of a mesh that was moved says of places and of percents of the diagonal, as of the mesh before.
+  void report_back(RemeshResult& result) const;
+
   // Moves the result of a mesh that was moved back. `corners` are those of its features, as they were before.
   void move_back(const std::vector<Vec3>& corners, RemeshResult& result) const;
 

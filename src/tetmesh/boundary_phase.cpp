@@ -88,6 +88,36 @@ RemeshResult remesh_boundary(TetRun& run, std::vector<Vec3> seeds, std::vector<S
   return result;
 }
 
+// By all that remeshing of surfaces does: parts that are near to each other are moved apart, edges become shorter where
+// results cross, and so on. It has no part in the sites inside, whose cells are pushed off it afterwards.
+RemeshResult remesh_anew(TetRun& run, std::size_t vertices) {
+  const Stopwatch watch;
+  const Surface& boundary = run.boundary.surface();
+  RemeshOptions options;
+  options.vertices = vertices;
+  options.weld = 0;
+  options.features.mode = FeatureMode::none;
+  options.features.given = run.features.edges;
+  options.tolerance = run.options.tolerance;
+  options.min_angle = run.options.min_angle;
+  options.energy = Energy::constrained;
+  options.compute = run.options.compute;
+  options.random_seed = run.options.random_seed;
+  if (!run.sized.lengths.empty()) {
+    options.sizing.kind = DensityKind::attribute;
+    options.sizing.attribute = run.sized.surface_density();
+  }
+  Context quiet = run.sites.context();
+  quiet.progress = nullptr;
+  RemeshResult result = remesh(boundary.mesh, options, quiet);
+  run.seconds_boundary += watch.seconds();
+  return result;
+}
+
+bool bounds_solid(const RemeshResult& surface) {
+  return surface.topology.closed && surface.topology.manifold && count_self_intersections(surface.mesh) == 0;
+}
+
 // Sites inside whose cells have come to the boundary join it while that has fewer than `room`; where the solid is thin,
 // all of them. True if any did.
 bool join_boundary(CvtRun& sites, double room, bool thin) {
@@ -133,13 +163,12 @@ RemeshResult finish_boundary(TetRun& run) {
   std::vector<char> inside(on_boundary.size(), 0);
   for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = on_boundary.kind(i) == Kind::interior;
   on_boundary.remove(inside);
+  const std::size_t count = on_boundary.size();
   RemeshResult surface = remesh_boundary(run, on_boundary.positions(), on_boundary.places(), true);
-  std::size_t crossings = count_self_intersections(surface.mesh);
   // Where sheets meet at a small angle, another pass may mend what one leaves, with more vertices.
-  if (crossings > 0 || !surface.topology.closed || !surface.topology.manifold) {
-    surface = remesh_boundary(run, surface.mesh.vertices, surface.places, true);
-    crossings = count_self_intersections(surface.mesh);
-  }
+  if (!bounds_solid(surface)) surface = remesh_boundary(run, surface.mesh.vertices, surface.places, true);
+  if (!bounds_solid(surface)) surface = remesh_anew(run, count);
+  const std::size_t crossings = count_self_intersections(surface.mesh);
   if (crossings > 0)
     throw Error(fmt::format(
         "the boundary of the result crosses itself at {} pairs of triangles: parts are thinner than its edges; "

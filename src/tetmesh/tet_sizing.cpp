@@ -91,17 +91,6 @@ TetEstimate estimate(const Extent& extent, const TetMesh& mesh, const TriangleMe
   return {kPerVolume * cubes + kPerArea * surface, squares / cubes};
 }
 
-double uniform_edge(const Extent& extent, double vertices) {
-  double low = 0,
-         high = std::cbrt(kPerVolume * extent.volume / vertices) + std::sqrt(kPerArea * extent.area / vertices);
-  while (estimate_tet_vertices(extent.volume, extent.area, high) > vertices) high *= 2;
-  for (int k = 0; k < 200 && high - low > 1e-12 * high; ++k) {
-    const double h = 0.5 * (low + high);
-    (estimate_tet_vertices(extent.volume, extent.area, h) > vertices ? low : high) = h;
-  }
-  return high;
-}
-
 bool positive(double x) { return x > 0 && std::isfinite(x); }
 
 void check_bounds(const SizingOptions& field, const SizingTarget& target) {
@@ -435,7 +424,7 @@ class Refiner {
 // The length and number that the target means where all edges are alike.
 void set_uniform(const Extent& extent, const SizingTarget& target, SizedSolid& sized) {
   const auto count = static_cast<double>(target.vertices);
-  sized.edge_length = target.vertices ? uniform_edge(extent, count) : target.edge_length;
+  sized.edge_length = target.vertices ? estimate_tet_edge(extent.volume, extent.area, count) : target.edge_length;
   const double wanted = target.vertices ? count : estimate_tet_vertices(extent.volume, extent.area, sized.edge_length);
   if (wanted > kMostVertices)
     throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones",
@@ -459,6 +448,16 @@ std::vector<double> SizedSolid::surface_density() const { return powers(lengths,
 
 double estimate_tet_vertices(double volume, double area, double h) {
   return kPerVolume * volume / (h * h * h) + kPerArea * area / (h * h);
+}
+
+double estimate_tet_edge(double volume, double area, double vertices) {
+  double low = 0, high = std::cbrt(kPerVolume * volume / vertices) + std::sqrt(kPerArea * area / vertices);
+  while (estimate_tet_vertices(volume, area, high) > vertices) high *= 2;
+  for (int k = 0; k < 200 && high - low > 1e-12 * high; ++k) {
+    const double h = 0.5 * (low + high);
+    (estimate_tet_vertices(volume, area, h) > vertices ? low : high) = h;
+  }
+  return high;
 }
 
 double estimate_cells(const SizedSolid& sized) {

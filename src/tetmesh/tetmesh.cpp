@@ -19,6 +19,7 @@
 #include "mesh/locate.h"
 #include "mesh/tet_topology.h"
 #include "mesh/topology.h"
+#include "remesh/mend_input.h"
 #include "remesh/prepare.h"
 #include "remesh/sizing.h"
 #include "tetmesh/boundary_phase.h"
@@ -29,6 +30,7 @@
 #include "tetmesh/inner_phase.h"
 #include "tetmesh/regions.h"
 #include "tetmesh/solid_plan.h"
+#include "tetmesh/solids_apart.h"
 #include "tetmesh/stand_ins.h"
 #include "tetmesh/tetgen.h"
 #include "tetmesh/walls.h"
@@ -271,8 +273,10 @@ std::vector<TetRegion> measure_regions(const TetMesh& input, const TetMesh& resu
 
 // Regions that are nowhere next to each other are told by where tetrahedra lie; others are meshed with their
 // interfaces.
-TetResult mesh_any(const TetMesh& mesh, const TetOptions& options, const Context& context) {
+TetResult mesh_any(const TetMesh& given, const TetOptions& options, const Context& context) {
   const Stopwatch watch;
+  const SolidsApart apart(given, options);
+  const TetMesh& mesh = apart.empty() ? given : apart.mesh();
   const Walls walls = find_walls(mesh);
   const bool divided = walls.divide();
   TetResult result = divided ? mesh_regions(mesh, walls, options, context) : mesh_solid(mesh, options, context);
@@ -281,6 +285,7 @@ TetResult mesh_any(const TetMesh& mesh, const TetOptions& options, const Context
   result.regions = measure_regions(mesh, result.mesh);
   if (divided)
     for (const TetRegion& region : result.regions) result.volume += region.input_volume;
+  apart.move_back(result);
   result.seconds.total = watch.seconds();
   return result;
 }
@@ -304,6 +309,16 @@ TetOptions follow_vertices(const TetOptions& options, const WeldResult& welded) 
   return moved;
 }
 
+// Solids that touch, or lie on each other with faces.
+void separate(TriangleMesh& mesh, TetOptions& options, const Context& context) {
+  const Separation separation(mesh, context);
+  options.features.given = separation.edges(mesh, options.features.given);
+  std::vector<double>& attribute = options.sizing.field.attribute;
+  if (!attribute.empty()) attribute = separation.values(std::move(attribute));
+  part_equal_points(mesh);
+  open_contacts(mesh, context);
+}
+
 }  // namespace
 
 TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, const Context& context) {
@@ -314,9 +329,13 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
   check_attribute(options, input.vertices.size());
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
-  const WeldResult welded = join_borders(input, options.weld);
+  WeldResult welded = join_borders(input, options.weld);
+  // Walls may be as near to each other as they like, and touch.
+  const bool mends = !options.enclosed_regions && !options.weld;
+  if (mends) mend_rounding(welded, options.features.given, 0, context);
+  TetOptions moved = follow_vertices(options, welded);
+  if (mends) separate(welded.mesh, moved, context);
   const TriangleMesh surface = options.enclosed_regions ? check_walls(welded.mesh) : check_surface(welded.mesh);
-  const TetOptions moved = follow_vertices(options, welded);
   context.report({"background tetrahedra", 0, 1, 0, 0, 0});
   const TetMesh background = (options.enclosed_regions ? tetgen_regions : tetgen_tets)(surface, {}, context).mesh;
   const double seconds = watch.seconds();

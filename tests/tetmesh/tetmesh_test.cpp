@@ -308,6 +308,87 @@ TEST(TetrahedraliseAgain, StartsFromGivenSeeds) {
   EXPECT_NEAR(measure_tet_quality(result.mesh).volume, 1, 1e-12);
 }
 
+// A sheet of thickness 0.004, rolled up to nine tenths of a circle of radius 0.3.
+TriangleMesh rolled_sheet() {
+  constexpr Index kSteps = 41, kRing = 2 * kSteps;
+  TriangleMesh mesh;
+  for (const double z : {0.0, 0.25})
+    for (const double r : {0.304, 0.3})
+      for (Index k = 0; k < kSteps; ++k) {
+        const Index i = r > 0.3 ? k : kSteps - 1 - k;
+        const double angle = 1.8 * std::numbers::pi * i / (kSteps - 1);
+        mesh.vertices.push_back({r * std::cos(angle), r * std::sin(angle), z});
+      }
+  const auto quad = [&](Index a, Index b, Index c, Index d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  for (Index i = 0; i < kRing; ++i) quad(i, (i + 1) % kRing, kRing + (i + 1) % kRing, kRing + i);
+  for (Index i = 0; i + 1 < kSteps; ++i) {
+    const Index across = kRing - 1 - i;
+    quad(i, across, across - 1, i + 1);
+    quad(kRing + i, kRing + i + 1, kRing + across - 1, kRing + across);
+  }
+  return mesh;
+}
+
+// Where the sites alone leave a boundary that crosses itself, it is remeshed as surfaces are.
+TEST(TetrahedraliseThinSolids, HaveABoundaryWhereSheetsAreNear) {
+  TetOptions options = options_for(250);
+  options.iterations = 100;
+  options.min_dihedral = 0;
+  const TetResult result = tetrahedralise(rolled_sheet(), options);
+  EXPECT_EQ(measure_tet_quality(result.mesh).inverted, 0u);
+  const TriangleMesh boundary = boundary_mesh(result.mesh);
+  EXPECT_EQ(count_self_intersections(boundary), 0u);
+  const MeshTopology topology = analyse_topology(boundary.triangles, boundary.vertices.size());
+  EXPECT_TRUE(topology.manifold && topology.closed);
+  EXPECT_EQ(topology.euler, 2);
+}
+
+// Sites of one would own parts of the other, and their facing sides count as details.
+TEST(TetrahedraliseNear, SolidsAreFilledEachForItself) {
+  TriangleMesh slab = box(1);
+  for (Vec3& p : slab.vertices) p = {2 * p.x + 1.0 / 3, 2 * p.y, p.z};
+  const TriangleMesh input = joined(slab, slab, {0.1, 0.1, 1.001});
+  const TetResult result = tetrahedralise(input, options_for(250));
+  EXPECT_NEAR(measure_tet_quality(result.mesh).volume, 8, 1e-9);
+  EXPECT_EQ(result.boundary.features.broken, 0u);
+  EXPECT_EQ(result.detail.merged, 0u);
+  for (const Vec3& corner : input.vertices)
+    EXPECT_NE(std::find(result.mesh.vertices.begin(), result.mesh.vertices.end(), corner), result.mesh.vertices.end());
+}
+
+// Moved apart by rounding, as in remeshing of surfaces.
+TEST(TetrahedraliseTouching, SolidsAreFilledEachForItself) {
+  const TriangleMesh cube = box(1);
+  const Vec3 in_a_point{1, 1, 1}, along_an_edge{1, 1, 0}, with_a_face{0.25, 0.25, 1};
+  for (const Vec3& offset : {in_a_point, along_an_edge, with_a_face}) {
+    const TetResult result = tetrahedralise(joined(cube, cube, offset), options_for(150));
+    EXPECT_EQ(measure_tet_quality(result.mesh).inverted, 0u);
+    EXPECT_NEAR(measure_tet_quality(result.mesh).volume, 2, 1e-4);
+    const TriangleMesh boundary = boundary_mesh(result.mesh);
+    EXPECT_EQ(count_self_intersections(boundary), 0u);
+    const MeshTopology topology = analyse_topology(boundary.triangles, boundary.vertices.size());
+    EXPECT_TRUE(topology.manifold && topology.closed);
+    EXPECT_EQ(topology.components, 2u);
+  }
+}
+
+TEST(TetrahedraliseTouching, TrianglesWithoutAreaAreMended) {
+  TriangleMesh mesh = box(2);
+  // A corner on an edge of the neighbour, which keeps its edge.
+  const auto [a, b, c] = mesh.triangles[0];
+  const auto middle = static_cast<Index>(mesh.vertices.size());
+  mesh.vertices.push_back(0.5 * (mesh.vertices[a] + mesh.vertices[b]));
+  mesh.triangles[0] = {a, middle, c};
+  mesh.triangles.push_back({middle, b, c});
+  mesh.triangles.push_back({a, b, middle});
+  const TetResult result = tetrahedralise(mesh, options_for(150));
+  EXPECT_NEAR(measure_tet_quality(result.mesh).volume, 1, 1e-9);
+  EXPECT_GE(measure_tet_quality(result.mesh).dihedral_min, 10);
+}
+
 TEST(TetrahedraliseErrors, RefusesWhatBoundsNoSolid) {
   EXPECT_THROW(tetrahedralise(wavy_patch(8), options_for(100)), Error);  // open
   EXPECT_THROW(tetrahedralise(pages(), options_for(100)), Error);        // open and not manifold

@@ -1,0 +1,120 @@
+#include "mesh/caps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <queue>
+#include <tuple>
+#include <unordered_set>
+#include <utility>
+
+#include "core/geometry.h"
+#include "mesh/stars.h"
+#include "mesh/topology.h"
+
+namespace bisector {
+namespace {
+
+class CapFlips {
+ public:
+  CapFlips(TriangleMesh& mesh, double height, const std::vector<std::array<Index, 2>>& given)
+      : mesh_(mesh), height_(height) {
+    for (Index t = 0; t < mesh.triangles.size(); ++t) push_if_low(t);
+    if (queue_.empty()) return;
+    for (const auto* edges : {&given, &std::as_const(mesh.feature_edges)})
+      for (const auto& [a, b] : *edges) stays_.insert(edge_key(a, b));
+    at_.resize(mesh.vertices.size());
+    for (Index t = 0; t < mesh.triangles.size(); ++t)
+      for (const Index v : mesh.triangles[t]) at_[v].push_back(t);
+  }
+
+  std::size_t run() {
+    std::size_t flipped = 0;
+    while (!queue_.empty()) {
+      const auto [height, t] = queue_.top();
+      queue_.pop();
+      if (height == height_of(mesh_.triangles[t])) flipped += flip(t);
+    }
+    return flipped;
+  }
+
+ private:
+  using Low = std::tuple<double, Index>;  // height, triangle
+
+  const Vec3& at(Index v) const { return mesh_.vertices[v]; }
+
+  // The first of the two corners of the longest edge.
+  std::size_t longest_edge(const Triangle& v) const {
+    std::array<double, 3> squares;
+    for (std::size_t k = 0; k < 3; ++k) squares[k] = norm2(at(v[(k + 1) % 3]) - at(v[k]));
+    return static_cast<std::size_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
+  }
+
+  // Over the longest edge.
+  double height_of(const Triangle& v) const {
+    const std::size_t k = longest_edge(v);
+    const double length = norm(at(v[(k + 1) % 3]) - at(v[k]));
+    return length > 0 ? norm(normal_of(v)) / length : 0;
+  }
+
+  Vec3 normal_of(const Triangle& v) const { return twice_area_normal(at(v[0]), at(v[1]), at(v[2])); }
+
+  void push_if_low(Index t) {
+    if (const double height = height_of(mesh_.triangles[t]); height < height_) queue_.push({height, t});
+  }
+
+  bool flip(Index cap) {
+    const Triangle low = mesh_.triangles[cap];
+    const std::size_t k = longest_edge(low);
+    const Index a = low[k], b = low[(k + 1) % 3], apex = low[(k + 2) % 3];
+    if (a == b || b == apex || apex == a || stays_.contains(edge_key(a, b))) return false;
+    Index beside = kNone;
+    for (const Index t : at_[a]) {
+      if (t == cap || !has_corner(mesh_.triangles[t], b)) continue;
+      if (beside != kNone) return false;
+      beside = t;
+    }
+    if (beside == kNone) return false;
+    const Triangle over = mesh_.triangles[beside];
+    const Index other = over[0] + over[1] + over[2] - a - b;
+    if (other == apex || shares_edge(apex, other)) return false;
+    Triangle first = over, second = over;
+    std::replace(first.begin(), first.end(), b, apex);
+    std::replace(second.begin(), second.end(), a, apex);
+    const Vec3 up = normal_of(over);
+    if (!(dot(normal_of(first), up) > 0 && dot(normal_of(second), up) > 0)) return false;
+    // So that this comes to an end.
+    if (!(std::min(height_of(first), height_of(second)) > height_of(low))) return false;
+    mesh_.triangles[cap] = first;
+    mesh_.triangles[beside] = second;
+    std::erase(at_[b], cap);
+    std::erase(at_[a], beside);
+    at_[other].push_back(cap);
+    at_[apex].push_back(beside);
+    if (!mesh_.face_of_triangle.empty()) mesh_.face_of_triangle[cap] = mesh_.face_of_triangle[beside];
+    if (!mesh_.labels.empty()) mesh_.labels[cap] = mesh_.labels[beside];
+    // What was in the way of others around may be gone.
+    for (const Index v : {a, b, apex, other})
+      for (const Index t : at_[v]) push_if_low(t);
+    return true;
+  }
+
+  bool shares_edge(Index v, Index w) const {
+    return std::any_of(at_[v].begin(), at_[v].end(), [&](Index t) { return has_corner(mesh_.triangles[t], w); });
+  }
+
+  TriangleMesh& mesh_;
+  const double height_;
+  std::priority_queue<Low, std::vector<Low>, std::greater<>> queue_;
+  std::unordered_set<std::uint64_t> stays_;
+  std::vector<std::vector<Index>> at_;  // triangles of each vertex
+};
+
+}  // namespace
+
+std::size_t flip_caps(TriangleMesh& mesh, double height, const std::vector<std::array<Index, 2>>& given) {
+  return CapFlips(mesh, height, given).run();
+}
+
+}  // namespace bisector

@@ -1,0 +1,141 @@
+#include "remesh/mend_input.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "core/geometry.h"
+#include "mesh/caps.h"
+#include "mesh/face_contacts.h"
+#include "mesh/joining.h"
+#include "mesh/short_edges.h"
+#include "mesh/topology.h"
+#include "mesh/touching.h"
+
+namespace bisector {
+namespace {
+
+// Of the diagonal: how far vertices are moved that would be at the same point.
+constexpr double kApart = 1e-7;
+// Of the diagonal: what is put between faces in contact. Files in single precision keep it.
+constexpr double kFacesApart = 2e-6;
+
+MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
+
+// Moves vertices that were one towards their own triangles, so that seeds there are not at the same point.
+void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
+  std::vector<char> is_split(mesh.vertices.size(), 0);
+  for (Index v = 0; v < original.size(); ++v)
+    if (original[v] != v) is_split[v] = is_split[original[v]] = 1;
+  std::vector<Vec3> inwards(mesh.vertices.size());
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!is_split[t[k]]) continue;
+      const Vec3 across = 0.5 * (mesh.vertices[t[(k + 1) % 3]] + mesh.vertices[t[(k + 2) % 3]]) - mesh.vertices[t[k]];
+      if (const double length = norm(across); length > 0) inwards[t[k]] += (1 / length) * across;
+    }
+  const double step = kApart * bounding_box(mesh).diagonal();
+  for (Index v = 0; v < original.size(); ++v)
+    if (const double length = norm(inwards[v]); is_split[v] && length > 0)
+      mesh.vertices[v] += (step / length) * inwards[v];
+}
+
+}  // namespace
+
+std::string plural(std::size_t count, const char* word) {
+  return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
+}
+
+void rename_edges(const std::vector<Index>& vertex_of, std::vector<std::array<Index, 2>>& edges) {
+  for (auto& edge : edges)
+    for (Index& v : edge) v = vertex_of[v];
+  std::erase_if(edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+}
+
+void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, double flat_part,
+                   const Context& context) {
+  rename_edges(welded.vertex_of, given);
+  const double length = kRounding * bounding_box(welded.mesh).diagonal();
+  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given, flat_part);
+  if (shortest.collapsed + shortest.removed_parts > 0) {
+    rename_edges(shortest.vertex_of, given);
+    for (Index& v : welded.vertex_of)
+      if (v != kNone) v = shortest.vertex_of[v];
+    welded.merged_vertices += shortest.collapsed;
+    welded.degenerate_triangles += shortest.removed_triangles;
+  }
+  if (shortest.collapsed > 0)
+    context.warn(fmt::format("collapsed {} shorter than {:g}, {:g} of the diagonal, as rounding leaves them",
+                             plural(shortest.collapsed, "edge"), length, kRounding));
+  if (shortest.removed_parts > 0)
+    context.warn(fmt::format("left out {} smaller than edges, with nothing inside but for rounding, {:g}",
+                             plural(shortest.removed_parts, "closed part"), length));
+  if (const std::size_t flipped = flip_caps(welded.mesh, length, given); flipped > 0)
+    context.warn(fmt::format("flipped {} of triangles lower than {:g}", plural(flipped, "edge"), length));
+}
+
+Separation::Separation(TriangleMesh& mesh, const Context& context) : Separation(mesh) {
+  const MeshTopology touching = topology_of(mesh);
+  if (touching.manifold) return;
+  halved_ = halve_touching_edges(mesh);
+  vertices_ = mesh.vertices.size();
+  original_ = separate_touching(mesh);
+  if (original_.size() == vertices_) return;
+  part_fans(mesh, original_);
+  const std::size_t edges = touching.non_manifold_edges - topology_of(mesh).non_manifold_edges;
+  std::vector<std::string> where;
+  if (touching.non_manifold_vertices > 0) where.push_back("in " + plural(touching.non_manifold_vertices, "point"));
+  if (edges > 0) where.push_back("along " + plural(edges, "edge"));
+  context.warn(
+      fmt::format("parts of the surface touch {}; they are meshed as if they did not", fmt::join(where, " and ")));
+}
+
+std::vector<std::array<Index, 2>> Separation::edges(const TriangleMesh& mesh,
+                                                    const std::vector<std::array<Index, 2>>& given) const {
+  if (mesh.vertices.size() == given_) return given;
+  return edges_after_separating(mesh, original_, edges_after_halving(given, halved_, vertices_));
+}
+
+std::vector<Index> Separation::originals(std::size_t vertices) const {
+  std::vector<Index> of = original_;
+  for (std::size_t v = of.size(); v < vertices; ++v) of.push_back(static_cast<Index>(v));
+  for (Index& v : of)
+    if (v >= given_) v = kNone;
+  return of;
+}
+
+std::vector<double> Separation::values(std::vector<double> given) const {
+  for (const auto& [a, b] : halved_) given.push_back(0.5 * (given[a] + given[b]));
+  for (std::size_t v = vertices_; v < original_.size(); ++v) given.push_back(double{given[original_[v]]});
+  return given;
+}
+
+void part_equal_points(TriangleMesh& mesh) {
+  if (topology_of(mesh).boundary_edges > 0) return;
+  std::vector<Index> order(mesh.vertices.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  const auto key = [&](Index v) {
+    const Vec3& p = mesh.vertices[v];
+    return std::tuple(p.x, p.y, p.z, v);
+  };
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return key(a) < key(b); });
+  std::vector<Index> first(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k)
+    first[order[k]] =
+        k > 0 && mesh.vertices[order[k - 1]] == mesh.vertices[order[k]] ? Index{first[order[k - 1]]} : order[k];
+  part_fans(mesh, first);
+}
+
+void open_contacts(TriangleMesh& mesh, const Context& context) {
+  const double diagonal = bounding_box(mesh).diagonal();
+  const std::size_t count = open_face_contacts(mesh, kRounding * diagonal, kFacesApart * diagonal);
+  if (count > 0)
+    context.warn(fmt::format("parts of the surface lie on each other with {}; these are moved {:g} apart",
+                             plural(count, "triangle"), kFacesApart * diagonal));
+}
+
+}  // namespace bisector
