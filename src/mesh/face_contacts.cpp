@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "core/geometry.h"
@@ -15,7 +17,7 @@
 namespace bisector {
 namespace {
 
-using TriangleBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, Index>;
+using FacetBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::size_t>;
 
 // Of normals that face each other; triangles that are small beside their rounding are not parallel.
 constexpr double kFacing = -0.9;
@@ -61,6 +63,71 @@ bool overlap(const Facet& f, const Facet& g, const Vec3& normal, double least) {
   return true;
 }
 
+// How far the smaller of two facets lies behind the larger, if they are in contact.
+std::optional<double> depth_of_contact(const Facet& large, const Facet& small, double rounding) {
+  if (!(dot(large.normal, small.normal) < kFacing)) return std::nullopt;
+  double depth = 0;
+  for (const Vec3& p : small.corners) {
+    const double height = dot(large.normal, p - large.corners[0]);
+    if (std::abs(height) > rounding) return std::nullopt;
+    depth = std::max(depth, -height);
+  }
+  if (!overlap(large, small, large.normal, rounding)) return std::nullopt;
+  return depth;
+}
+
+Box enlarged(Box box, double by) {
+  for (int k = 0; k < 3; ++k) {
+    box.lo[k] -= by;
+    box.hi[k] += by;
+  }
+  return box;
+}
+
+bool intersect(const Box& a, const Box& b) {
+  for (int k = 0; k < 3; ++k)
+    if (a.lo[k] > b.hi[k] || b.lo[k] > a.hi[k]) return false;
+  return true;
+}
+
+// Of each component a box that holds all that its own box has in common with those of others, an empty one (lo > hi) if
+// nothing is. Nothing at all if no two have.
+std::vector<Box> where_components_meet(const TriangleMesh& mesh, const std::vector<Index>& component, double rounding) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const Box nothing{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
+  const auto add = [](Box& box, const Box& other) {
+    for (int k = 0; k < 3; ++k) {
+      box.lo[k] = std::min(box.lo[k], other.lo[k]);
+      box.hi[k] = std::max(box.hi[k], other.hi[k]);
+    }
+  };
+  std::vector<Box> whole;
+  for (Index v = 0; v < component.size(); ++v) {
+    if (component[v] == kNone) continue;
+    if (component[v] >= whole.size()) whole.resize(component[v] + std::size_t{1}, nothing);
+    add(whole[component[v]], {mesh.vertices[v], mesh.vertices[v]});
+  }
+  std::vector<FacetBox> boxes;
+  for (std::size_t c = 0; c < whole.size(); ++c) {
+    const auto& [lo, hi] = enlarged(whole[c], rounding);
+    boxes.emplace_back(CGAL::Bbox_3(lo.x, lo.y, lo.z, hi.x, hi.y, hi.z), c);
+  }
+  std::vector<Box> meeting(whole.size(), nothing);
+  bool any = false;
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const FacetBox& a, const FacetBox& b) {
+    any = true;
+    Box common = enlarged(whole[a.info()], rounding);
+    const Box other = enlarged(whole[b.info()], rounding);
+    for (int k = 0; k < 3; ++k) {
+      common.lo[k] = std::max(common.lo[k], other.lo[k]);
+      common.hi[k] = std::min(common.hi[k], other.hi[k]);
+    }
+    for (const std::size_t c : {a.info(), b.info()}) add(meeting[c], common);
+  });
+  if (!any) meeting.clear();
+  return meeting;
+}
+
 // How a vertex has to move: by `distance` at least against the normal.
 struct Recession {
   Vec3 normal;
@@ -101,43 +168,35 @@ Vec3 way_of(const std::vector<Recession>& all) {
 
 std::size_t open_face_contacts(TriangleMesh& mesh, double rounding, double apart) {
   const std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
-  const Index first = mesh.triangles.empty() ? kNone : component[mesh.triangles[0][0]];
-  if (std::all_of(component.begin(), component.end(), [&](Index c) { return c == first || c == kNone; })) return 0;
-  std::vector<Facet> facets(mesh.triangles.size());
-  std::vector<TriangleBox> boxes;
-  for (Index t = 0; t < facets.size(); ++t) {
-    facets[t] = facet_of(mesh, t);
-    CGAL::Bbox_3 box;
-    for (const Vec3& p : facets[t].corners)
-      box +=
-          CGAL::Bbox_3(p.x - rounding, p.y - rounding, p.z - rounding, p.x + rounding, p.y + rounding, p.z + rounding);
-    boxes.emplace_back(box, t);
+  const std::vector<Box> meeting = where_components_meet(mesh, component, rounding);
+  std::vector<Facet> facets;
+  std::vector<Index> triangle;  // of each facet
+  std::vector<FacetBox> boxes;
+  for (Index t = 0; !meeting.empty() && t < mesh.triangles.size(); ++t) {
+    const Facet facet = facet_of(mesh, t);
+    const Box box = enlarged(bounding_box(std::vector<Vec3>(facet.corners.begin(), facet.corners.end())), rounding);
+    if (!intersect(box, meeting[component[mesh.triangles[t][0]]])) continue;
+    boxes.emplace_back(CGAL::Bbox_3(box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z), facets.size());
+    facets.push_back(facet);
+    triangle.push_back(t);
   }
   std::vector<double> recedes(facets.size(), 0);
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
-    const std::array<Index, 2> pair{a.info(), b.info()};
-    if (component[mesh.triangles[pair[0]][0]] == component[mesh.triangles[pair[1]][0]]) return;
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const FacetBox& a, const FacetBox& b) {
+    const std::array<std::size_t, 2> pair{a.info(), b.info()};
+    if (component[mesh.triangles[triangle[pair[0]]][0]] == component[mesh.triangles[triangle[pair[1]]][0]]) return;
     const bool swap = facets[pair[0]].area < facets[pair[1]].area;
-    const Facet &large = facets[pair[swap]], &small = facets[pair[!swap]];
-    if (!(dot(large.normal, small.normal) < kFacing)) return;
-    double depth = 0;
-    for (const Vec3& p : small.corners) {
-      const double height = dot(large.normal, p - large.corners[0]);
-      if (std::abs(height) > rounding) return;
-      depth = std::max(depth, -height);
-    }
-    if (!overlap(large, small, large.normal, rounding)) return;
-    for (const Index t : pair) recedes[t] = std::max(recedes[t], 0.5 * (depth + apart));
+    const std::optional<double> depth = depth_of_contact(facets[pair[swap]], facets[pair[!swap]], rounding);
+    if (!depth) return;
+    for (const std::size_t f : pair) recedes[f] = std::max(recedes[f], 0.5 * (*depth + apart));
   });
-  std::vector<std::vector<Recession>> of_vertex(mesh.vertices.size());
   std::size_t count = 0;
-  for (Index t = 0; t < facets.size(); ++t) {
-    if (recedes[t] == 0) continue;
+  std::unordered_map<Index, std::vector<Recession>> of_vertex;
+  for (std::size_t f = 0; f < facets.size(); ++f) {
+    if (recedes[f] == 0) continue;
     ++count;
-    for (const Index v : mesh.triangles[t]) add(of_vertex[v], facets[t].normal, recedes[t]);
+    for (const Index v : mesh.triangles[triangle[f]]) add(of_vertex[v], facets[f].normal, recedes[f]);
   }
-  for (Index v = 0; v < of_vertex.size(); ++v)
-    if (!of_vertex[v].empty()) mesh.vertices[v] += way_of(of_vertex[v]);
+  for (const auto& [v, recessions] : of_vertex) mesh.vertices[v] += way_of(recessions);
   return count;
 }
 
