@@ -179,7 +179,8 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
 
   if (!sizing_.attribute.empty()) {
     std::vector<double> values(vertices);
-    for (std::size_t v = input.vertices.size(); v-- > 0;) values[vertex_of[v]] = sizing_.attribute[v];
+    for (std::size_t v = input.vertices.size(); v-- > 0;)
+      if (vertex_of[v] != kNone) values[vertex_of[v]] = sizing_.attribute[v];
     sizing_.attribute = separation.values(std::move(values));
   }
   sizing_.sharp = features_.edges;

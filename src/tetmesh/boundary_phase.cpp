@@ -11,6 +11,7 @@
 #include "bisector/error.h"
 #include "bisector/quality.h"
 #include "core/stopwatch.h"
+#include "mesh/topology.h"
 #include "remesh/remesh.h"
 #include "spatial/hilbert.h"
 
@@ -97,7 +98,9 @@ RemeshResult remesh_anew(TetRun& run, std::size_t vertices) {
   options.vertices = vertices;
   options.weld = 0;
   options.features.mode = FeatureMode::none;
-  options.features.given = run.features.edges;
+  const EdgeTable table = edge_table(boundary.mesh.triangles, boundary.mesh.vertices.size());
+  for (const auto& edge : run.features.edges)
+    if (std::binary_search(table.edges.begin(), table.edges.end(), edge)) options.features.given.push_back(edge);
   options.tolerance = run.options.tolerance;
   options.min_angle = run.options.min_angle;
   options.energy = Energy::constrained;

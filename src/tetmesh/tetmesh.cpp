@@ -290,22 +290,23 @@ TetResult mesh_any(const TetMesh& given, const TetOptions& options, const Contex
   return result;
 }
 
+void check_given(const TetOptions& options, std::size_t vertices) {
+  for (const auto& edge : options.features.given)
+    for (const Index v : edge)
+      if (v >= vertices) throw Error(fmt::format("feature edge of vertex {}: the mesh has none; correct it", v));
+}
+
 // Densities and feature edges given for the vertices before welding, as those of the vertices after it.
 TetOptions follow_vertices(const TetOptions& options, const WeldResult& welded) {
   TetOptions moved = options;
   std::vector<double>& attribute = moved.sizing.field.attribute;
   if (!attribute.empty()) {
     std::vector<double> values(welded.mesh.vertices.size());
-    for (std::size_t v = welded.vertex_of.size(); v-- > 0;) values[welded.vertex_of[v]] = attribute[v];
+    for (std::size_t v = welded.vertex_of.size(); v-- > 0;)
+      if (welded.vertex_of[v] != kNone) values[welded.vertex_of[v]] = attribute[v];
     attribute = std::move(values);
   }
-  for (auto& edge : moved.features.given)
-    for (Index& v : edge) {
-      if (v >= welded.vertex_of.size())
-        throw Error(fmt::format("feature edge of vertex {}: the mesh has none; correct it", v));
-      v = welded.vertex_of[v];
-    }
-  std::erase_if(moved.features.given, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
+  rename_edges(welded.vertex_of, moved.features.given);
   return moved;
 }
 
@@ -327,6 +328,7 @@ TetResult tetrahedralise(const TriangleMesh& input, const TetOptions& options, c
   require_moderate_model(input.vertices, "vertex");
   require_moderate(options.seeds, "seed");
   check_attribute(options, input.vertices.size());
+  check_given(options, input.vertices.size());
   std::optional<ThreadLimit> limit;
   if (options.threads) limit.emplace(options.threads);
   WeldResult welded = join_borders(input, options.weld);

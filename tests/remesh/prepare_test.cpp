@@ -138,6 +138,21 @@ TEST(Preparation, CornersThatRoundingMadeTwoAreOne) {
   EXPECT_EQ(Preparation(OrderedInput(mesh, options), {}).mesh().vertices.size(), mesh.vertices.size());
 }
 
+// Closed parts smaller than rounding are left out, with what is given at their vertices.
+TEST(Preparation, DensitiesOfPartsThatAreLeftOutGoWithThem) {
+  TriangleMesh speck = icosphere(0);
+  for (Vec3& p : speck.vertices) p = 1e-7 * p;
+  const TriangleMesh mesh = joined(icosphere(3), speck, {0.1, 0.2, 0.3});
+  RemeshOptions options;
+  options.vertices = 600;
+  options.sizing.kind = DensityKind::attribute;
+  options.sizing.attribute.assign(mesh.vertices.size(), 1);
+  Preparation preparation(OrderedInput(mesh, options), {});
+  EXPECT_EQ(preparation.mesh().triangles.size(), icosphere(3).triangles.size());
+  const std::vector<double> density = preparation.lay_down().density;
+  for (const double rho : density) EXPECT_NEAR(rho, density[0], 1e-9 * density[0]);
+}
+
 // Bounds of edge lengths that are found where components are set apart hold there, not where nothing is in the input.
 TEST(Preparation, BoundsFollowWhatIsSetApart) {
   RemeshOptions options;

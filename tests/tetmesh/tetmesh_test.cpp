@@ -449,6 +449,9 @@ TEST(TetrahedraliseErrors, RefusesOptionsThatMakeNoSense) {
   options.sizing.field.kind = DensityKind::attribute;
   options.sizing.field.attribute = {1, 2, 3};
   EXPECT_THROW(tetrahedralise(solid, options), Error);
+  options = options_for(100);
+  options.features.given = {{0, 1000}};
+  EXPECT_THROW(tetrahedralise(box(1), options), Error);
 }
 
 TEST(TetrahedraliseErrors, CanBeCancelled) {
