@@ -16,6 +16,9 @@
 namespace bisector {
 namespace {
 
+// Of the longest edge: what is higher is a triangle of a fine mesh.
+constexpr double kFlat = 1e-3;
+
 class CapFlips {
  public:
   CapFlips(TriangleMesh& mesh, double height, const std::vector<std::array<Index, 2>>& given)
@@ -51,17 +54,22 @@ class CapFlips {
     return static_cast<std::size_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
   }
 
+  double length_of(const Triangle& v) const {
+    const std::size_t k = longest_edge(v);
+    return norm(at(v[(k + 1) % 3]) - at(v[k]));
+  }
+
   // Over the longest edge.
   double height_of(const Triangle& v) const {
-    const std::size_t k = longest_edge(v);
-    const double length = norm(at(v[(k + 1) % 3]) - at(v[k]));
+    const double length = length_of(v);
     return length > 0 ? norm(normal_of(v)) / length : 0;
   }
 
   Vec3 normal_of(const Triangle& v) const { return twice_area_normal(at(v[0]), at(v[1]), at(v[2])); }
 
   void push_if_low(Index t) {
-    if (const double height = height_of(mesh_.triangles[t]); height < height_) queue_.push({height, t});
+    const double height = height_of(mesh_.triangles[t]);
+    if (height < height_ && height < kFlat * length_of(mesh_.triangles[t])) queue_.push({height, t});
   }
 
   bool flip(Index cap) {

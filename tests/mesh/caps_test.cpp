@@ -116,6 +116,15 @@ TEST(Caps, StayWhereTheirEdgeIsGivenOrABorder) {
   EXPECT_EQ(flip_caps(alone, kHeight, {}), 0u);
 }
 
+// However small: a fine mesh has edges as long as a coarse one's caps are high.
+TEST(Caps, TrianglesThatAreNotFlatAreLeft) {
+  TriangleMesh mesh = icosphere(3);
+  for (Vec3& p : mesh.vertices) p = {1e-6 * p.x, 1e-6 * p.y, 2e-8 * p.z};
+  const std::vector<Triangle> before = mesh.triangles;
+  EXPECT_EQ(flip_caps(mesh, kHeight, {}), 0u);
+  EXPECT_EQ(mesh.triangles, before);
+}
+
 TEST(Caps, OthersAreLeft) {
   TriangleMesh mesh = icosphere(3);
   EXPECT_EQ(flip_caps(mesh, kHeight, {}), 0u);
