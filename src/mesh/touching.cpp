@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <set>
@@ -34,6 +35,7 @@ struct Wing {
 std::vector<HalfEdgePair> pairs_across_solids(const TriangleMesh& mesh, const EdgeTable& table, std::size_t edge,
                                               double rounding) {
   const auto [a, b] = table.edges[edge];
+  const double length = norm(mesh.vertices[b] - mesh.vertices[a]);
   const Vec3 axis = unit(mesh.vertices[b] - mesh.vertices[a]);
   if (norm2(axis) == 0) return {};
   const Vec3 x = perpendicular(axis), y = cross(axis, x);
@@ -42,7 +44,9 @@ std::vector<HalfEdgePair> pairs_across_solids(const TriangleMesh& mesh, const Ed
     const Vec3 out = mesh.vertices[origin(mesh.triangles, next_half_edge(next_half_edge(*h)))] - mesh.vertices[a];
     const double u = dot(out, x), v = dot(out, y), height = std::hypot(u, v);
     if (!(height > 0)) return {};
-    wings.push_back({*h, origin(mesh.triangles, *h) == a, std::atan2(v, u), rounding / height});
+    // The line of a short edge turns by more, and a corner that is far along it is off by as much more.
+    const double off = rounding * (1 + std::abs(dot(out, axis)) / length);
+    wings.push_back({*h, origin(mesh.triangles, *h) == a, std::atan2(v, u), off / height});
   }
   std::sort(wings.begin(), wings.end(), [](const Wing& p, const Wing& q) { return p.angle < q.angle; });
   // From the widest gap on, so that no coincident triangles are torn apart.
@@ -181,6 +185,27 @@ std::vector<Index> separate_touching(TriangleMesh& mesh) {
   }
   mesh.feature_edges = edges_after_separating(mesh, original, mesh.feature_edges);
   return original;
+}
+
+bool has_solids_with_common_faces(TriangleMesh mesh) {
+  halve_touching_edges(mesh);
+  const std::vector<Index> original = separate_touching(mesh);
+  const MeshTopology topology = analyse_topology(mesh.triangles, mesh.vertices.size());
+  if (!topology.manifold || !topology.closed || topology.components < 2) return false;
+  const std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
+  std::map<Triangle, std::vector<Index>> components;  // of the triangles with the same corners
+  for (const Triangle& t : mesh.triangles) {
+    Triangle corners{original[t[0]], original[t[1]], original[t[2]]};
+    std::sort(corners.begin(), corners.end());
+    components[corners].push_back(component[t[0]]);
+  }
+  bool any = false;
+  for (auto& [corners, of] : components) {
+    std::sort(of.begin(), of.end());
+    if (std::adjacent_find(of.begin(), of.end()) != of.end()) return false;
+    any |= of.size() > 1;
+  }
+  return any;
 }
 
 std::vector<std::array<Index, 2>> edges_after_halving(const std::vector<std::array<Index, 2>>& edges,

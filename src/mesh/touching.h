@@ -23,6 +23,11 @@ std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh);
 // old ones being what they were.
 std::vector<Index> separate_touching(TriangleMesh& mesh);
 
+// Whether a surface is that of several solids, some of which have faces in common: once each has vertices of its own,
+// by the two above, it is closed and manifold, and triangles that are there twice are on two components each. A sheet
+// that is to be seen from both sides is there twice on one component.
+bool has_solids_with_common_faces(TriangleMesh mesh);
+
 // Edges that were named before halve_touching_edges, which returned `halved` and left `count` vertices.
 std::vector<std::array<Index, 2>> edges_after_halving(const std::vector<std::array<Index, 2>>& edges,
                                                       const std::vector<std::array<Index, 2>>& halved,

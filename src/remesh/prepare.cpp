@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "mesh/joining.h"
 #include "mesh/spatial_order.h"
 #include "mesh/topology.h"
+#include "mesh/touching.h"
 #include "mesh/used_vertices.h"
 #include "remesh/detail.h"
 #include "remesh/mend_input.h"
@@ -102,6 +104,14 @@ WeldResult weld_and_mend(const OrderedInput& input, const Context& context) {
   return welded;
 }
 
+WeldResult as_it_is(const TriangleMesh& input) {
+  WeldResult welded;
+  welded.mesh = input;
+  welded.vertex_of.resize(input.vertices.size());
+  std::iota(welded.vertex_of.begin(), welded.vertex_of.end(), Index{0});
+  return welded;
+}
+
 }  // namespace
 
 OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given) : options(given) {
@@ -131,6 +141,9 @@ OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given
 
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
   if (tolerance) return weld(input, *tolerance);
+  const MeshTopology given = topology_of(input);
+  if (given.boundary_edges == 0 && given.non_manifold_edges > 0 && has_solids_with_common_faces(input))
+    return as_it_is(input);
   WeldResult best = remove_double_triangles(input);
   MeshTopology before = topology_of(best.mesh);
   const double diagonal = bounding_box(input).diagonal();

@@ -29,7 +29,7 @@ struct PreparedInput {
 };
 
 // The input with its borders joined: within `tolerance`, or, without one, as RemeshOptions::weld says. Triangles that
-// are there twice are then taken once.
+// are there twice are then taken once; not those of faces that several solids have in common (mesh/touching.h).
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance);
 
 // The same, with triangles turned that run against most others, and warnings of what was done.

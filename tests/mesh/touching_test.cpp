@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bisector/quality.h"
+#include "bisector/remesh.h"
 #include "core/geometry.h"
 #include "core/random.h"
 #include "mesh/topology.h"
@@ -198,6 +199,28 @@ TEST(Touching, SheetsThatMeetStayTogether) {
     EXPECT_EQ(same.triangles, sheets.triangles);
     EXPECT_EQ(same.vertices.size(), sheets.vertices.size());
   }
+}
+
+// Of solids that are there whole, each with the faces that it shares.
+TEST(SolidsWithCommonFaces, AreToldFromSheetsSeenFromBothSides) {
+  EXPECT_TRUE(has_solids_with_common_faces(surface_of({{0, 0, 0}, {1, 0, 0}}, true)));
+  EXPECT_TRUE(has_solids_with_common_faces(surface_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 1}}, true)));
+  EXPECT_FALSE(has_solids_with_common_faces(surface_of({{0, 0, 0}, {1, 1, 0}}, true)));  // along an edge alone
+  EXPECT_FALSE(has_solids_with_common_faces(surface_of({{0, 0, 0}, {1, 0, 0}})));
+  TriangleMesh sheet = grid_patch(3, 3);
+  const std::vector<Triangle> front = sheet.triangles;
+  for (const auto& [a, b, c] : front) sheet.triangles.push_back({a, c, b});
+  EXPECT_FALSE(has_solids_with_common_faces(sheet));
+}
+
+TEST(SolidsWithCommonFaces, AreRemeshedEachForItself) {
+  RemeshOptions options;
+  options.vertices = 400;
+  const RemeshResult result = remesh(surface_of({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}, true), options);
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_EQ(result.topology.components, 3u);
+  EXPECT_EQ(count_self_intersections(result.mesh), 0u);
+  EXPECT_NEAR(volume_of(result.mesh), 3, 1e-4);
 }
 
 }  // namespace
