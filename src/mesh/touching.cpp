@@ -14,15 +14,13 @@
 #include "core/geometry.h"
 #include "mesh/edge_splitter.h"
 #include "mesh/half_edges.h"
+#include "mesh/joining.h"
 #include "mesh/topology.h"
 
 namespace bisector {
 namespace {
 
 using HalfEdgePair = std::array<std::size_t, 2>;
-
-// Of the largest coordinate: what files in single precision round.
-constexpr double kRounding = 0x1p-22;
 
 // A triangle at an edge, seen along it.
 struct Wing {
@@ -95,9 +93,7 @@ std::vector<HalfEdgePair> pairs_across_solids(const TriangleMesh& mesh, const Ed
 using Contacts = std::unordered_map<std::size_t, std::vector<HalfEdgePair>>;
 
 Contacts find_contacts(const TriangleMesh& mesh, const EdgeTable& table) {
-  double largest = 0;
-  for (const Vec3& p : mesh.vertices)
-    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::abs(p[k]));
+  const double rounding = kRounding * bounding_box(mesh).diagonal();
   Contacts contacts;
   const std::vector<Index> part = label_components(mesh.triangles, mesh.vertices.size());
   std::set<Index> no_solids;
@@ -107,7 +103,7 @@ Contacts find_contacts(const TriangleMesh& mesh, const EdgeTable& table) {
     if (count == 2 && origin(mesh.triangles, sides[0]) != origin(mesh.triangles, sides[1])) continue;
     if (no_solids.contains(of)) continue;
     std::vector<HalfEdgePair> pairs;
-    if (count > 2) pairs = pairs_across_solids(mesh, table, e, kRounding * largest);
+    if (count > 2) pairs = pairs_across_solids(mesh, table, e, rounding);
     if (pairs.empty()) no_solids.insert(of);
     else contacts.emplace(e, std::move(pairs));
   }
