@@ -46,8 +46,8 @@ struct TetOptions {
   double tolerance = 1e-6;   // a phase ends when the energy falls by less than this share per step
   double min_angle = 40;     // degrees; goal for the boundary's triangles, 0: none
   double min_dihedral = 30;  // degrees; goal for the tetrahedra, 0: slivers stay
-  // Length within which borders of a surface are joined, as in remesh.h; without a value only what lies at the same
-  // point.
+  // Length within which borders of a surface are joined, as in remesh.h. Without a value edges and triangles of the
+  // size of rounding are mended, too, and solids that touch parted, by 2e-6 of the diagonal at most.
   std::optional<double> weld;
   // Of a surface: each part of space that it encloses is filled, and a region of its own, cavities as well. The surface
   // may branch, where more than two parts meet.

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <unordered_map>
 #include <vector>
@@ -17,7 +16,8 @@
 namespace bisector {
 namespace {
 
-using FacetBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::size_t>;
+// Of a facet or a component.
+using IndexedBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::size_t>;
 
 // Of normals that face each other; triangles that are small beside their rounding are not parallel.
 constexpr double kFacing = -0.9;
@@ -37,7 +37,7 @@ Facet facet_of(const TriangleMesh& mesh, Index t) {
   Facet facet;
   for (std::size_t k = 0; k < 3; ++k) facet.corners[k] = mesh.vertices[mesh.triangles[t][k]];
   const auto& [a, b, c] = facet.corners;
-  const Vec3 doubled = cross(b - a, c - a);
+  const Vec3 doubled = twice_area_normal(a, b, c);
   facet.area = norm(doubled);
   if (facet.area > 0) facet.normal = (1 / facet.area) * doubled;
   return facet;
@@ -76,55 +76,34 @@ std::optional<double> depth_of_contact(const Facet& large, const Facet& small, d
   return depth;
 }
 
-Box enlarged(Box box, double by) {
-  for (int k = 0; k < 3; ++k) {
-    box.lo[k] -= by;
-    box.hi[k] += by;
-  }
-  return box;
+CGAL::Bbox_3 box_around(const Vec3& p, double by) {
+  return {p.x - by, p.y - by, p.z - by, p.x + by, p.y + by, p.z + by};
 }
 
-bool intersect(const Box& a, const Box& b) {
-  for (int k = 0; k < 3; ++k)
-    if (a.lo[k] > b.hi[k] || b.lo[k] > a.hi[k]) return false;
-  return true;
+CGAL::Bbox_3 box_around(const Facet& facet, double by) {
+  return box_around(facet.corners[0], by) + box_around(facet.corners[1], by) + box_around(facet.corners[2], by);
 }
 
-// Of each component a box that holds all that its own box has in common with those of others, an empty one (lo > hi) if
-// nothing is. Nothing at all if no two have.
-std::vector<Box> where_components_meet(const TriangleMesh& mesh, const std::vector<Index>& component, double rounding) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const Box nothing{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
-  const auto add = [](Box& box, const Box& other) {
-    for (int k = 0; k < 3; ++k) {
-      box.lo[k] = std::min(box.lo[k], other.lo[k]);
-      box.hi[k] = std::max(box.hi[k], other.hi[k]);
-    }
-  };
-  std::vector<Box> whole;
+CGAL::Bbox_3 common_part(const CGAL::Bbox_3& a, const CGAL::Bbox_3& b) {
+  return {std::max(a.xmin(), b.xmin()), std::max(a.ymin(), b.ymin()), std::max(a.zmin(), b.zmin()),
+          std::min(a.xmax(), b.xmax()), std::min(a.ymax(), b.ymax()), std::min(a.zmax(), b.zmax())};
+}
+
+// Of each component a box that holds all that its own box, enlarged by rounding, has in common with those of others.
+std::vector<CGAL::Bbox_3> where_components_meet(const TriangleMesh& mesh, const std::vector<Index>& component,
+                                                double rounding) {
+  std::vector<CGAL::Bbox_3> whole;
   for (Index v = 0; v < component.size(); ++v) {
     if (component[v] == kNone) continue;
-    if (component[v] >= whole.size()) whole.resize(component[v] + std::size_t{1}, nothing);
-    add(whole[component[v]], {mesh.vertices[v], mesh.vertices[v]});
+    if (component[v] >= whole.size()) whole.resize(component[v] + std::size_t{1});
+    whole[component[v]] += box_around(mesh.vertices[v], rounding);
   }
-  std::vector<FacetBox> boxes;
-  for (std::size_t c = 0; c < whole.size(); ++c) {
-    const auto& [lo, hi] = enlarged(whole[c], rounding);
-    boxes.emplace_back(CGAL::Bbox_3(lo.x, lo.y, lo.z, hi.x, hi.y, hi.z), c);
-  }
-  std::vector<Box> meeting(whole.size(), nothing);
-  bool any = false;
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const FacetBox& a, const FacetBox& b) {
-    any = true;
-    Box common = enlarged(whole[a.info()], rounding);
-    const Box other = enlarged(whole[b.info()], rounding);
-    for (int k = 0; k < 3; ++k) {
-      common.lo[k] = std::max(common.lo[k], other.lo[k]);
-      common.hi[k] = std::min(common.hi[k], other.hi[k]);
-    }
-    for (const std::size_t c : {a.info(), b.info()}) add(meeting[c], common);
+  std::vector<IndexedBox> boxes;
+  for (std::size_t c = 0; c < whole.size(); ++c) boxes.emplace_back(whole[c], c);
+  std::vector<CGAL::Bbox_3> meeting(whole.size());
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const IndexedBox& a, const IndexedBox& b) {
+    for (const std::size_t c : {a.info(), b.info()}) meeting[c] += common_part(a.bbox(), b.bbox());
   });
-  if (!any) meeting.clear();
   return meeting;
 }
 
@@ -168,20 +147,20 @@ Vec3 way_of(const std::vector<Recession>& all) {
 
 std::size_t open_face_contacts(TriangleMesh& mesh, double rounding, double apart) {
   const std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
-  const std::vector<Box> meeting = where_components_meet(mesh, component, rounding);
+  const std::vector<CGAL::Bbox_3> meeting = where_components_meet(mesh, component, rounding);
   std::vector<Facet> facets;
   std::vector<Index> triangle;  // of each facet
-  std::vector<FacetBox> boxes;
-  for (Index t = 0; !meeting.empty() && t < mesh.triangles.size(); ++t) {
+  std::vector<IndexedBox> boxes;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
     const Facet facet = facet_of(mesh, t);
-    const Box box = enlarged(bounding_box(std::vector<Vec3>(facet.corners.begin(), facet.corners.end())), rounding);
-    if (!intersect(box, meeting[component[mesh.triangles[t][0]]])) continue;
-    boxes.emplace_back(CGAL::Bbox_3(box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z), facets.size());
+    const CGAL::Bbox_3 box = box_around(facet, rounding);
+    if (!CGAL::do_overlap(box, meeting[component[mesh.triangles[t][0]]])) continue;
+    boxes.emplace_back(box, facets.size());
     facets.push_back(facet);
     triangle.push_back(t);
   }
   std::vector<double> recedes(facets.size(), 0);
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const FacetBox& a, const FacetBox& b) {
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const IndexedBox& a, const IndexedBox& b) {
     const std::array<std::size_t, 2> pair{a.info(), b.info()};
     if (component[mesh.triangles[triangle[pair[0]]][0]] == component[mesh.triangles[triangle[pair[1]]][0]]) return;
     const bool swap = facets[pair[0]].area < facets[pair[1]].area;

@@ -21,6 +21,9 @@ WeldResult remove_double_triangles(const TriangleMesh& mesh);
 // edges together.
 bool joins_borders(const MeshTopology& now, const MeshTopology& before);
 
+// For each point the first of those equal to it.
+std::vector<Index> first_equal(const std::vector<Vec3>& points);
+
 // The triangles, all of them and in their order, with the first of the vertices at a point in the place of each other
 // one, if that joins borders: files give faces vertices of their own where normals or texture coordinates differ. A
 // triangle with two corners at a point stays as it is.

@@ -22,6 +22,9 @@ namespace {
 
 using HalfEdgePair = std::array<std::size_t, 2>;
 
+// Radians: what is farther apart at an edge does not coincide, however short the edge is and flat the triangles.
+constexpr double kMostRounding = 0.1;
+
 // A triangle at an edge, seen along it.
 struct Wing {
   std::size_t half_edge;
@@ -34,8 +37,8 @@ std::vector<HalfEdgePair> pairs_across_solids(const TriangleMesh& mesh, const Ed
                                               double rounding) {
   const auto [a, b] = table.edges[edge];
   const double length = norm(mesh.vertices[b] - mesh.vertices[a]);
-  const Vec3 axis = unit(mesh.vertices[b] - mesh.vertices[a]);
-  if (norm2(axis) == 0) return {};
+  if (!(length > 0)) return {};
+  const Vec3 axis = (1 / length) * (mesh.vertices[b] - mesh.vertices[a]);
   const Vec3 x = perpendicular(axis), y = cross(axis, x);
   std::vector<Wing> wings;
   for (const std::size_t* h = table.half_edges.begin(edge); h != table.half_edges.end(edge); ++h) {
@@ -44,7 +47,7 @@ std::vector<HalfEdgePair> pairs_across_solids(const TriangleMesh& mesh, const Ed
     if (!(height > 0)) return {};
     // The line of a short edge turns by more, and a corner that is far along it is off by as much more.
     const double off = rounding * (1 + std::abs(dot(out, axis)) / length);
-    wings.push_back({*h, origin(mesh.triangles, *h) == a, std::atan2(v, u), off / height});
+    wings.push_back({*h, origin(mesh.triangles, *h) == a, std::atan2(v, u), std::min(off / height, kMostRounding)});
   }
   std::sort(wings.begin(), wings.end(), [](const Wing& p, const Wing& q) { return p.angle < q.angle; });
   // From the widest gap on, so that no coincident triangles are torn apart.

@@ -41,21 +41,6 @@ std::vector<Index> own_names(std::size_t vertices) {
   return names;
 }
 
-// For each point the first of those equal to it.
-std::vector<Index> first_equal(const std::vector<Vec3>& points) {
-  std::vector<Index> order(points.size()), first(points.size());
-  std::iota(order.begin(), order.end(), Index{0});
-  std::sort(order.begin(), order.end(), [&](Index i, Index j) {
-    const Vec3 &p = points[i], &q = points[j];
-    if (p.x != q.x) return p.x < q.x;
-    if (p.y != q.y) return p.y < q.y;
-    return p.z != q.z ? p.z < q.z : i < j;
-  });
-  for (std::size_t k = 0; k < order.size(); ++k)
-    first[order[k]] = k > 0 && points[order[k]] == points[order[k - 1]] ? first[order[k - 1]] : order[k];
-  return first;
-}
-
 // The mesh under work: its triangles and where each came from.
 struct Work {
   const std::vector<Vec3>& points;
@@ -455,6 +440,20 @@ WeldResult remove_double_triangles(const TriangleMesh& mesh) {
 bool joins_borders(const MeshTopology& now, const MeshTopology& before) {
   return now.boundary_edges <= before.boundary_edges &&
          now.boundary_edges + now.non_manifold_edges < before.boundary_edges + before.non_manifold_edges;
+}
+
+std::vector<Index> first_equal(const std::vector<Vec3>& points) {
+  std::vector<Index> order(points.size()), first(points.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(), [&](Index i, Index j) {
+    const Vec3 &p = points[i], &q = points[j];
+    if (p.x != q.x) return p.x < q.x;
+    if (p.y != q.y) return p.y < q.y;
+    return p.z != q.z ? p.z < q.z : i < j;
+  });
+  for (std::size_t k = 0; k < order.size(); ++k)
+    first[order[k]] = k > 0 && points[order[k]] == points[order[k - 1]] ? first[order[k - 1]] : order[k];
+  return first;
 }
 
 std::vector<Triangle> join_equal_points(const TriangleMesh& mesh) {

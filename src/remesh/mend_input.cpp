@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "core/geometry.h"
@@ -78,7 +76,7 @@ void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, 
     context.warn(fmt::format("flipped {} of triangles lower than {:g}", plural(flipped, "edge"), length));
 }
 
-Separation::Separation(TriangleMesh& mesh, const Context& context) : Separation(mesh) {
+void Separation::separate(TriangleMesh& mesh, const Context& context) {
   const MeshTopology touching = topology_of(mesh);
   if (touching.manifold) return;
   halved_ = halve_touching_edges(mesh);
@@ -114,20 +112,15 @@ std::vector<double> Separation::values(std::vector<double> given) const {
   return given;
 }
 
-void part_equal_points(TriangleMesh& mesh) {
+void part_equal_points(TriangleMesh& mesh, const Context& context) {
   if (topology_of(mesh).boundary_edges > 0) return;
-  std::vector<Index> order(mesh.vertices.size());
-  std::iota(order.begin(), order.end(), Index{0});
-  const auto key = [&](Index v) {
-    const Vec3& p = mesh.vertices[v];
-    return std::tuple(p.x, p.y, p.z, v);
-  };
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return key(a) < key(b); });
-  std::vector<Index> first(order.size());
-  for (std::size_t k = 0; k < order.size(); ++k)
-    first[order[k]] =
-        k > 0 && mesh.vertices[order[k - 1]] == mesh.vertices[order[k]] ? Index{first[order[k - 1]]} : order[k];
+  const std::vector<Index> first = first_equal(mesh.vertices);
+  std::size_t count = 0;
+  for (Index v = 0; v < first.size(); ++v) count += first[v] != v;
+  if (count == 0) return;
   part_fans(mesh, first);
+  context.warn(fmt::format("parts of the surface have {} at the points of others; they are meshed as if they did not",
+                           count == 1 ? "1 vertex" : fmt::format("{} vertices", count)));
 }
 
 void open_contacts(TriangleMesh& mesh, const Context& context) {

@@ -22,10 +22,10 @@ void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, 
 // a manifold then.
 class Separation {
  public:
-  // Nothing is separated.
+  // Nothing is separated yet.
   explicit Separation(const TriangleMesh& mesh) : given_(mesh.vertices.size()), vertices_(given_) {}
-  // Separates them, with a warning.
-  Separation(TriangleMesh& mesh, const Context& context);
+  // Separates the parts of that mesh, with a warning.
+  void separate(TriangleMesh& mesh, const Context& context);
 
   // Edges of the separated mesh that were `given` before.
   std::vector<std::array<Index, 2>> edges(const TriangleMesh& mesh,
@@ -42,9 +42,9 @@ class Separation {
   std::vector<Index> original_;
 };
 
-// Moves vertices at the same point apart, 1e-7 of the diagonal towards their triangles, if the surface has no border:
-// it hangs together elsewhere then.
-void part_equal_points(TriangleMesh& mesh);
+// Moves vertices at the same point apart, 1e-7 of the diagonal towards their triangles, with a warning, if the surface
+// has no border: it hangs together elsewhere then.
+void part_equal_points(TriangleMesh& mesh, const Context& context);
 
 // Moves faces apart in which components lie on each other (mesh/face_contacts.h), with a warning: triangles of two
 // faces that coincide all intersect, and the more, the finer they are.

@@ -141,10 +141,8 @@ OrderedInput::OrderedInput(const TriangleMesh& input, const RemeshOptions& given
 
 WeldResult join_borders(const TriangleMesh& input, const std::optional<double>& tolerance) {
   if (tolerance) return weld(input, *tolerance);
-  const MeshTopology given = topology_of(input);
-  if (given.boundary_edges == 0 && given.non_manifold_edges > 0 && has_solids_with_common_faces(input))
-    return as_it_is(input);
   WeldResult best = remove_double_triangles(input);
+  if (best.duplicate_triangles > 0 && has_solids_with_common_faces(input)) return as_it_is(input);
   MeshTopology before = topology_of(best.mesh);
   const double diagonal = bounding_box(input).diagonal();
   for (const double rounding : kRoundings) {
@@ -179,7 +177,8 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   std::vector<std::array<Index, 2>> keep_edges = options.keep_edges;
   for (auto* edges : {&features.given, &keep_edges}) rename_edges(vertex_of, *edges);
   const std::size_t vertices = mesh_.vertices.size();
-  const Separation separation = branches ? Separation(std::as_const(mesh_)) : Separation(mesh_, context);
+  Separation separation(mesh_);
+  if (!branches) separation.separate(mesh_, context);
   features.given = separation.edges(mesh_, features.given);
   keep_edges = separation.edges(mesh_, keep_edges);
   if (!branches && options.keep_vertices.empty() && options.keep_edges.empty()) open_contacts(mesh_, context);

@@ -169,18 +169,19 @@ RemeshResult finish_boundary(TetRun& run) {
   const std::size_t count = on_boundary.size();
   RemeshResult surface = remesh_boundary(run, on_boundary.positions(), on_boundary.places(), true);
   // Where sheets meet at a small angle, another pass may mend what one leaves, with more vertices.
-  if (!bounds_solid(surface)) surface = remesh_boundary(run, surface.mesh.vertices, surface.places, true);
-  if (!bounds_solid(surface)) surface = remesh_anew(run, count);
+  if (bounds_solid(surface)) return surface;
+  surface = remesh_boundary(run, surface.mesh.vertices, surface.places, true);
+  if (bounds_solid(surface)) return surface;
+  surface = remesh_anew(run, count);
+  if (bounds_solid(surface)) return surface;
   const std::size_t crossings = count_self_intersections(surface.mesh);
   if (crossings > 0)
     throw Error(fmt::format(
         "the boundary of the result crosses itself at {} pairs of triangles: parts are thinner than its edges; "
         "ask for more vertices",
         crossings));
-  if (!surface.topology.closed || !surface.topology.manifold)
-    throw Error(
-        "the boundary of the result is not a closed manifold: parts are thinner than its edges; ask for more vertices");
-  return surface;
+  throw Error(
+      "the boundary of the result is not a closed manifold: parts are thinner than its edges; ask for more vertices");
 }
 
 }  // namespace bisector

@@ -91,6 +91,17 @@ TetEstimate estimate(const Extent& extent, const TetMesh& mesh, const TriangleMe
   return {kPerVolume * cubes + kPerArea * surface, squares / cubes};
 }
 
+double uniform_edge(const Extent& extent, double vertices) {
+  double low = 0,
+         high = std::cbrt(kPerVolume * extent.volume / vertices) + std::sqrt(kPerArea * extent.area / vertices);
+  while (estimate_tet_vertices(extent.volume, extent.area, high) > vertices) high *= 2;
+  for (int k = 0; k < 200 && high - low > 1e-12 * high; ++k) {
+    const double h = 0.5 * (low + high);
+    (estimate_tet_vertices(extent.volume, extent.area, h) > vertices ? low : high) = h;
+  }
+  return high;
+}
+
 bool positive(double x) { return x > 0 && std::isfinite(x); }
 
 void check_bounds(const SizingOptions& field, const SizingTarget& target) {
@@ -421,17 +432,6 @@ class Refiner {
   std::priority_queue<Edge, std::vector<Edge>, Shorter> queue_;
 };
 
-// The length and number that the target means where all edges are alike.
-void set_uniform(const Extent& extent, const SizingTarget& target, SizedSolid& sized) {
-  const auto count = static_cast<double>(target.vertices);
-  sized.edge_length = target.vertices ? estimate_tet_edge(extent.volume, extent.area, count) : target.edge_length;
-  const double wanted = target.vertices ? count : estimate_tet_vertices(extent.volume, extent.area, sized.edge_length);
-  if (wanted > kMostVertices)
-    throw Error(fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones",
-                            sized.edge_length, kMostVertices));
-  sized.vertices = static_cast<std::size_t>(std::llround(wanted));
-}
-
 std::vector<double> powers(const std::vector<double>& lengths, double unit, int exponent) {
   std::vector<double> rho(lengths.size());
   for (std::size_t v = 0; v < rho.size(); ++v) {
@@ -450,14 +450,15 @@ double estimate_tet_vertices(double volume, double area, double h) {
   return kPerVolume * volume / (h * h * h) + kPerArea * area / (h * h);
 }
 
-double estimate_tet_edge(double volume, double area, double vertices) {
-  double low = 0, high = std::cbrt(kPerVolume * volume / vertices) + std::sqrt(kPerArea * area / vertices);
-  while (estimate_tet_vertices(volume, area, high) > vertices) high *= 2;
-  for (int k = 0; k < 200 && high - low > 1e-12 * high; ++k) {
-    const double h = 0.5 * (low + high);
-    (estimate_tet_vertices(volume, area, h) > vertices ? low : high) = h;
-  }
-  return high;
+UniformSize uniform_size(const TetMesh& mesh, const TriangleMesh& boundary, const SizingTarget& target) {
+  const Extent extent(mesh, boundary);
+  const auto count = static_cast<double>(target.vertices);
+  const double edge = target.vertices ? uniform_edge(extent, count) : target.edge_length;
+  const double wanted = target.vertices ? count : estimate_tet_vertices(extent.volume, extent.area, edge);
+  if (wanted > kMostVertices)
+    throw Error(
+        fmt::format("sizing: edges of {:g} make more than {:.0f} vertices; ask for longer ones", edge, kMostVertices));
+  return {edge, static_cast<std::size_t>(std::llround(wanted))};
 }
 
 double estimate_cells(const SizedSolid& sized) {
@@ -476,7 +477,9 @@ SizedSolid refine_for_sizes(const TetMesh& mesh, const TriangleMesh& boundary, c
   check(mesh, options, target);
   SizedSolid sized;
   sized.mesh = mesh;
-  set_uniform(Extent(mesh, boundary), target, sized);
+  const UniformSize size = uniform_size(mesh, boundary, target);
+  sized.edge_length = size.edge_length;
+  sized.vertices = size.vertices;
   const bool uniform = options.field.kind == DensityKind::uniform && options.sizes.points.empty();
   if (uniform && !bound) return sized;
 

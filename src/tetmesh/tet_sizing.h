@@ -30,8 +30,13 @@ struct SizedSolid {
 // about, has 1.575 / h^3 of them per volume for the mean h of its edges; on the boundary there are as many as an
 // equilateral triangulation has, each with half a cell.
 double estimate_tet_vertices(double volume, double area, double h);
-// The h with which that gives so many.
-double estimate_tet_edge(double volume, double area, double vertices);
+// What a target means where all edges are alike. Throws Error if the solid has no volume, or would get more vertices
+// than may be asked for.
+struct UniformSize {
+  double edge_length = 0;
+  std::size_t vertices = 0;
+};
+UniformSize uniform_size(const TetMesh& mesh, const TriangleMesh& boundary, const SizingTarget& target);
 // Those of its cells in a solid, for the lengths that it is sized for, of which each vertex on the boundary has half a
 // one.
 double estimate_cells(const SizedSolid& sized);

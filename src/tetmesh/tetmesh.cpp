@@ -312,11 +312,12 @@ TetOptions follow_vertices(const TetOptions& options, const WeldResult& welded) 
 
 // Solids that touch, or lie on each other with faces.
 void separate(TriangleMesh& mesh, TetOptions& options, const Context& context) {
-  const Separation separation(mesh, context);
+  Separation separation(mesh);
+  separation.separate(mesh, context);
   options.features.given = separation.edges(mesh, options.features.given);
   std::vector<double>& attribute = options.sizing.field.attribute;
   if (!attribute.empty()) attribute = separation.values(std::move(attribute));
-  part_equal_points(mesh);
+  part_equal_points(mesh, context);
   open_contacts(mesh, context);
 }
 

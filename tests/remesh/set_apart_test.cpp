@@ -14,14 +14,10 @@
 #include "bisector/remesh.h"
 #include "mesh/topology.h"
 #include "support/models.h"
+#include "support/scaled.h"
 
 namespace bisector::test {
 namespace {
-
-TriangleMesh scaled(TriangleMesh mesh, const Vec3& by) {
-  for (Vec3& p : mesh.vertices) p = {p.x * by.x, p.y * by.y, p.z * by.z};
-  return mesh;
-}
 
 TriangleMesh component_of(const TriangleMesh& mesh, Index which) {
   const std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
