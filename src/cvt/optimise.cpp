@@ -289,6 +289,18 @@ void optimise(CvtRun& run, const OptimiseOptions& options) {
                               (after.clip - before.clip);
 }
 
+void optimise_with(CvtRun& run, Backend* stand_in, OptimiseOptions options, double on_surface) {
+  if (!stand_in) return optimise(run, options);
+  const auto last = static_cast<int>(std::ceil(on_surface * options.iterations));
+  Backend& own = run.backend();
+  run.change_backend(*stand_in);
+  options.iterations -= last;
+  optimise(run, options);
+  run.change_backend(own);
+  options.iterations = last;
+  if (last > 0) optimise(run, options);
+}
+
 CvtGradient complete(CvtRun& run, bool constrained) {
   const Diagram& diagram = run.diagram(constrained ? run.backend().projected() : Want::moments);
   if (constrained) {

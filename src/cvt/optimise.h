@@ -22,6 +22,13 @@ struct OptimiseOptions {
 // evaluations, and Error if a diagram does not cover the domain.
 void optimise(CvtRun& run, const OptimiseOptions& options);
 
+// Of the steps, those that are made on a run's own surface where another stands in for it.
+inline constexpr double kOnSurfaceShare = 0.15;
+
+// The same, where there is a surface that stands in for the run's first on that, but for the share `on_surface` of the
+// steps.
+void optimise_with(CvtRun& run, Backend* stand_in, OptimiseOptions options, double on_surface = kOnSurfaceShare);
+
 // dF/dx_i = 2 m_i (x_i - c_i) of each seed, and its part along what the seed is held on.
 struct CvtGradient {
   std::vector<Vec3> vectors;

@@ -11,7 +11,7 @@ namespace bisector {
 namespace {
 
 // Rings of seeds around those that changed that move with them; beyond, the change is hardly felt.
-constexpr int kRings = 3;
+constexpr int kRings = 2;
 // Of the triangles; a larger piece costs as much as the whole surface.
 constexpr double kLargePiece = 0.75;
 
@@ -90,6 +90,41 @@ void move_on_piece(CvtRun& run, const Piece& piece, const std::vector<char>& fre
   run.totals += part.totals;
 }
 
+// Seeds that move, and those whose cells that changes.
+struct Moving {
+  std::vector<char> seeds, cells;
+
+  bool any() const { return !seeds.empty(); }
+};
+
+// None if no seeds have changed.
+Moving around_changes(CvtRun& run, const SeedsBefore& before) {
+  Moving moving{changed_seeds(before, run.seeds.positions()), {}};
+  if (std::find(moving.seeds.begin(), moving.seeds.end(), 1) == moving.seeds.end()) return {};
+  const std::vector<DualEdge> edges = extract_dual_edges(run.diagram(Want::polygons).polygons, run.seeds.positions());
+  for (int ring = 0; ring < kRings; ++ring) mark_neighbours(edges, moving.seeds);
+  moving.cells = moving.seeds;
+  mark_neighbours(edges, moving.cells);
+  return moving;
+}
+
+void move_marked(CvtRun& run, const Moving& moving, const MoveSeeds& move) {
+  const Diagram& diagram = run.diagram(Want::polygons);
+  const Csr<Index>& cells = diagram.moments.triangles;
+  std::vector<char> triangles(run.surface().mesh.triangles.size(), 0);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < moving.cells.size(); ++i)
+    for (const Index* t = cells.begin(i); moving.cells[i] && t != cells.end(i); ++t)
+      count += !std::exchange(triangles[*t], 1);
+  if (count == 0 || static_cast<double>(count) > kLargePiece * static_cast<double>(triangles.size())) {
+    std::vector<Index> all(run.seeds.size());
+    std::iota(all.begin(), all.end(), Index{0});
+    return move(run, all);
+  }
+  const std::vector<Index> seeds = seeds_on(diagram.polygons, triangles, run.seeds.size());
+  move_on_piece(run, {marked_surface(run.surface(), triangles), seeds}, moving.seeds, move);
+}
+
 }  // namespace
 
 SeedsBefore seeds_before(CvtRun& run) {
@@ -97,30 +132,31 @@ SeedsBefore seeds_before(CvtRun& run) {
 }
 
 void move_around(CvtRun& run, const SeedsBefore& before, const MoveSeeds& move) {
-  std::vector<char> free = changed_seeds(before, run.seeds.positions());
-  if (std::find(free.begin(), free.end(), 1) == free.end()) return;
-  const Diagram& diagram = run.diagram(Want::polygons);
-  const std::vector<DualEdge> edges = extract_dual_edges(diagram.polygons, run.seeds.positions());
-  for (int ring = 0; ring < kRings; ++ring) mark_neighbours(edges, free);
-  std::vector<char> inner = free;
-  mark_neighbours(edges, inner);
-
-  const Csr<Index>& cells = diagram.moments.triangles;
-  std::vector<char> triangles(run.surface().mesh.triangles.size(), 0);
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < inner.size(); ++i)
-    for (const Index* t = cells.begin(i); inner[i] && t != cells.end(i); ++t) count += !std::exchange(triangles[*t], 1);
-  if (count == 0 || static_cast<double>(count) > kLargePiece * static_cast<double>(triangles.size())) {
-    std::vector<Index> all(run.seeds.size());
-    std::iota(all.begin(), all.end(), Index{0});
-    return move(run, all);
-  }
-  const std::vector<Index> seeds = seeds_on(diagram.polygons, triangles, run.seeds.size());
-  move_on_piece(run, {marked_surface(run.surface(), triangles), seeds}, free, move);
+  if (const Moving moving = around_changes(run, before); moving.any()) move_marked(run, moving, move);
 }
 
-void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options) {
-  move_around(run, before, [&](CvtRun& part, const std::vector<Index>&) { optimise(part, options); });
+void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options, Backend* stand_in) {
+  const auto optimise_in = [&](CvtRun& part, const Moving& moving, int iterations) {
+    OptimiseOptions some = options;
+    some.iterations = iterations;
+    move_marked(part, moving, [&](CvtRun& moved, const std::vector<Index>&) { optimise(moved, some); });
+  };
+  if (!stand_in) {
+    if (const Moving moving = around_changes(run, before); moving.any()) optimise_in(run, moving, options.iterations);
+    return;
+  }
+  CvtRun coarse(*stand_in, run.curves(), run.context());
+  coarse.seeds = run.seeds;
+  coarse.localise(run.localises());
+  const Moving moving = around_changes(coarse, before);
+  if (moving.any()) {
+    const int on_surface = static_cast<int>(kOnSurfaceShare * options.iterations);
+    optimise_in(coarse, moving, options.iterations - on_surface);
+    run.seeds = std::move(coarse.seeds);
+    // Without any step, seeds that are to be on the surface are put there all the same.
+    if (on_surface > 0 || options.constrained) optimise_in(run, moving, on_surface);
+  }
+  run.totals += coarse.totals;
 }
 
 }  // namespace bisector

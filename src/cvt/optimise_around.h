@@ -25,7 +25,8 @@ using MoveSeeds = std::function<void(CvtRun& run, const std::vector<Index>& seed
 // surface that their cells and those around them cover, which the CPU's backend evaluates. Where much has changed, or
 // triangles are so large that the piece is no smaller than the surface, all seeds of the whole run may move.
 void move_around(CvtRun& run, const SeedsBefore& before, const MoveSeeds& move);
-// By the optimiser.
-void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options);
+// By the optimiser; where there is a surface that stands in for the run's, most of the steps on that.
+void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options,
+                     Backend* stand_in = nullptr);
 
 }  // namespace bisector

@@ -20,6 +20,39 @@ constexpr double kAcute = 0.15;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// The nearest point across a gap from another, which the tree's search narrows down to. Most points within reach are on
+// the same stretch of the same curve, and are told without a search along the curves.
+class AcrossGap {
+ public:
+  using DistanceType = double;
+
+  AcrossGap(const CurveNetwork& network, CurveNetwork::Search& search, Index from, double reach)
+      : network_(network), search_(search), from_(from), reach_(reach), squared_(reach * reach) {}
+  bool addPoint(double squared, Index point) {
+    if (!(squared < squared_) || point == from_) return true;
+    const double distance = std::sqrt(squared);
+    if (network_.along(from_, point) <= kDetour * distance) return true;
+    if (!std::exchange(started_, true)) search_.start(from_, kDetour * reach_);
+    const CurveNetwork::Way way = search_.to(point);
+    if (way.length <= kDetour * distance) return true;
+    if (way.corners == 1 && distance >= kAcute * way.length) return true;
+    squared_ = squared;
+    gap_ = distance;
+    return true;
+  }
+  double worstDist() const { return squared_; }
+  bool full() const { return true; }
+  double gap() const { return gap_; }
+
+ private:
+  const CurveNetwork& network_;
+  CurveNetwork::Search& search_;
+  Index from_;
+  double reach_, squared_;
+  double gap_ = kInfinity;
+  bool started_ = false;
+};
+
 }  // namespace
 
 CurveNetwork::CurveNetwork(const FeatureCurves& curves, double spacing) {
@@ -46,6 +79,14 @@ CurveNetwork::CurveNetwork(const FeatureCurves& curves, double spacing) {
       put(ends[1], Link{ends[0], length});
     }
   });
+}
+
+double CurveNetwork::along(Index a, Index b) const {
+  const Index curve = curve_[a];
+  if (curve == kNone || curve != curve_[b]) return kInfinity;
+  const Line& line = lines_[curve];
+  const double length = std::abs(position_[a] - position_[b]);
+  return line.ends[0] == kNone ? std::min(length, line.length - length) : length;
 }
 
 CurveNetwork::Search::Search(const CurveNetwork& network)
@@ -79,12 +120,7 @@ CurveNetwork::Way CurveNetwork::Search::to(Index point) const {
     const bool is_end = corner == from_ || corner == point;
     best = std::min(best, Way{way.length + length, way.corners + (is_end ? 0 : 1)});
   });
-  if (const Index c = network_.curve_[point]; c != kNone && c == network_.curve_[from_]) {
-    const Line& line = network_.lines_[c];
-    double along = std::abs(network_.position_[point] - network_.position_[from_]);
-    if (line.ends[0] == kNone) along = std::min(along, line.length - along);
-    best = std::min(best, Way{along, 0});
-  }
+  best = std::min(best, Way{network_.along(from_, point), 0});
   return best.length <= reach_ ? best : Way{kInfinity, 0};
 }
 
@@ -96,23 +132,12 @@ std::vector<double> curve_gaps(const CurveNetwork& network, const std::vector<do
   const KdTree tree(3, set);
   constexpr std::size_t kChunk = 1024;
   parallel_chunks(points.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::vector<std::pair<Index, double>> near;
     CurveNetwork::Search search(network);
     for (auto i = static_cast<Index>(begin); i < end; ++i) {
-      const Vec3& p = points[i];
-      const double q[3] = {p.x, p.y, p.z};
-      tree.radiusSearch(q, reach[i] * reach[i], near, nanoflann::SearchParams());
-      if (near.size() < 2) continue;
-      search.start(i, kDetour * reach[i]);
-      for (const auto& [other, squared] : near) {
-        if (other == i) continue;
-        const double distance = std::sqrt(squared);
-        const CurveNetwork::Way way = search.to(other);
-        if (way.length <= kDetour * distance) continue;
-        if (way.corners == 1 && distance >= kAcute * way.length) continue;
-        gaps[i] = distance;
-        break;
-      }
+      const double at[3] = {points[i].x, points[i].y, points[i].z};
+      AcrossGap across(network, search, i, reach[i]);
+      tree.findNeighbors(across, at, nanoflann::SearchParams());
+      gaps[i] = across.gap();
     }
   });
   return gaps;

@@ -20,6 +20,8 @@ class CurveNetwork {
   // The curve that a point lies on; kNone of a corner.
   Index curve(Index point) const { return curve_[point]; }
   double position(Index point) const { return position_[point]; }  // arc length along that curve
+  // From one point to another along the curve that both lie on; infinity if there is none.
+  double along(Index a, Index b) const;
 
   struct Way {
     double length;

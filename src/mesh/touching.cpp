@@ -198,13 +198,14 @@ bool has_solids_with_common_faces(TriangleMesh mesh) {
     std::sort(corners.begin(), corners.end());
     components[corners].push_back(component[t[0]]);
   }
-  bool any = false;
+  std::set<Index> with_common, with_own;
   for (auto& [corners, of] : components) {
     std::sort(of.begin(), of.end());
     if (std::adjacent_find(of.begin(), of.end()) != of.end()) return false;
-    any |= of.size() > 1;
+    (of.size() > 1 ? with_common : with_own).insert(of.begin(), of.end());
   }
-  return any;
+  return !with_common.empty() &&
+         std::includes(with_own.begin(), with_own.end(), with_common.begin(), with_common.end());
 }
 
 std::vector<std::array<Index, 2>> edges_after_halving(const std::vector<std::array<Index, 2>>& edges,

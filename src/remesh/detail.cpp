@@ -42,6 +42,7 @@ constexpr double kDiskReach = 1.15, kPerDisk = 0.6;
 // Points where that is looked at, for each vertex wanted of so many.
 constexpr double kLimbSamples = 6, kMostLimbVertices = 50'000;
 constexpr int kBisections = 7;
+constexpr double kBudgetSpent = 0.97;         // of the vertices, at which no finer width need be looked for
 constexpr std::size_t kMostPoints = 100'000;  // of the curves
 // Triangles are halved until they are no longer than so many edges, for integrals.
 constexpr double kPiece = 1;
@@ -104,7 +105,8 @@ class Planner {
       if (best.vertices <= vertices_) return best;
       best = attempt(coarse, false);
     }
-    for (int k = 0; k < kBisections; ++k) {
+    const auto spends_all = [&] { return best.vertices > kBudgetSpent * vertices_ && best.vertices <= vertices_; };
+    for (int k = 0; k < kBisections && !spends_all(); ++k) {
       const double middle = std::sqrt(fine * coarse);
       Trial t = attempt(middle, resolves_short);
       if (t.vertices <= vertices_) {

@@ -22,9 +22,9 @@ using Kind = SeedPlace::Kind;
 // moves. What comes next begins at once when a round leaves more than this share of the faults.
 constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
 constexpr double kWorthARound = 0.75;
-constexpr int kFirstSteps = 20, kLastSteps = 4;
-// Rounds of clearing curves at the end of a level, and steps after each.
-constexpr int kClearingRounds = 2, kClearingSteps = 20;
+constexpr int kFirstSteps = 10, kLastSteps = 4;
+// Steps after clearing curves at the end of a level.
+constexpr int kClearingSteps = 20;
 // Seeds that recovery may add, beside a quarter of those there are.
 constexpr std::size_t kMostAdded = 100;
 // Lengths of curve, in edges: what a cell must hold to be snapped to it; what is worth a seed, and in the last rounds;
@@ -352,30 +352,29 @@ FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& cur
   return found;
 }
 
-void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options) {
+void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options,
+                    Backend* stand_in) {
   const FeatureCurves& curves = run.curves();
   PlacedSeeds& seeds = run.seeds;
   const std::size_t count = seeds.size();
   options.iterations = kClearingSteps;
-  for (int round = 0; round < kClearingRounds; ++round) {
-    std::vector<char> removed(seeds.size(), 0), crossed(curves.size(), 0);
-    const std::vector<std::vector<CurveInterval>> traced = trace.trace(run.diagram(run.traced()).polygons);
-    for (Index c = 0; c < curves.size(); ++c)
-      for (const CurveInterval& i : traced[c])
-        if (seeds.on_surface(i.cell)) removed[i.cell] = crossed[c] = 1;
-    if (std::find(crossed.begin(), crossed.end(), 1) == crossed.end()) return;
-    const SeedsBefore before = seeds_before(run);
-    seeds.remove(removed);
-    const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
-    for (Index c = 0; c < on.size(); ++c)
-      if (crossed[c]) space_evenly(curves, measure, c, on[c], seeds);
-    set_count(run.diagram(Want::polygons), count, seeds);
-    optimise_around(run, before, options);
-  }
+  std::vector<char> removed(seeds.size(), 0), crossed(curves.size(), 0);
+  const std::vector<std::vector<CurveInterval>> traced = trace.trace(run.diagram(run.traced()).polygons);
+  for (Index c = 0; c < curves.size(); ++c)
+    for (const CurveInterval& i : traced[c])
+      if (seeds.on_surface(i.cell)) removed[i.cell] = crossed[c] = 1;
+  if (std::find(crossed.begin(), crossed.end(), 1) == crossed.end()) return;
+  const SeedsBefore before = seeds_before(run);
+  seeds.remove(removed);
+  const std::vector<std::vector<Index>> on = seeds_by_curve(curves, seeds);
+  for (Index c = 0; c < on.size(); ++c)
+    if (crossed[c]) space_evenly(curves, measure, c, on[c], seeds);
+  set_count(run.diagram(Want::polygons), count, seeds);
+  optimise_around(run, before, options, stand_in);
 }
 
 FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, double c,
-                               OptimiseOptions options) {
+                               OptimiseOptions options, Backend* stand_in) {
   const Want chains = run.traced() | Want::dual;
   const FeatureCurves& curves = run.curves();
   const std::size_t count = run.seeds.size(), most = count + count / 4 + kMostAdded;
@@ -409,7 +408,7 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
     if (run.seeds.size() != count) set_count(run.diagram(Want::polygons), count, run.seeds);
     options.phase = "features, round " + std::to_string(round + 1);
     options.iterations = kFirstSteps + (kLastSteps - kFirstSteps) * round / (kMovingRounds - 1);
-    optimise_around(run, before, options);
+    optimise_around(run, before, options, stand_in);
   }
   // Sheets that intersect, or curves that cross another sheet, cannot all be had.
   run.seeds = std::move(best);

@@ -34,13 +34,14 @@ struct FeatureReport {
 FeatureReport check_features(const FeatureTrace& trace, const FeatureCurves& curves,
                              const std::vector<SeedPlace>& places, const Diagram& diagram);
 
-// Puts seeds on the surface whose cells reach a curve elsewhere, where the energy is high, and optimises again, for a
-// bounded number of rounds: curves have as many seeds of their own as they need.
-void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options);
+// Puts seeds on the surface whose cells reach a curve elsewhere, where the energy is high, and optimises again: curves
+// have as many seeds of their own as they need. `stand_in` as in optimise_around().
+void clear_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, OptimiseOptions options,
+                    Backend* stand_in = nullptr);
 
 // Mends the curves that are broken and optimises again, for a bounded number of rounds. The count is kept in the first
 // rounds; in the last ones seeds are inserted and nothing moves. `c` is the scale of CurveMeasure.
 FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const CurveMeasure& measure, double c,
-                               OptimiseOptions options);
+                               OptimiseOptions options, Backend* stand_in = nullptr);
 
 }  // namespace bisector

@@ -51,8 +51,6 @@ constexpr std::size_t kManyStrays = 20;
 constexpr double kLocalisedShare = 0.5, kAddedShare = 0.2;
 // Triangles for each seed, from which on a stand-in with fewer may pay.
 constexpr std::size_t kManyFacets = 6;
-// Of the steps of the finest level, those that are made on the input after all.
-constexpr double kOnInputShare = 0.15;
 constexpr int kMendingRounds = 3;  // of features and topology
 // Edges along features and borders at most: so many, or so many times the vertices asked for.
 constexpr double kMostOnFeatures = 1e6, kMostOnFeaturesPerVertex = 1000;
@@ -170,8 +168,9 @@ class Pipeline {
   void place_on_short_curves();
   void to_next_level(std::size_t count);
   void make_stand_ins(const std::vector<std::size_t>& counts);
-  bool begin_on_stand_in(std::size_t level);
-  void return_to_input();
+  void open_stand_in(std::size_t level);
+  void begin_on_stand_in();
+  void return_to_input() { run_.change_backend(backend_); }
   void optimise_levels(const std::vector<std::size_t>& counts);
   bool is_held(const SeedPlace& place) const {
     return place.corner != kNone && !plan_.held.empty() && plan_.held[place.corner];
@@ -194,7 +193,7 @@ class Pipeline {
   Backend& backend_;
   const MakeBackend& make_backend_;
   std::vector<CoarseSurface> stand_ins_;  // for the input's surface, by level
-  std::unique_ptr<Backend> on_stand_in_;  // what computes the diagrams of one
+  std::unique_ptr<Backend> stand_in_;     // what computes the diagrams of that for the level, if there is one
   const Surface& surface_;
   const RemeshPlan& plan_;
   const FeatureCurves curves_;
@@ -256,17 +255,12 @@ void Pipeline::make_stand_ins(const std::vector<std::size_t>& counts) {
   }
 }
 
-// Whether there is a stand-in for that level. Then the run is on it.
-bool Pipeline::begin_on_stand_in(std::size_t level) {
-  if (!stand_ins_[level].surface) return false;
-  on_stand_in_ = make_backend_(*stand_ins_[level].surface);
-  run_.change_backend(*on_stand_in_);
-  return true;
+void Pipeline::open_stand_in(std::size_t level) {
+  if (stand_ins_[level].surface) stand_in_ = make_backend_(*stand_ins_[level].surface);
 }
 
-void Pipeline::return_to_input() {
-  run_.change_backend(backend_);
-  on_stand_in_.reset();
+void Pipeline::begin_on_stand_in() {
+  if (stand_in_) run_.change_backend(*stand_in_);
 }
 
 // With seeds for the first of these levels.
@@ -284,31 +278,25 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     const bool finest = level + 1 == counts.size();
     const bool may_localise = finest && can_localise();
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
+    open_stand_in(level);
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
-    const bool stands_in = step_.iterations > 0 && begin_on_stand_in(level);
-    if (stands_in && finest) {
-      const int on_input = share_of(step_.iterations, kOnInputShare);
-      step_.iterations -= on_input;
-      optimise(run_, step_);
-      step_.iterations = on_input;
-      return_to_input();
-    }
-    optimise(run_, step_);
+    optimise_with(run_, stand_in_.get(), step_, finest && !many ? kOnSurfaceShare : 0);
     if (may_localise) run_.localise(true);
     if (may_localise && run_.strays() == 0) run_.localise(false);
     if (many || run_.localises()) {
       // What is around both sides of a bent wall is nearer to the inner one, so too many seeds are there.
+      begin_on_stand_in();
       follow_density(run_);
-      step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
-      optimise(run_, step_);
-    }
-    if (run_.has_features()) {
       return_to_input();
-      clear_features(run_, trace_, measure_, step_);
-      if (!finest) begin_on_stand_in(level);
+      step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
+      optimise_with(run_, stand_in_.get(), step_);
     }
-    if (!finest) to_next_level(counts[level + 1]);
+    if (run_.has_features()) clear_features(run_, trace_, measure_, step_, stand_in_.get());
+    if (finest) break;
+    begin_on_stand_in();
+    to_next_level(counts[level + 1]);
     return_to_input();
+    stand_in_.reset();
     stand_ins_[level] = {};
   }
   if (plan_.constrained) {
@@ -363,7 +351,7 @@ std::vector<Vec3> Pipeline::all_vertices() const {
 
 void Pipeline::mend_features() {
   const Stopwatch watch;
-  features_ = recover_features(run_, trace_, measure_, measure_.scale(wanted_), step_);
+  features_ = recover_features(run_, trace_, measure_, measure_.scale(wanted_), step_, stand_in_.get());
   result_.seconds.features += watch.seconds();
 }
 
@@ -374,7 +362,8 @@ void Pipeline::mend_features_and_topology() {
     if (run_.has_features()) mend_features();
     if (plan_.topology != TopologyControl::enforce || dual_suffices()) return;
     const Stopwatch watch;
-    topology_ = enforce_topology(run_, trace_, input_topology_, step_, {plan_.branches, placed_around_});
+    topology_ =
+        enforce_topology(run_, trace_, input_topology_, step_, {plan_.branches, placed_around_, stand_in_.get()});
     if (!topology_.ball.holds && round + 1 < kMendingRounds && free_tips()) {
       step_.iterations = kFreedSteps;
       optimise(run_, step_);
@@ -560,12 +549,14 @@ bool Pipeline::place_around(const PlacedSeeds& earlier) {
     return false;
   }
   placed_around_ = true;
+  make_stand_ins({wanted_});
+  open_stand_in(0);
   step_.constrained = plan_.constrained;
   step_.phase = "around shorter edges";
   step_.iterations = share_of(plan_.iterations, kFinestShare);
   step_.done = 0;
   step_.share = 1;
-  optimise_around(run_, before, step_);
+  optimise_around(run_, before, step_, stand_in_.get());
   step_.done = 1;
   step_.share = 0;
   return true;

@@ -236,8 +236,10 @@ std::vector<char> failing_seeds(const BallReport& report, std::size_t count) {
 
 class Control {
  public:
-  Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, bool polishes_around, OptimiseOptions options)
-      : run_(run), trace_(trace), is_sound_(is_sound), polishes_around_(polishes_around),
+  Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, const TopologyControlOptions& control,
+          OptimiseOptions options)
+      : run_(run), trace_(trace), is_sound_(is_sound), polishes_around_(control.polish_around),
+        stand_in_(control.stand_in),
         most_work_(is_sound ? kInfinity : run.totals.work + kMostFutileSteps * run.step_work()),
         options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_), most_(std::max(budget(), kGrown)),
         lost_(run.curves().size(), 0) {
@@ -522,7 +524,8 @@ class Control {
     const PlacedSeeds before = run_.seeds;
     options_.iterations = kPolishingSteps;
     options_.phase = "topology, polishing";
-    polishes_around_ ? optimise_around(run_, given, options_) : optimise(run_, options_);
+    if (polishes_around_) optimise_around(run_, given, options_, stand_in_);
+    else optimise_with(run_, stand_in_, options_);
     const std::vector<Vec3> next = run_.seeds.positions();
     std::vector<char> held = held_seeds();
     move(before, next, held);
@@ -567,7 +570,8 @@ class Control {
   const FeatureTrace& trace_;
   const bool is_sound_;         // the input is a manifold and oriented, or branches on purpose
   const bool polishes_around_;  // what has changed, and not everywhere
-  const double most_work_;      // of the run
+  Backend* const stand_in_;
+  const double most_work_;  // of the run
   OptimiseOptions options_;
   std::size_t wanted_;      // vertices
   std::size_t given_;       // seeds before those inserted by refining
@@ -633,7 +637,7 @@ std::vector<TopologyFault> topology_faults(const BallReport& report, const std::
 TopologyOutcome enforce_topology(CvtRun& run, const FeatureTrace& trace, const MeshTopology& input,
                                  OptimiseOptions options, const TopologyControlOptions& control) {
   const bool is_sound = control.branches || (input.manifold && input.oriented);
-  return Control(run, trace, is_sound, control.polish_around, std::move(options)).run();
+  return Control(run, trace, is_sound, control, std::move(options)).run();
 }
 
 }  // namespace bisector

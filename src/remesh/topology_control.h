@@ -34,8 +34,9 @@ struct TopologyOutcome {
 };
 
 struct TopologyControlOptions {
-  bool branches = false;       // the surface branches on purpose
-  bool polish_around = false;  // all but the seeds around what changes are as they should be
+  bool branches = false;        // the surface branches on purpose
+  bool polish_around = false;   // all but the seeds around what changes are as they should be
+  Backend* stand_in = nullptr;  // of a surface on which most of the last optimisation's steps are made
 };
 
 // Inserts seeds until the topological ball property holds:

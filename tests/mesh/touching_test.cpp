@@ -211,6 +211,9 @@ TEST(SolidsWithCommonFaces, AreToldFromSheetsSeenFromBothSides) {
   const std::vector<Triangle> front = sheet.triangles;
   for (const auto& [a, b, c] : front) sheet.triangles.push_back({a, c, b});
   EXPECT_FALSE(has_solids_with_common_faces(sheet));
+  TriangleMesh twice = surface_of({{0, 0, 0}});
+  for (const Triangle& t : std::vector<Triangle>(twice.triangles)) twice.triangles.push_back(t);
+  EXPECT_FALSE(has_solids_with_common_faces(twice));
 }
 
 TEST(SolidsWithCommonFaces, AreRemeshedEachForItself) {
