@@ -25,8 +25,8 @@ std::vector<Index> separate_touching(TriangleMesh& mesh);
 
 // Whether a surface is that of several solids, some of which have faces in common: once each has vertices of its own,
 // by the two above, it is closed and manifold, triangles that are there twice are on two components each, and each
-// component has others, too. A sheet that is to be seen from both sides is there twice on one component, a solid that is
-// written twice has no triangle that its copy has not.
+// component has others, too. A sheet that is to be seen from both sides is there twice on one component, a solid that
+// is written twice has no triangle that its copy has not.
 bool has_solids_with_common_faces(TriangleMesh mesh);
 
 // Edges that were named before halve_touching_edges, which returned `halved` and left `count` vertices.

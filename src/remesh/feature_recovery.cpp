@@ -22,7 +22,7 @@ using Kind = SeedPlace::Kind;
 // moves. What comes next begins at once when a round leaves more than this share of the faults.
 constexpr int kRelocatingRounds = 3, kMovingRounds = 8, kInsertingRounds = 20;
 constexpr double kWorthARound = 0.75;
-constexpr int kFirstSteps = 10, kLastSteps = 4;
+constexpr int kFirstSteps = 20, kLastSteps = 4;
 // Steps after clearing curves at the end of a level.
 constexpr int kClearingSteps = 20;
 // Seeds that recovery may add, beside a quarter of those there are.

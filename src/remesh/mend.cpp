@@ -27,10 +27,10 @@ constexpr double kLeastGain = 0.05;  // of what is missing of the angles
 // many.
 constexpr std::size_t kMostSearches = 500, kVerticesPerSearch = 200;
 constexpr long long kDrift = 200;
-// Rounds over the pairs of triangles that cross, one pair at most for so many vertices, and the best changes of a part
-// that are looked at for whether they cross.
+// Rounds over the pairs of triangles that cross, and the best changes of a part that are looked at for whether they
+// cross.
 constexpr int kUncrossingRounds = 4;
-constexpr std::size_t kVerticesPerCrossing = 20, kMostUncrossed = 64;
+constexpr std::size_t kMostUncrossed = 64;
 
 std::array<Index, 2> key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 

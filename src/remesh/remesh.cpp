@@ -718,7 +718,8 @@ AnotherRun another_run(Pipeline& pipeline, const JudgedResult& judged, const Cro
   if (judged.slivers.hopeless) return next;
   if (judged.slivers.worth_another_run) next.why = "shorter edges for angles";
   next.bounds = judged.slivers.bounds;
-  next.add("shorter edges where it crosses", crossings.bounds);
+  if (crossings.pairs <= result.mesh.vertices.size() / kVerticesPerCrossing)
+    next.add("shorter edges where it crosses", crossings.bounds);
   if (!result.topology_matches) next.add("shorter edges for topology", pipeline.crowded());
   if (result.features.broken > 0) next.add("shorter edges for curves", pipeline.broken_curves());
   return next;
