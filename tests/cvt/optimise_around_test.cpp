@@ -12,6 +12,7 @@
 #include "core/parallel.h"
 #include "cvt/multilevel.h"
 #include "support/models.h"
+#include "support/optimised.h"
 #include "support/run.h"
 
 namespace bisector::test {
@@ -114,6 +115,55 @@ TEST(OptimiseAround, RepeatsBitForBit) {
     if (first.empty()) first = settled.free.seeds();
     EXPECT_EQ(settled.free.seeds(), first);
   }
+}
+
+// Where a surface of a quarter of the triangles stands in, whose vertices are on the finer one and whose faces are not.
+TEST(OptimiseAround, EndsOnTheSurfaceThatAnotherStandsInFor) {
+  const Surface coarse(icosphere(4));
+  CpuBackend stand_in(coarse, NeighbourSource::nearest);
+  Settled settled(icosphere(5));
+  CvtRun& run = settled.run();
+  const PlacedSeeds start = run.seeds;
+  for (const int steps : {4, 60}) {  // the first are too few for any to be made on the surface itself
+    SCOPED_TRACE(steps);
+    settled.options.iterations = steps;
+    run.seeds = start;
+    const SeedsBefore before = seeds_before(run);
+    disturb(run.seeds);
+    const PlacedSeeds disturbed = run.seeds;
+    complete(run, true);
+    const double disturbed_energy = run.energy;
+    optimise_around(run, before, settled.options, &stand_in);
+    std::size_t moved = 0;
+    for (Index i = 0; i < kSeeds; ++i) {
+      if (run.seeds.position(i) == disturbed.position(i)) continue;
+      ++moved;
+      EXPECT_LE(norm(nearest_of_all(settled.surface, run.seeds.position(i)) - run.seeds.position(i)), 1e-12);
+    }
+    EXPECT_GT(moved, 30u);
+    EXPECT_LT(moved, 200u);
+    complete(run, true);
+    EXPECT_LT(run.energy, disturbed_energy);
+  }
+}
+
+TEST(OptimiseWith, MakesItsLastStepsOnTheSurface) {
+  const Surface fine(icosphere(5)), coarse(icosphere(4));
+  CpuBackend backend(fine, NeighbourSource::nearest), stand_in(coarse, NeighbourSource::nearest);
+  OptimiseOptions options;
+  options.iterations = 40;
+  options.constrained = true;
+  FreeRun alone(backend, initial_seeds(fine, kSeeds, 7)), together(backend, alone.seeds());
+  optimise(alone.run, options);
+  optimise_with(together.run, &stand_in, options);
+  EXPECT_EQ(&together.run.backend(), &backend);
+  for (const Vec3& x : together.seeds()) EXPECT_LE(norm(nearest_of_all(fine, x) - x), 1e-12);
+  EXPECT_NEAR(together.run.energy, alone.run.energy, 0.01 * alone.run.energy);
+  // Without a share of the steps for the surface, seeds stay where the other one has them.
+  FreeRun apart(backend, initial_seeds(fine, kSeeds, 7)), on_it(stand_in, apart.seeds());
+  optimise_with(apart.run, &stand_in, options, 0);
+  optimise(on_it.run, options);
+  EXPECT_EQ(apart.seeds(), on_it.seeds());
 }
 
 }  // namespace
