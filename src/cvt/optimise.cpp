@@ -289,9 +289,9 @@ void optimise(CvtRun& run, const OptimiseOptions& options) {
                               (after.clip - before.clip);
 }
 
-void optimise_with(CvtRun& run, Backend* stand_in, OptimiseOptions options, double on_surface) {
-  if (!stand_in) return optimise(run, options);
+void optimise_with_stand_in(CvtRun& run, Backend* stand_in, OptimiseOptions options, double on_surface) {
   const auto last = static_cast<int>(std::ceil(on_surface * options.iterations));
+  if (!stand_in || last == options.iterations) return optimise(run, options);
   Backend& own = run.backend();
   run.change_backend(*stand_in);
   options.iterations -= last;

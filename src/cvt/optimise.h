@@ -27,7 +27,8 @@ inline constexpr double kOnSurfaceShare = 0.15;
 
 // The same, where there is a surface that stands in for the run's first on that, but for the share `on_surface` of the
 // steps.
-void optimise_with(CvtRun& run, Backend* stand_in, OptimiseOptions options, double on_surface = kOnSurfaceShare);
+void optimise_with_stand_in(CvtRun& run, Backend* stand_in, OptimiseOptions options,
+                            double on_surface = kOnSurfaceShare);
 
 // dF/dx_i = 2 m_i (x_i - c_i) of each seed, and its part along what the seed is held on.
 struct CvtGradient {

@@ -136,27 +136,20 @@ void move_around(CvtRun& run, const SeedsBefore& before, const MoveSeeds& move) 
 }
 
 void optimise_around(CvtRun& run, const SeedsBefore& before, const OptimiseOptions& options, Backend* stand_in) {
-  const auto optimise_in = [&](CvtRun& part, const Moving& moving, int iterations) {
+  const auto optimise_marked = [&](const Moving& moving, int iterations) {
     OptimiseOptions some = options;
     some.iterations = iterations;
-    move_marked(part, moving, [&](CvtRun& moved, const std::vector<Index>&) { optimise(moved, some); });
+    move_marked(run, moving, [&](CvtRun& part, const std::vector<Index>&) { optimise(part, some); });
   };
-  if (!stand_in) {
-    if (const Moving moving = around_changes(run, before); moving.any()) optimise_in(run, moving, options.iterations);
-    return;
-  }
-  CvtRun coarse(*stand_in, run.curves(), run.context());
-  coarse.seeds = run.seeds;
-  coarse.localise(run.localises());
-  const Moving moving = around_changes(coarse, before);
-  if (moving.any()) {
-    const int on_surface = static_cast<int>(kOnSurfaceShare * options.iterations);
-    optimise_in(coarse, moving, options.iterations - on_surface);
-    run.seeds = std::move(coarse.seeds);
-    // Without any step, seeds that are to be on the surface are put there all the same.
-    if (on_surface > 0 || options.constrained) optimise_in(run, moving, on_surface);
-  }
-  run.totals += coarse.totals;
+  Backend& own = run.backend();
+  if (stand_in) run.change_backend(*stand_in);
+  const Moving moving = around_changes(run, before);
+  const int on_surface = stand_in ? static_cast<int>(kOnSurfaceShare * options.iterations) : 0;
+  if (moving.any()) optimise_marked(moving, options.iterations - on_surface);
+  if (!stand_in) return;
+  run.change_backend(own);
+  // Without any step, seeds that are to be on the surface are put there all the same.
+  if (moving.any() && (on_surface > 0 || options.constrained)) optimise_marked(moving, on_surface);
 }
 
 }  // namespace bisector

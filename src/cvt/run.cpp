@@ -42,11 +42,9 @@ void CvtRun::localise(bool on) {
 }
 
 Localiser& CvtRun::localiser() {
-  if (localiser_surface_ != &surface()) {
-    localiser_ = std::make_unique<Localiser>(surface());
-    localiser_surface_ = &surface();
-  }
-  return *localiser_;
+  std::unique_ptr<Localiser>& here = backend_ == &home_ ? at_home_ : elsewhere_;
+  if (!here) here = std::make_unique<Localiser>(surface());
+  return *here;
 }
 
 void CvtRun::leave_out_strays(DiagramOfSeeds& known) {
@@ -113,10 +111,7 @@ bool CvtRun::covers(double mass) const {
 void CvtRun::change_backend(Backend& backend) {
   if (&backend == backend_) return;
   diagram_ = {};
-  if (backend_ != &home_ && localiser_surface_ == &surface()) {
-    localiser_.reset();
-    localiser_surface_ = nullptr;
-  }
+  elsewhere_.reset();
   backend_ = &backend;
 }
 

@@ -96,8 +96,8 @@ class CvtRun {
   const Context& context_;
   DiagramOfSeeds diagram_;
   bool localised_ = false;
-  std::unique_ptr<Localiser> localiser_;        // once there was need of it
-  const Surface* localiser_surface_ = nullptr;  // that it is for
+  // Once there was need of them: for the first backend's surface, and for another's while that is used.
+  std::unique_ptr<Localiser> at_home_, elsewhere_;
   // Of the surface where each seed was put last. A seed that owns no triangle keeps the one it had.
   std::vector<Vec3> normals_;
 };

@@ -31,10 +31,10 @@ inline constexpr std::size_t kVerticesPerCrossing = 20;
 // Mends triangles with an angle below 30 degrees that no two feature edges impose, with the changes of improve.h, which
 // are made in the mesh itself. A change stays if less is missing of the angles around it, and if it makes no triangles
 // intersect and keeps the topology; vertices stay on the surface, and curves chains of edges. New vertices come last,
-// and those that are removed leave no gap. Where more triangles cross than may, changes around them stay that make
-// the pairs fewer and no angle worse, unless there is more than one for kVerticesPerCrossing vertices.
-// Labels are those of the surface's triangles in the middle. There is a bound on the searches, which begin with the
-// worst triangles. Throws Cancelled.
+// and those that are removed leave no gap. Where more triangles cross than may, changes around them stay that make the
+// pairs fewer and no angle worse, unless there is more than one for kVerticesPerCrossing vertices. Labels are those of
+// the surface's triangles in the middle. There is a bound on the searches, which begin with the worst triangles. Throws
+// Cancelled.
 MendReport mend_angles(const CellMap& map, const FeatureCurves& curves, const FeatureTrace& trace,
                        const ImproveOptions& options, MendMesh& result, const Context& context);
 

@@ -280,7 +280,7 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
     const bool many = may_localise && run_.strays() > counts[level] / kManyStrays;
     open_stand_in(level);
     step_.iterations = many ? steps - share_of(steps, kLocalisedShare) : steps;
-    optimise_with(run_, stand_in_.get(), step_, finest && !many ? kOnSurfaceShare : 0);
+    optimise_with_stand_in(run_, stand_in_.get(), step_, finest && !many ? kOnSurfaceShare : 0);
     if (may_localise) run_.localise(true);
     if (may_localise && run_.strays() == 0) run_.localise(false);
     if (many || run_.localises()) {
@@ -289,7 +289,7 @@ void Pipeline::optimise_levels(const std::vector<std::size_t>& counts) {
       follow_density(run_);
       return_to_input();
       step_.iterations = many ? share_of(steps, kLocalisedShare) : share_of(plan_.iterations, kAddedShare);
-      optimise_with(run_, stand_in_.get(), step_);
+      optimise_with_stand_in(run_, stand_in_.get(), step_);
     }
     if (run_.has_features()) clear_features(run_, trace_, measure_, step_, stand_in_.get());
     if (finest) break;

@@ -238,8 +238,7 @@ class Control {
  public:
   Control(CvtRun& run, const FeatureTrace& trace, bool is_sound, const TopologyControlOptions& control,
           OptimiseOptions options)
-      : run_(run), trace_(trace), is_sound_(is_sound), polishes_around_(control.polish_around),
-        stand_in_(control.stand_in),
+      : run_(run), trace_(trace), is_sound_(is_sound), control_(control),
         most_work_(is_sound ? kInfinity : run.totals.work + kMostFutileSteps * run.step_work()),
         options_(std::move(options)), wanted_(run.seeds.size()), given_(wanted_), most_(std::max(budget(), kGrown)),
         lost_(run.curves().size(), 0) {
@@ -524,8 +523,8 @@ class Control {
     const PlacedSeeds before = run_.seeds;
     options_.iterations = kPolishingSteps;
     options_.phase = "topology, polishing";
-    if (polishes_around_) optimise_around(run_, given, options_, stand_in_);
-    else optimise_with(run_, stand_in_, options_);
+    if (control_.polish_around) optimise_around(run_, given, options_, control_.stand_in);
+    else optimise_with_stand_in(run_, control_.stand_in, options_);
     const std::vector<Vec3> next = run_.seeds.positions();
     std::vector<char> held = held_seeds();
     move(before, next, held);
@@ -568,9 +567,8 @@ class Control {
 
   CvtRun& run_;
   const FeatureTrace& trace_;
-  const bool is_sound_;         // the input is a manifold and oriented, or branches on purpose
-  const bool polishes_around_;  // what has changed, and not everywhere
-  Backend* const stand_in_;
+  const bool is_sound_;  // the input is a manifold and oriented, or branches on purpose
+  const TopologyControlOptions control_;
   const double most_work_;  // of the run
   OptimiseOptions options_;
   std::size_t wanted_;      // vertices

@@ -147,7 +147,7 @@ TEST(OptimiseAround, EndsOnTheSurfaceThatAnotherStandsInFor) {
   }
 }
 
-TEST(OptimiseWith, MakesItsLastStepsOnTheSurface) {
+TEST(OptimiseWithStandIn, MakesItsLastStepsOnTheSurface) {
   const Surface fine(icosphere(5)), coarse(icosphere(4));
   CpuBackend backend(fine, NeighbourSource::nearest), stand_in(coarse, NeighbourSource::nearest);
   OptimiseOptions options;
@@ -155,13 +155,13 @@ TEST(OptimiseWith, MakesItsLastStepsOnTheSurface) {
   options.constrained = true;
   FreeRun alone(backend, initial_seeds(fine, kSeeds, 7)), together(backend, alone.seeds());
   optimise(alone.run, options);
-  optimise_with(together.run, &stand_in, options);
+  optimise_with_stand_in(together.run, &stand_in, options);
   EXPECT_EQ(&together.run.backend(), &backend);
   for (const Vec3& x : together.seeds()) EXPECT_LE(norm(nearest_of_all(fine, x) - x), 1e-12);
   EXPECT_NEAR(together.run.energy, alone.run.energy, 0.01 * alone.run.energy);
   // Without a share of the steps for the surface, seeds stay where the other one has them.
   FreeRun apart(backend, initial_seeds(fine, kSeeds, 7)), on_it(stand_in, apart.seeds());
-  optimise_with(apart.run, &stand_in, options, 0);
+  optimise_with_stand_in(apart.run, &stand_in, options, 0);
   optimise(on_it.run, options);
   EXPECT_EQ(apart.seeds(), on_it.seeds());
 }
