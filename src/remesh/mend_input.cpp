@@ -42,6 +42,18 @@ void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
       mesh.vertices[v] += (step / length) * inwards[v];
 }
 
+// Takes those back whose edges coincide with others, too: there borders meet along lines.
+void leave_seams(const TriangleMesh& mesh, std::vector<Index>& first) {
+  std::vector<char> is_equal(first.size(), 0), on_seam(first.size(), 0);
+  for (Index v = 0; v < first.size(); ++v)
+    if (first[v] != v) is_equal[v] = is_equal[first[v]] = 1;
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      if (const Index a = t[k], b = t[(k + 1) % 3]; is_equal[a] && is_equal[b]) on_seam[first[a]] = on_seam[first[b]] = 1;
+  for (Index v = 0; v < first.size(); ++v)
+    if (on_seam[first[v]]) first[v] = v;
+}
+
 }  // namespace
 
 std::string plural(std::size_t count, const char* word) {
@@ -112,9 +124,9 @@ std::vector<double> Separation::values(std::vector<double> given) const {
   return given;
 }
 
-void part_equal_points(TriangleMesh& mesh, const Context& context) {
-  if (topology_of(mesh).boundary_edges > 0) return;
-  const std::vector<Index> first = first_equal(mesh.vertices);
+void part_equal_points(TriangleMesh& mesh, bool seams, const Context& context) {
+  std::vector<Index> first = first_equal(mesh.vertices);
+  if (!seams) leave_seams(mesh, first);
   std::size_t count = 0;
   for (Index v = 0; v < first.size(); ++v) count += first[v] != v;
   if (count == 0) return;

@@ -42,9 +42,10 @@ class Separation {
   std::vector<Index> original_;
 };
 
-// Moves vertices at the same point apart, 1e-7 of the diagonal towards their triangles, with a warning, if the surface
-// has no border: it hangs together elsewhere then.
-void part_equal_points(TriangleMesh& mesh, const Context& context);
+// Moves vertices at the same point apart, 1e-7 of the diagonal towards their triangles, with a warning: of two seeds at
+// the same point one owns nothing. With `seams` also those of borders that coincide in edges, else where parts touch in
+// single points alone.
+void part_equal_points(TriangleMesh& mesh, bool seams, const Context& context);
 
 // Moves faces apart in which components lie on each other (mesh/face_contacts.h), with a warning: triangles of two
 // faces that coincide all intersect, and the more, the finer they are.

@@ -178,7 +178,10 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   for (auto* edges : {&features.given, &keep_edges}) rename_edges(vertex_of, *edges);
   const std::size_t vertices = mesh_.vertices.size();
   Separation separation(mesh_);
-  if (!branches) separation.separate(mesh_, context);
+  if (!branches) {
+    separation.separate(mesh_, context);
+    part_equal_points(mesh_, false, context);
+  }
   features.given = separation.edges(mesh_, features.given);
   keep_edges = separation.edges(mesh_, keep_edges);
   if (!branches && options.keep_vertices.empty() && options.keep_edges.empty()) open_contacts(mesh_, context);

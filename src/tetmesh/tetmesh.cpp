@@ -317,7 +317,8 @@ void separate(TriangleMesh& mesh, TetOptions& options, const Context& context) {
   options.features.given = separation.edges(mesh, options.features.given);
   std::vector<double>& attribute = options.sizing.field.attribute;
   if (!attribute.empty()) attribute = separation.values(std::move(attribute));
-  part_equal_points(mesh, context);
+  // A surface that has borders is to be joined at its seams.
+  part_equal_points(mesh, analyse_topology(mesh.triangles, mesh.vertices.size()).boundary_edges == 0, context);
   open_contacts(mesh, context);
 }
 

@@ -321,6 +321,32 @@ TEST(RemeshHard, WhatTouchesInAPointIsSeveralSurfaces) {
   EXPECT_EQ(std::count_if(result.mesh.vertices.begin(), result.mesh.vertices.end(), is_there), 2);
 }
 
+// Two borders of a plate that have a vertex each at the same point, as files leave it that were made manifold: of two
+// seeds there one would own nothing.
+TEST(RemeshHard, BordersThatTouchInAPointKeepTheirCurves) {
+  const int cells = 3;
+  TriangleMesh plate;
+  for (int y = 0; y <= cells; ++y)
+    for (int x = 0; x <= cells; ++x) plate.vertices.push_back({double(x), double(y), 0});
+  const auto at = [&](int x, int y) { return static_cast<Index>(y * (cells + 1) + x); };
+  for (int y = 0; y < cells; ++y)
+    for (int x = 0; x < cells; ++x) {
+      if ((x == 0 && y == 0) || (x == 1 && y == 1)) continue;
+      plate.triangles.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+      plate.triangles.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
+    }
+  const auto copy = static_cast<Index>(plate.vertices.size());
+  plate.vertices.push_back({1, 1, 0});
+  for (Triangle& t : plate.triangles)
+    if (std::find(t.begin(), t.end(), at(1, 0)) != t.end()) std::replace(t.begin(), t.end(), at(1, 1), copy);
+  ASSERT_TRUE(analyse_topology(plate.triangles, plate.vertices.size()).manifold);
+  const RemeshResult result = remesh(plate, options_for(600));
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_EQ(result.features.broken, 0u);
+  EXPECT_EQ(result.mesh.vertices.size(), 600u);
+  EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
+}
+
 TEST(RemeshHard, FewVerticesGiveWhatTheyCan) {
   for (const TriangleMesh& mesh : {icosphere(3), torus(24, 16), box(2), two_spheres()})
     for (std::size_t vertices : {4u, 5u, 12u, 40u}) {
