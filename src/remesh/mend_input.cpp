@@ -49,7 +49,8 @@ void leave_seams(const TriangleMesh& mesh, std::vector<Index>& first) {
     if (first[v] != v) is_equal[v] = is_equal[first[v]] = 1;
   for (const Triangle& t : mesh.triangles)
     for (std::size_t k = 0; k < 3; ++k)
-      if (const Index a = t[k], b = t[(k + 1) % 3]; is_equal[a] && is_equal[b]) on_seam[first[a]] = on_seam[first[b]] = 1;
+      if (const Index a = t[k], b = t[(k + 1) % 3]; is_equal[a] && is_equal[b])
+        on_seam[first[a]] = on_seam[first[b]] = 1;
   for (Index v = 0; v < first.size(); ++v)
     if (on_seam[first[v]]) first[v] = v;
 }
