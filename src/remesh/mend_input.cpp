@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <utility>
 
 #include "core/geometry.h"
 #include "mesh/caps.h"
 #include "mesh/face_contacts.h"
+#include "mesh/half_edges.h"
 #include "mesh/joining.h"
 #include "mesh/short_edges.h"
 #include "mesh/topology.h"
@@ -42,15 +44,20 @@ void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
       mesh.vertices[v] += (step / length) * inwards[v];
 }
 
-// Takes those back whose edges coincide with others, too: there borders meet along lines.
+// Takes those back that have edges in common with what they are equal to: there borders meet along lines.
 void leave_seams(const TriangleMesh& mesh, std::vector<Index>& first) {
   std::vector<char> is_equal(first.size(), 0), on_seam(first.size(), 0);
   for (Index v = 0; v < first.size(); ++v)
     if (first[v] != v) is_equal[v] = is_equal[first[v]] = 1;
+  std::map<std::array<Index, 2>, std::array<Index, 2>> edges;  // between points, and the first between vertices there
   for (const Triangle& t : mesh.triangles)
-    for (std::size_t k = 0; k < 3; ++k)
-      if (const Index a = t[k], b = t[(k + 1) % 3]; is_equal[a] && is_equal[b])
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::array<Index, 2> edge = ascending(t[k], t[(k + 1) % 3]);
+      const auto [a, b] = edge;
+      if (!is_equal[a] || !is_equal[b]) continue;
+      if (edges.try_emplace(ascending(first[a], first[b]), edge).first->second != edge)
         on_seam[first[a]] = on_seam[first[b]] = 1;
+    }
   for (Index v = 0; v < first.size(); ++v)
     if (on_seam[first[v]]) first[v] = v;
 }

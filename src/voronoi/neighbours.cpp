@@ -385,18 +385,22 @@ std::size_t Neighbours::nearest_to(Index slot, std::size_t count, Index* slots) 
   const Vec3 p = seeds_->x[slot];
   const NeighbourList known = list(slot);
   const std::size_t listed = static_cast<std::size_t>(known.end - known.begin);
-  using Near = std::pair<double, Index>;  // squared distance, caller's index
+  struct Near {
+    double squared;
+    Index id;  // the caller's
+    bool operator<(const Near& other) const { return std::tie(squared, id) < std::tie(other.squared, other.id); }
+  };
   const auto take = [&](Near* first, std::size_t size) {
     const std::size_t taken = std::min(count, size);
     std::partial_sort(first, first + taken, first + size);
-    for (std::size_t k = 0; k < taken; ++k) slots[k] = seeds_->slot[first[k].second];
+    for (std::size_t k = 0; k < taken; ++k) slots[k] = seeds_->slot[first[k].id];
     return taken;
   };
   // The nearest listed seeds bound the distance of the nearest of all, and so do those that are near in their order.
   double radius = listed >= count ? norm(seeds_->x[known.begin[count - 1]] - p) : distance_in_order(slot, count);
   radius *= 1 + 1e-9;
   if (!use_rings_ && listed >= count && radius < known.radius) {
-    std::array<Near, ListLength::kMost> nearest;
+    std::array<Near, ListLength::kMost> nearest;  // not initialised, which would take as long as the search
     std::size_t size = 0;
     for (const Index* j = known.begin; j != known.end; ++j) {
       const double squared = norm2(seeds_->x[*j] - p);
@@ -409,9 +413,9 @@ std::size_t Neighbours::nearest_to(Index slot, std::size_t count, Index* slots) 
     const std::vector<Index> found = around(p, radius);
     nearest.clear();
     for (const Index j : found)
-      if (j != slot) nearest.emplace_back(norm2(seeds_->x[j] - p), seeds_->id[j]);
+      if (j != slot) nearest.push_back({norm2(seeds_->x[j] - p), seeds_->id[j]});
     std::sort(nearest.begin(), nearest.end());
-    const bool complete = nearest.size() >= count && nearest[count - 1].first <= radius * radius;
+    const bool complete = nearest.size() >= count && nearest[count - 1].squared <= radius * radius;
     if (complete || found.size() == seeds_->x.size()) return take(nearest.data(), nearest.size());
   }
 }
