@@ -25,6 +25,9 @@ constexpr double kWorthARound = 0.75;
 constexpr int kFirstSteps = 20, kLastSteps = 4;
 // Steps after clearing curves at the end of a level.
 constexpr int kClearingSteps = 20;
+// Where links of a curve are divided so often in the rounds of inserting that it has so many times the faults, and no
+// fewer than so many, its sheets are too near to each other for any.
+constexpr std::size_t kDivided = 3, kLeastDivided = 8;
 // Seeds that recovery may add, beside a quarter of those there are.
 constexpr std::size_t kMostAdded = 100;
 // Lengths of curve, in edges: what a cell must hold to be snapped to it; what is worth a seed, and in the last rounds;
@@ -229,10 +232,10 @@ void protect_acute_corners(const FeatureCurves& curves, const CurveMeasure& meas
     if (!zones[k].empty()) space_evenly(curves, measure, k, on[k], seeds);
 }
 
-// True if something was changed. `crowd`: curves may get more seeds than they should have; `last`: nothing is moved
-// away.
+// True if something was changed. Links of `hopeless` curves are not divided. `crowd`: curves may get more seeds than
+// they should have; `last`: nothing is moved away.
 bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, const std::vector<FeatureFault>& faults,
-          bool crowd, bool last, PlacedSeeds& seeds) {
+          const std::vector<char>& hopeless, bool crowd, bool last, PlacedSeeds& seeds) {
   std::vector<std::size_t> wanted(curves.size());
   for (Index k = 0; k < curves.size(); ++k) wanted[k] = measure.edges(k, c) - (curves.closed(k) ? 0 : 1);
   for (const SeedPlace& place : seeds.places())
@@ -265,7 +268,7 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
       }
       continue;
     }
-    if (fault.cell == kNone && meeting && last) continue;
+    if (fault.cell == kNone && (hopeless[fault.curve] || (meeting && last))) continue;
     // Where curves cross another sheet no seed helps.
     const bool meets = fault.cell != kNone;
     const double least = last ? kTiniest : meets ? kSmallest : kShortLink;
@@ -282,6 +285,12 @@ bool mend(const FeatureCurves& curves, const CurveMeasure& measure, double c, co
     for (Index k : loosened) space_evenly(curves, measure, k, on[k], seeds);
   }
   return changed;
+}
+
+std::vector<std::size_t> faults_by_curve(const std::vector<FeatureFault>& faults, std::size_t curves) {
+  std::vector<std::size_t> counts(curves, 0);
+  for (const FeatureFault& fault : faults) ++counts[fault.curve];
+  return counts;
 }
 
 }  // namespace
@@ -381,6 +390,8 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
   protect_acute_corners(curves, measure, c, run.seeds);
   PlacedSeeds best;
   std::size_t fewest = std::numeric_limits<std::size_t>::max(), previous = fewest;
+  std::vector<std::size_t> first_faults;  // of the rounds of inserting, by curve
+  std::vector<char> hopeless(curves.size(), 0);
   bool crowd = false;
   for (int round = 0;; ++round) {
     run.context().check();
@@ -396,8 +407,14 @@ FeatureReport recover_features(CvtRun& run, const FeatureTrace& trace, const Cur
     crowd = crowd || stuck || round >= kRelocatingRounds;
     const bool last = round >= kMovingRounds;
     if (round == kMovingRounds + kInsertingRounds || run.seeds.size() > most) break;
+    if (last) {
+      const std::vector<std::size_t> faults = faults_by_curve(found.faults, curves.size());
+      if (first_faults.empty()) first_faults = faults;
+      for (Index k = 0; k < faults.size(); ++k)
+        hopeless[k] = faults[k] >= std::max(kDivided * first_faults[k], kLeastDivided);
+    }
     const SeedsBefore before = last ? SeedsBefore{} : seeds_before(run);
-    const bool changed = mend(curves, measure, c, found.faults, crowd, last, run.seeds);
+    const bool changed = mend(curves, measure, c, found.faults, hopeless, crowd, last, run.seeds);
     if (last && !changed) break;
     if (last) continue;
     if (!changed) {

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "core/grouping.h"
@@ -265,8 +266,7 @@ void Improver::measure(Snapshot& s) {
   s.excess.resize(s.costs.size());
   parallel_each(s.costs.size(), [&](std::size_t k) {
     const Triangle& t = dual.triangles[k];
-    s.costs[k] = shape_cost(seeds[t[0]], seeds[t[1]], seeds[t[2]], goal_);
-    s.excess[k] = shape_excess(seeds[t[0]], seeds[t[1]], seeds[t[2]], goal_);
+    std::tie(s.costs[k], s.excess[k]) = shape_cost_and_excess(seeds[t[0]], seeds[t[1]], seeds[t[2]], goal_);
   });
   s.average = fixed_sum(s.costs.size(), [&](std::size_t k) { return s.costs[k]; });
   s.average /= static_cast<double>(s.costs.size());

@@ -67,6 +67,20 @@ Shape shape_of(const Vec3& a, const Vec3& b, const Vec3& c) {
           6 / std::numbers::sqrt3 * norm(cross(u, v)) / ((rs + rm + rl) * rl)};
 }
 
+double cost_of(const Shape& shape, const ShapeGoal& goal) {
+  return (1 - shape.q) + kAngleWeight * (shape.smallest - 0.5) + beyond(shape.smallest - goal.near_min) +
+         beyond(goal.near_max - shape.largest);
+}
+
+// Most triangles are within the goal by more than its margin, which their cosines tell.
+ShapeExcess excess_of(const Shape& shape, const ShapeGoal& goal) {
+  const auto angle = [](double cosine) { return std::acos(std::clamp(cosine, -1.0, 1.0)) * kDegrees; };
+  ShapeExcess excess;
+  if (!(shape.smallest < goal.near_min)) excess.under = std::max(0.0, goal.min_angle - angle(shape.smallest));
+  if (!(shape.largest > goal.near_max)) excess.over = std::max(0.0, angle(shape.largest) - goal.max_angle);
+  return excess;
+}
+
 }  // namespace
 
 ShapeGoal shape_goal(double min_angle, double max_angle) {
@@ -75,15 +89,17 @@ ShapeGoal shape_goal(double min_angle, double max_angle) {
 }
 
 double shape_cost(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal) {
-  const Shape shape = shape_of(a, b, c);
-  return (1 - shape.q) + kAngleWeight * (shape.smallest - 0.5) + beyond(shape.smallest - goal.near_min) +
-         beyond(goal.near_max - shape.largest);
+  return cost_of(shape_of(a, b, c), goal);
 }
 
 ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal) {
+  return excess_of(shape_of(a, b, c), goal);
+}
+
+std::pair<double, ShapeExcess> shape_cost_and_excess(const Vec3& a, const Vec3& b, const Vec3& c,
+                                                     const ShapeGoal& goal) {
   const Shape shape = shape_of(a, b, c);
-  const auto angle = [](double cosine) { return std::acos(std::clamp(cosine, -1.0, 1.0)) * kDegrees; };
-  return {std::max(0.0, goal.min_angle - angle(shape.smallest)), std::max(0.0, angle(shape.largest) - goal.max_angle)};
+  return {cost_of(shape, goal), excess_of(shape, goal)};
 }
 
 bool angle_is_imposed(const std::array<Vec3, 3>& corners, const std::array<bool, 3>& locked) {

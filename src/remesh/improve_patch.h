@@ -42,6 +42,9 @@ struct ShapeExcess {
   }
 };
 ShapeExcess shape_excess(const Vec3& a, const Vec3& b, const Vec3& c, const ShapeGoal& goal);
+// Both in little more time than one of them takes.
+std::pair<double, ShapeExcess> shape_cost_and_excess(const Vec3& a, const Vec3& b, const Vec3& c,
+                                                     const ShapeGoal& goal);
 
 // Whether the smallest angle is between two locked edges, which curves give it. `locked` tells of the edges from each
 // corner to the next.

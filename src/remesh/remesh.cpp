@@ -58,15 +58,17 @@ constexpr double kMostOnFeatures = 1e6, kMostOnFeaturesPerVertex = 1000;
 // cell, or curve, in so many is such.
 constexpr double kShorter = 0.6;
 constexpr std::size_t kTooManyFailures = 4;
-// Of triangles, more than one sliver in so many are too high a price for components that do not cross.
-constexpr std::size_t kFewSlivers = 50;
+// Of triangles, more than one sliver in so many are too high a price for components that do not cross; with no more
+// than one in so many another run in which they share intersections may have none.
+constexpr std::size_t kFewSlivers = 50, kVeryFewSlivers = 500;
 // Of the seeds wanted, by how many those of an earlier run may be off. Where topology took many more, it has to be
 // found anew for other edge lengths.
 constexpr double kMostOff = 0.01;
-// Of a result, while that makes it better, and while all took no more than so many times the work of placing seeds.
-// Where components share intersections there may have to be runs in which they do not.
+// Of a result, while that makes it much better, and while all took no more than so many times the work of placing
+// seeds; less where the input is no manifold, whose curves and sheets cannot all be had. Where components share
+// intersections there may have to be runs in which they do not.
 constexpr int kRefinements = 3, kSharedRefinements = 1;
-constexpr double kMostWork = 5;
+constexpr double kMostWork = 5, kMostWorkForSheets = 3;
 // Runs for a distance to the input, how many times the vertices they may take, and the gap between bounds of it.
 constexpr int kNearings = 8;
 constexpr std::size_t kMostTimes = 10;
@@ -732,8 +734,8 @@ bool has_faults(const JudgedResult& judged) {
 
 std::size_t slivers_of(const JudgedResult& judged) { return judged.slivers.bounds.points.size() / 3; }
 
-bool has_many_slivers(const JudgedResult& judged) {
-  return slivers_of(judged) * kFewSlivers > judged.result.mesh.triangles.size();
+bool has_slivers(const JudgedResult& judged, std::size_t one_in) {
+  return slivers_of(judged) * one_in > judged.result.mesh.triangles.size();
 }
 
 // Whether a result in which components share vertices where they meet is to be preferred to one in which they do not:
@@ -742,7 +744,7 @@ bool shares_well(const JudgedResult& shared, const JudgedResult& apart, const Tr
   const std::size_t allowed = count_self_intersections(input);
   const auto rank = [&](const JudgedResult& j) {
     const std::size_t crossings = count_self_intersections(j.result.mesh);
-    return std::tuple(!j.result.topology_matches, has_many_slivers(j), (crossings > 0) + (crossings > allowed),
+    return std::tuple(!j.result.topology_matches, has_slivers(j, kFewSlivers), (crossings > 0) + (crossings > allowed),
                       slivers_of(j), crossings);
   };
   return rank(shared) < rank(apart);
@@ -892,9 +894,12 @@ void Runs::settle() {
   for (int left = may_shorten_ ? (shares ? kSharedRefinements : kRefinements) : 0;; --left) {
     Run run = make_run(left == 0);
     if (best_ && !is_better(run.judged, *best_)) return;
+    const bool goes_on = !best_ || is_much_better(run.judged, *best_);
     best_ = std::move(run.judged);
-    if (left == 0 || !run.next.why || spent_.totals.work - work_before_ > kMostWork * placing_) return;
-    if (shares && has_many_slivers(*best_)) return;
+    if (left == 0 || !run.next.why || !goes_on) return;
+    const double most = best_->result.input_topology.manifold ? kMostWork : kMostWorkForSheets;
+    if (spent_.totals.work - work_before_ > most * placing_) return;
+    if (shares && (best_->crossings > 0 || has_slivers(*best_, kVeryFewSlivers))) return;
     shorten_edges(run.next.bounds);
     progress_.start_again(run.next.why);
   }

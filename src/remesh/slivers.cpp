@@ -24,6 +24,7 @@ constexpr double kHopeless = 0.05;
 // Edges to be had in a sliver's place, by its height, and at least this part of its own: equilateral triangles have
 // 1.15 times their height as edges.
 constexpr double kPerHeight = 1.15, kLeast = 0.5;
+constexpr double kMuchFewer = 2.0 / 3;
 constexpr std::size_t kTrianglesAtOnce = 4096;
 
 }  // namespace
@@ -99,6 +100,15 @@ bool is_better(const JudgedResult& judged, const JudgedResult& than) {
     return std::tuple(!r.topology_matches, r.features.broken, j.crossings, j.slivers.bounds.points.size());
   };
   return rank(judged) < rank(than);
+}
+
+bool is_much_better(const JudgedResult& judged, const JudgedResult& than) {
+  const auto rank = [](const JudgedResult& j) {
+    return std::tuple(!j.result.topology_matches, j.result.features.broken, j.crossings);
+  };
+  if (rank(judged) != rank(than)) return rank(judged) < rank(than);
+  return static_cast<double>(judged.slivers.bounds.points.size()) <=
+         kMuchFewer * static_cast<double>(than.slivers.bounds.points.size());
 }
 
 bool is_worse(const JudgedResult& judged, const JudgedResult& than) {

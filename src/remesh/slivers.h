@@ -34,6 +34,8 @@ JudgedResult judge(RemeshResult result);
 // Whether a run is to be preferred to another on the same input: for its topology, then for the curves it keeps, then
 // for fewer pairs of triangles that cross though the input's do not, then for fewer slivers.
 bool is_better(const JudgedResult& judged, const JudgedResult& than);
+// Whether it is so by more than some slivers: by what comes before these, or by a third of them.
+bool is_much_better(const JudgedResult& judged, const JudgedResult& than);
 // Whether its topology is not the input's or more triangles cross, where the other is better in that.
 bool is_worse(const JudgedResult& judged, const JudgedResult& than);
 

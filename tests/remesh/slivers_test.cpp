@@ -76,6 +76,22 @@ TEST(Slivers, DecideAfterTopologyCurvesAndCrossings) {
   EXPECT_FALSE(is_better(good, good));
 }
 
+TEST(Slivers, AreMuchFewerByAThird) {
+  const auto judged = [](std::size_t slivers) {
+    JudgedResult j;
+    j.slivers.bounds.points.resize(3 * slivers);
+    j.slivers.bounds.lengths.resize(3 * slivers);
+    return j;
+  };
+  EXPECT_TRUE(is_much_better(judged(0), judged(1)));
+  EXPECT_TRUE(is_much_better(judged(8), judged(12)));
+  EXPECT_FALSE(is_much_better(judged(9), judged(12)));
+  JudgedResult whole = judged(12), broken = judged(1);
+  broken.result.features.broken = 1;
+  EXPECT_TRUE(is_much_better(whole, broken));
+  EXPECT_FALSE(is_much_better(broken, whole));
+}
+
 // Each triangle that crosses another asks for edges of half its own at its corners, once.
 TEST(Crossings, AskForShorterEdgesAtTheirTriangles) {
   TriangleMesh mesh = icosphere(3);
