@@ -18,18 +18,23 @@ namespace {
 
 // Of the longest edge: what is higher is a triangle of a fine mesh.
 constexpr double kFlat = 1e-3;
+// Of the longest edge of a triangle that is folded back, and the cosine from its normal to its neighbour's.
+constexpr double kFlatFold = 0.1, kFolded = -0.9;
 
 class CapFlips {
  public:
-  CapFlips(TriangleMesh& mesh, double height, const std::vector<std::array<Index, 2>>& given)
-      : mesh_(mesh), height_(height) {
-    for (Index t = 0; t < mesh.triangles.size(); ++t) push_if_low(t);
-    if (queue_.empty()) return;
+  CapFlips(TriangleMesh& mesh, double height, double fold, const std::vector<std::array<Index, 2>>& given)
+      : mesh_(mesh), height_(height), fold_(fold) {
+    std::vector<Index> low;
+    for (Index t = 0; t < mesh.triangles.size(); ++t)
+      if (is_low(t) || is_low_for_a_fold(t)) low.push_back(t);
+    if (low.empty()) return;
     for (const auto* edges : {&given, &std::as_const(mesh.feature_edges)})
       for (const auto& [a, b] : *edges) stays_.insert(edge_key(a, b));
     at_.resize(mesh.vertices.size());
     for (Index t = 0; t < mesh.triangles.size(); ++t)
       for (const Index v : mesh.triangles[t]) at_[v].push_back(t);
+    for (const Index t : low) push_if_low(t);
   }
 
   std::size_t run() {
@@ -67,9 +72,36 @@ class CapFlips {
 
   Vec3 normal_of(const Triangle& v) const { return twice_area_normal(at(v[0]), at(v[1]), at(v[2])); }
 
+  bool is_lower(Index t, double height, double flat) const {
+    const double is = height_of(mesh_.triangles[t]);
+    return is < height && is < flat * length_of(mesh_.triangles[t]);
+  }
+  bool is_low(Index t) const { return is_lower(t, height_, kFlat); }
+  bool is_low_for_a_fold(Index t) const { return is_lower(t, fold_, kFlatFold); }
+
+  // The only other triangle of an edge, or kNone.
+  Index across(Index t, Index a, Index b) const {
+    Index beside = kNone;
+    for (const Index u : at_[a]) {
+      if (u == t || !has_corner(mesh_.triangles[u], b)) continue;
+      if (beside != kNone) return kNone;
+      beside = u;
+    }
+    return beside;
+  }
+
+  // Back onto the neighbour at its longest edge.
+  bool is_folded(Index t) const {
+    const Triangle& v = mesh_.triangles[t];
+    const std::size_t k = longest_edge(v);
+    const Index beside = across(t, v[k], v[(k + 1) % 3]);
+    if (beside == kNone) return false;
+    const Vec3 n = normal_of(v), m = normal_of(mesh_.triangles[beside]);
+    return dot(n, m) < kFolded * norm(n) * norm(m);
+  }
+
   void push_if_low(Index t) {
-    const double height = height_of(mesh_.triangles[t]);
-    if (height < height_ && height < kFlat * length_of(mesh_.triangles[t])) queue_.push({height, t});
+    if (is_low(t) || (is_low_for_a_fold(t) && is_folded(t))) queue_.push({height_of(mesh_.triangles[t]), t});
   }
 
   bool flip(Index cap) {
@@ -77,12 +109,7 @@ class CapFlips {
     const std::size_t k = longest_edge(low);
     const Index a = low[k], b = low[(k + 1) % 3], apex = low[(k + 2) % 3];
     if (a == b || b == apex || apex == a || stays_.contains(edge_key(a, b))) return false;
-    Index beside = kNone;
-    for (const Index t : at_[a]) {
-      if (t == cap || !has_corner(mesh_.triangles[t], b)) continue;
-      if (beside != kNone) return false;
-      beside = t;
-    }
+    const Index beside = across(cap, a, b);
     if (beside == kNone) return false;
     const Triangle over = mesh_.triangles[beside];
     const Index other = over[0] + over[1] + over[2] - a - b;
@@ -113,7 +140,7 @@ class CapFlips {
   }
 
   TriangleMesh& mesh_;
-  const double height_;
+  const double height_, fold_;
   std::priority_queue<Low, std::vector<Low>, std::greater<>> queue_;
   std::unordered_set<std::uint64_t> stays_;
   std::vector<std::vector<Index>> at_;  // triangles of each vertex
@@ -121,8 +148,8 @@ class CapFlips {
 
 }  // namespace
 
-std::size_t flip_caps(TriangleMesh& mesh, double height, const std::vector<std::array<Index, 2>>& given) {
-  return CapFlips(mesh, height, given).run();
+std::size_t flip_caps(TriangleMesh& mesh, double height, double fold, const std::vector<std::array<Index, 2>>& given) {
+  return CapFlips(mesh, height, fold, given).run();
 }
 
 }  // namespace bisector

@@ -21,6 +21,8 @@ namespace {
 
 // Of the diagonal: how far vertices are moved that would be at the same point.
 constexpr double kApart = 1e-7;
+// Of the edge length: how high triangles are at most whose folds are let go.
+constexpr double kFold = 0.05;
 // Of the diagonal: what is put between faces in contact. Files in single precision keep it.
 constexpr double kFacesApart = 2e-6;
 
@@ -74,11 +76,10 @@ void rename_edges(const std::vector<Index>& vertex_of, std::vector<std::array<In
   std::erase_if(edges, [](const std::array<Index, 2>& e) { return e[0] == e[1]; });
 }
 
-void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, double flat_part,
-                   const Context& context) {
+void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, double edge, const Context& context) {
   rename_edges(welded.vertex_of, given);
   const double length = kRounding * bounding_box(welded.mesh).diagonal();
-  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given, flat_part);
+  const ShortEdges shortest = collapse_short_edges(welded.mesh, length, given, edge);
   if (shortest.collapsed + shortest.removed_parts > 0) {
     rename_edges(shortest.vertex_of, given);
     for (Index& v : welded.vertex_of)
@@ -92,8 +93,10 @@ void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, 
   if (shortest.removed_parts > 0)
     context.warn(fmt::format("left out {} smaller than edges, with nothing inside but for rounding, {:g}",
                              plural(shortest.removed_parts, "closed part"), length));
-  if (const std::size_t flipped = flip_caps(welded.mesh, length, given); flipped > 0)
-    context.warn(fmt::format("flipped {} of triangles lower than {:g}", plural(flipped, "edge"), length));
+  const double fold = kFold * edge;
+  if (const std::size_t flipped = flip_caps(welded.mesh, length, fold, given); flipped > 0)
+    context.warn(fmt::format("flipped {} of triangles lower than {:g}, or folded back and lower than {:g}",
+                             plural(flipped, "edge"), length, fold));
 }
 
 void Separation::separate(TriangleMesh& mesh, const Context& context) {

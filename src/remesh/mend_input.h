@@ -13,10 +13,10 @@
 namespace bisector {
 
 // Mends what is within rounding, 1e-5 of the diagonal: shorter edges are collapsed, and parts without an inside left
-// out (mesh/short_edges.h, also for `flat_part`), lower caps flipped (mesh/caps.h). `given` are edges of the mesh that
-// was welded, which stay. Says in warnings what was done.
-void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, double flat_part,
-                   const Context& context);
+// out that are smaller than `edge`, the length of edges asked for (mesh/short_edges.h), lower caps flipped
+// (mesh/caps.h), and with them triangles folded back that are lower than a twentieth of `edge`. `given` are edges of
+// the mesh that was welded, which stay. Says in warnings what was done.
+void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, double edge, const Context& context);
 
 // Where parts of the surface touch in points, or solids along edges, they are meshed as if they did not: the surface is
 // a manifold then.

@@ -76,14 +76,14 @@ TEST(Caps, AreFlippedUntilNoneIsLeft) {
       ASSERT_LT(lowest(mesh), kHeight);
       const double area = area_of(mesh);
       const std::vector<Vec3> vertices = mesh.vertices;
-      EXPECT_GE(flip_caps(mesh, kHeight, {}), 2u * static_cast<unsigned>(points));
+      EXPECT_GE(flip_caps(mesh, kHeight, 0, {}), 2u * static_cast<unsigned>(points));
       EXPECT_GE(lowest(mesh), kHeight) << points << " " << off;
       EXPECT_EQ(mesh.vertices, vertices);
       EXPECT_NEAR(area_of(mesh), area, 10 * kHeight);
       const MeshTopology topology = analyse_topology(mesh.triangles, mesh.vertices.size());
       EXPECT_TRUE(topology.manifold && topology.closed && topology.oriented);
       EXPECT_EQ(topology.euler, 2);
-      EXPECT_EQ(flip_caps(mesh, kHeight, {}), 0u);
+      EXPECT_EQ(flip_caps(mesh, kHeight, 0, {}), 0u);
     }
 }
 
@@ -93,7 +93,7 @@ TEST(Caps, TakeTheLabelOfTheNeighbourThatTheyDivide) {
     mesh.labels.push_back(height_of(mesh, mesh.triangles[t]) < kHeight ? -1 : static_cast<std::int32_t>(t));
     mesh.face_of_triangle.push_back(static_cast<Index>(t));
   }
-  EXPECT_GT(flip_caps(mesh, kHeight, {}), 0u);
+  EXPECT_GT(flip_caps(mesh, kHeight, 0, {}), 0u);
   EXPECT_EQ(std::count(mesh.labels.begin(), mesh.labels.end(), -1), 0);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     EXPECT_EQ(mesh.labels[t], static_cast<std::int32_t>(mesh.face_of_triangle[t]));
@@ -106,14 +106,14 @@ TEST(Caps, StayWhereTheirEdgeIsGivenOrABorder) {
     if (height_of(box, t) < kHeight)
       for (std::size_t k = 0; k < 3; ++k) given.push_back({t[(k + 1) % 3], t[k]});
   TriangleMesh mesh = box;
-  EXPECT_EQ(flip_caps(mesh, kHeight, given), 0u);
+  EXPECT_EQ(flip_caps(mesh, kHeight, 0, given), 0u);
   EXPECT_EQ(mesh.triangles, box.triangles);
   mesh.feature_edges = given;
-  EXPECT_EQ(flip_caps(mesh, kHeight, {}), 0u);
+  EXPECT_EQ(flip_caps(mesh, kHeight, 0, {}), 0u);
   TriangleMesh alone;
   alone.vertices = {{0, 0, 0}, {1, 0, 0}, {0.5, 0, 0}};
   alone.triangles = {{0, 1, 2}};
-  EXPECT_EQ(flip_caps(alone, kHeight, {}), 0u);
+  EXPECT_EQ(flip_caps(alone, kHeight, 0, {}), 0u);
 }
 
 // However small: a fine mesh has edges as long as a coarse one's caps are high.
@@ -121,13 +121,43 @@ TEST(Caps, TrianglesThatAreNotFlatAreLeft) {
   TriangleMesh mesh = icosphere(3);
   for (Vec3& p : mesh.vertices) p = {1e-6 * p.x, 1e-6 * p.y, 2e-8 * p.z};
   const std::vector<Triangle> before = mesh.triangles;
-  EXPECT_EQ(flip_caps(mesh, kHeight, {}), 0u);
+  EXPECT_EQ(flip_caps(mesh, kHeight, 0, {}), 0u);
   EXPECT_EQ(mesh.triangles, before);
+}
+
+// A corner of a flat grid that was drawn across the far edge of one of its triangles.
+TEST(Caps, FoldsAreOpenedWhereTheyAreLow) {
+  TriangleMesh grid;
+  const int n = 4;
+  for (int y = 0; y <= n; ++y)
+    for (int x = 0; x <= n; ++x) grid.vertices.push_back({double(x), double(y), 0});
+  const auto at = [&](int x, int y) { return static_cast<Index>(y * (n + 1) + x); };
+  for (int y = 0; y < n; ++y)
+    for (int x = 0; x < n; ++x) {
+      grid.triangles.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+      grid.triangles.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
+    }
+  // Beyond the diagonal from (1, 1) to (2, 2), opposite to it.
+  const double over = 0.05, height = over * std::sqrt(2.0);
+  grid.vertices[at(2, 1)] = {1.5 - over, 1.5 + over, 0};
+  const auto downwards = [](const TriangleMesh& mesh) {
+    return std::count_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
+      return twice_area_normal(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]).z < 0;
+    });
+  };
+  ASSERT_EQ(downwards(grid), 1);
+  TriangleMesh mesh = grid;
+  EXPECT_EQ(flip_caps(mesh, kHeight, 0.9 * height, {}), 0u);
+  EXPECT_EQ(flip_caps(mesh, kHeight, 1.1 * height, {}), 1u);
+  EXPECT_EQ(downwards(mesh), 0);
+  EXPECT_NEAR(area_of(mesh), n * n, 1e-12);
+  EXPECT_EQ(analyse_topology(mesh.triangles, mesh.vertices.size()).euler, 1);
+  EXPECT_EQ(flip_caps(mesh, kHeight, 1.1 * height, {}), 0u);
 }
 
 TEST(Caps, OthersAreLeft) {
   TriangleMesh mesh = icosphere(3);
-  EXPECT_EQ(flip_caps(mesh, kHeight, {}), 0u);
+  EXPECT_EQ(flip_caps(mesh, kHeight, 0, {}), 0u);
   EXPECT_EQ(mesh.triangles, icosphere(3).triangles);
 }
 
