@@ -28,6 +28,16 @@ constexpr double kFacesApart = 2e-6;
 
 MeshTopology topology_of(const TriangleMesh& mesh) { return analyse_topology(mesh.triangles, mesh.vertices.size()); }
 
+// Those that are another one's, or that others are.
+std::vector<Index> members_of_pairs(const std::vector<Index>& original) {
+  std::vector<Index> members;
+  for (Index v = 0; v < original.size(); ++v)
+    if (original[v] != v) members.insert(members.end(), {v, original[v]});
+  std::sort(members.begin(), members.end());
+  members.erase(std::unique(members.begin(), members.end()), members.end());
+  return members;
+}
+
 // Moves vertices that were one towards their own triangles, so that seeds there are not at the same point.
 void part_fans(TriangleMesh& mesh, const std::vector<Index>& original) {
   std::vector<char> is_split(mesh.vertices.size(), 0);
@@ -129,21 +139,24 @@ std::vector<Index> Separation::originals(std::size_t vertices) const {
   return of;
 }
 
+std::vector<Index> Separation::parted() const { return members_of_pairs(original_); }
+
 std::vector<double> Separation::values(std::vector<double> given) const {
   for (const auto& [a, b] : halved_) given.push_back(0.5 * (given[a] + given[b]));
   for (std::size_t v = vertices_; v < original_.size(); ++v) given.push_back(double{given[original_[v]]});
   return given;
 }
 
-void part_equal_points(TriangleMesh& mesh, bool seams, const Context& context) {
+std::vector<Index> part_equal_points(TriangleMesh& mesh, bool seams, const Context& context) {
   std::vector<Index> first = first_equal(mesh.vertices);
   if (!seams) leave_seams(mesh, first);
   std::size_t count = 0;
   for (Index v = 0; v < first.size(); ++v) count += first[v] != v;
-  if (count == 0) return;
+  if (count == 0) return {};
   part_fans(mesh, first);
   context.warn(fmt::format("parts of the surface have {} at the points of others; they are meshed as if they did not",
                            count == 1 ? "1 vertex" : fmt::format("{} vertices", count)));
+  return members_of_pairs(first);
 }
 
 void open_contacts(TriangleMesh& mesh, const Context& context) {

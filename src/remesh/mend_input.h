@@ -32,6 +32,8 @@ class Separation {
                                           const std::vector<std::array<Index, 2>>& given) const;
   // Of each vertex of a mesh, the one that it was; kNone of middles of edges.
   std::vector<Index> originals(std::size_t vertices) const;
+  // The vertices that were one with others, of the mesh that separate() left.
+  std::vector<Index> parted() const;
   // Of each vertex, from those that were given.
   std::vector<double> values(std::vector<double> given) const;
 
@@ -44,8 +46,8 @@ class Separation {
 
 // Moves vertices at the same point apart, 1e-7 of the diagonal towards their triangles, with a warning: of two seeds at
 // the same point one owns nothing. With `seams` also those of borders that coincide in edges, else where parts touch in
-// single points alone.
-void part_equal_points(TriangleMesh& mesh, bool seams, const Context& context);
+// single points alone. Returns them, ascending.
+std::vector<Index> part_equal_points(TriangleMesh& mesh, bool seams, const Context& context);
 
 // Moves faces apart in which components lie on each other (mesh/face_contacts.h), with a warning: triangles of two
 // faces that coincide all intersect, and the more, the finer they are.

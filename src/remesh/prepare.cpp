@@ -180,7 +180,9 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   Separation separation(mesh_);
   if (!branches) {
     separation.separate(mesh_, context);
-    part_equal_points(mesh_, false, context);
+    touching_ = separation.parted();
+    const std::vector<Index> equal = part_equal_points(mesh_, false, context);
+    touching_.insert(touching_.end(), equal.begin(), equal.end());
   }
   features.given = separation.edges(mesh_, features.given);
   keep_edges = separation.edges(mesh_, keep_edges);
@@ -188,6 +190,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   features.given.insert(features.given.end(), keep_edges.begin(), keep_edges.end());
   if (options.energy == Energy::automatic) find_noise(features);
   features_ = detect_features(mesh_, features);
+  add_corners_where_curves_touch();
   std::vector<Index> keep_vertices = options.keep_vertices;
   for (const auto& edge : options.keep_edges) keep_vertices.insert(keep_vertices.end(), edge.begin(), edge.end());
   if (!keep_vertices.empty()) keep(keep_vertices, std::move(keep_edges), separation.originals(vertices));
@@ -260,6 +263,18 @@ KeptFeatures Preparation::kept_features(const FeatureGraph& features) const {
         whole && std::binary_search(keep_edges_.begin(), keep_edges_.end(), sorted_edge(on.front(), on.back())));
   }
   return kept;
+}
+
+// Where a curve passes a point of another part of the surface, an edge across its bend there would cross that part.
+void Preparation::add_corners_where_curves_touch() {
+  if (touching_.empty()) return;
+  std::vector<char> is_on_curve(mesh_.vertices.size(), 0);
+  for (const FeatureCurve& curve : features_.curves)
+    for (const Index v : curve.vertices) is_on_curve[v] = 1;
+  std::vector<Index> corners;
+  for (const Index v : touching_)
+    if (is_on_curve[v]) corners.push_back(v);
+  add_corners(features_, corners);
 }
 
 // What noise folds is no feature.
@@ -369,6 +384,7 @@ void Preparation::plan_features(const std::vector<double>& lengths) {
   DetailPlan plan = plan_details(moved ? *moved : mesh_, features_, lengths, plain.vertices, resolves_all_);
   features_ = std::move(plan.features);
   add_corners(features_, keep_vertices_);
+  add_corners_where_curves_touch();
   if (!meeting_.empty()) meeting_.put_into(features_);
   detail_ = plan.result;
   if (resolves_all_ && detail_.vertices > plain.vertices) {

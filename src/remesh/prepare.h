@@ -76,6 +76,7 @@ class Preparation {
 
  private:
   void find_noise(FeatureOptions& features);
+  void add_corners_where_curves_touch();
   // Vertices of the input, and edges of mesh(); `original` is of each of its vertices the welded one, kNone: none.
   void keep(const std::vector<Index>& vertices, std::vector<std::array<Index, 2>> edges,
             const std::vector<Index>& original);
@@ -113,6 +114,7 @@ class Preparation {
   bool lets_cross_ = false;
   std::optional<Undivided> undivided_;
   std::shared_ptr<const Preparation> uncut_;      // before components were cut where they meet
+  std::vector<Index> touching_;                   // vertices of mesh_ that were at the points of others
   std::vector<Index> keep_vertices_;              // of mesh_, ascending
   std::vector<Index> kept_as_;                    // of each of mesh_'s vertices before its details, the input's
   std::vector<std::array<Index, 2>> keep_edges_;  // of mesh_, sorted, lower vertex first

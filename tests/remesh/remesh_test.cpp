@@ -347,6 +347,19 @@ TEST(RemeshHard, BordersThatTouchInAPointKeepTheirCurves) {
   EXPECT_GT(measure_quality(result.mesh).theta_min, 30);
 }
 
+// A tip that touches a straight border of another part: an edge of that part across the point would cross the tip where
+// the border bends, so the border has a corner there.
+TEST(RemeshHard, ABorderHasACornerWhereATipTouchesIt) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 0, 0}, {0.4, -1, 0}, {1.6, -1, 0}};
+  mesh.triangles = {{0, 1, 4}, {1, 2, 3}, {1, 3, 4}, {5, 6, 7}};
+  const RemeshResult result = remesh(mesh, options_for(300));
+  EXPECT_TRUE(result.topology_matches);
+  EXPECT_EQ(result.features.broken, 0u);
+  const auto is_there = [](const Vec3& v) { return norm(v - Vec3{1, 0, 0}) < 1e-5; };
+  EXPECT_EQ(std::count_if(result.mesh.vertices.begin(), result.mesh.vertices.end(), is_there), 2);
+}
+
 TEST(RemeshHard, FewVerticesGiveWhatTheyCan) {
   for (const TriangleMesh& mesh : {icosphere(3), torus(24, 16), box(2), two_spheres()})
     for (std::size_t vertices : {4u, 5u, 12u, 40u}) {
