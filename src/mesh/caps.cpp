@@ -18,7 +18,7 @@ namespace {
 
 // Of the longest edge: what is higher is a triangle of a fine mesh.
 constexpr double kFlat = 1e-3;
-// Of the longest edge of a triangle that is folded back, and the cosine from its normal to its neighbour's.
+// Of the longest edge of a triangle that is folded back, and the cosine from its normal to that of its neighbour there.
 constexpr double kFlatFold = 0.1, kFolded = -0.9;
 
 class CapFlips {
@@ -90,14 +90,19 @@ class CapFlips {
     return beside;
   }
 
-  // Back onto the neighbour at its longest edge.
+  // Faces the other way than all neighbours, and lies on the one at its longest edge. Where two neighbours face the
+  // same way it may be part of a sheet, whose edge is a crease.
   bool is_folded(Index t) const {
     const Triangle& v = mesh_.triangles[t];
-    const std::size_t k = longest_edge(v);
-    const Index beside = across(t, v[k], v[(k + 1) % 3]);
-    if (beside == kNone) return false;
-    const Vec3 n = normal_of(v), m = normal_of(mesh_.triangles[beside]);
-    return dot(n, m) < kFolded * norm(n) * norm(m);
+    const std::size_t longest = longest_edge(v);
+    const Vec3 n = normal_of(v);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index beside = across(t, v[k], v[(k + 1) % 3]);
+      if (beside == kNone) return false;
+      const Vec3 m = normal_of(mesh_.triangles[beside]);
+      if (!(dot(n, m) < (k == longest ? kFolded : 0) * norm(n) * norm(m))) return false;
+    }
+    return true;
   }
 
   void push_if_low(Index t) {

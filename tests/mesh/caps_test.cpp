@@ -10,6 +10,7 @@
 
 #include "core/degenerate.h"
 #include "core/geometry.h"
+#include "mesh/stars.h"
 #include "mesh/topology.h"
 #include "support/models.h"
 
@@ -152,6 +153,21 @@ TEST(Caps, FoldsAreOpenedWhereTheyAreLow) {
   EXPECT_EQ(downwards(mesh), 0);
   EXPECT_NEAR(area_of(mesh), n * n, 1e-12);
   EXPECT_EQ(analyse_topology(mesh.triangles, mesh.vertices.size()).euler, 1);
+  EXPECT_EQ(flip_caps(mesh, kHeight, 1.1 * height, {}), 0u);
+
+  // Two triangles that are folded back together are a sheet.
+  mesh = grid;
+  const Index middle = static_cast<Index>(mesh.vertices.size());
+  mesh.vertices.push_back(0.5 * (grid.vertices[at(2, 1)] + grid.vertices[at(2, 2)]));
+  for (std::size_t t = 0, n_before = mesh.triangles.size(); t < n_before; ++t) {
+    Triangle& v = mesh.triangles[t];
+    if (!has_corner(v, at(2, 1)) || !has_corner(v, at(2, 2))) continue;
+    Triangle rest = v;
+    std::replace(v.begin(), v.end(), at(2, 1), middle);
+    std::replace(rest.begin(), rest.end(), at(2, 2), middle);
+    mesh.triangles.push_back(rest);
+  }
+  ASSERT_EQ(downwards(mesh), 2);
   EXPECT_EQ(flip_caps(mesh, kHeight, 1.1 * height, {}), 0u);
 }
 
