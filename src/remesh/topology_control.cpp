@@ -46,6 +46,8 @@ constexpr std::size_t kMostAdded = 100, kGrown = 300, kAnyway = 5000;
 constexpr double kCrossing = 0.01, kTouching = 0.1;
 // Squared distance of points inserted together, over that to the seeds there are.
 constexpr double kApart = 2;
+// Times that refining goes on once its seeds are on the surface, and that a seed is moved off the curves at a corner.
+constexpr int kFinishingRounds = 3, kShells = 3;
 // Cosine of the angle at which a surface faces away.
 constexpr double kTurned = -0.2;
 
@@ -365,7 +367,41 @@ class Control {
     for (const Cut& cut : cuts) move_to(cut, points[cut.cell - first].other);
     for (const Cut& cut : cuts_of_new())
       move_to(cut, points[cut.cell - first].farthest_from(run_.curves().point(cut.curve, cut.position)));
+    for (const Cut& cut : cuts_of_new()) move_to(cut, points[cut.cell - first].place.point);
+    for (int round = 0; round < kShells; ++round) {
+      std::map<Index, Cut> left;  // the first of each cell
+      for (const Cut& cut : cuts_of_new()) left.insert({cut.cell, cut});
+      if (left.empty()) return;
+      for (const auto& [cell, cut] : left) move_to(cut, beside_next_on_curve(cut));
+    }
     for (const Cut& cut : cuts_of_new()) put_on_curve(cut.cell, cut);
+  }
+
+  // For a seed whose cell cuts a curve between a corner and the curve's next seed: the point in its direction that is
+  // as far from the corner as that seed. From there it leaves a straight curve alone at whatever angle; at the tip of a
+  // needle no nearer point does. Elsewhere where the seed is.
+  Vec3 beside_next_on_curve(const Cut& cut) const {
+    const Vec3 p = run_.seeds.position(cut.cell);
+    const FeatureCurves& curves = run_.curves();
+    if (curves.closed(cut.curve)) return p;
+    const double length = curves.length(cut.curve);
+    const bool at_start = cut.position < 0.5 * length;
+    const auto from_end = [&](double position) { return at_start ? position : length - position; };
+    const auto [start, end] = curves.ends(cut.curve);
+    Vec3 next = curves.corner(at_start ? end : start);
+    double least = length;
+    for (std::size_t i = 0; i < run_.seeds.size(); ++i)
+      if (const SeedPlace& place = run_.seeds.place(i);
+          !run_.seeds.on_surface(i) && place.curve == cut.curve && from_end(place.position) < least) {
+        least = from_end(place.position);
+        next = run_.seeds.position(i);
+      }
+    if (from_end(cut.position) > least) return p;
+    const Vec3 corner = curves.corner(at_start ? start : end), along = p - corner;
+    if (!(norm2(along) > 0)) return p;
+    std::vector<Index> all(run_.surface().mesh.triangles.size());
+    std::iota(all.begin(), all.end(), Index{0});
+    return nearest_on_triangles(run_.surface(), all, corner + (norm(next - corner) / norm(along)) * along).at;
   }
 
   void put_on_curve(std::size_t seed, const Cut& cut) {
@@ -558,8 +594,15 @@ class Control {
     }
   }
 
-  // Leaves the run as the optimiser does, with its energy and gradient, for seeds that the optimiser did not place.
+  // Leaves the run as the optimiser does, with its energy and gradient, for seeds that the optimiser did not place. It
+  // puts seeds on the surface again, which in a tie may fail by rounding what held.
   void finish() {
+    const bool held = holds();
+    put_on_surface();
+    for (int round = 0; round < kFinishingRounds && held && !holds() && refine(); ++round) put_on_surface();
+  }
+
+  void put_on_surface() {
     options_.iterations = 0;
     optimise(run_, options_);
     check();

@@ -1,5 +1,6 @@
 // The topological ball property: against theory, against a complex welded from coordinates, and as what topology
 // control ends in.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -618,6 +619,52 @@ TEST(TopologyControlTest, CurvesStay) {
       EXPECT_GT(outcome.inserted, 0u) << height << ' ' << count;
       const Diagram& diagram = run.diagram(Want::polygons | Want::dual);
       EXPECT_TRUE(check_features(trace, curves, run.seeds.places(), diagram).broken.empty()) << height << ' ' << count;
+    }
+}
+
+// A pointed leaf: two bulging sides between the same two creases, which end at the tip.
+TriangleMesh leaf(double width, double height) {
+  constexpr Index kPieces = 8;  // of a side
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}};
+  for (Index k = 0; k < 2 * kPieces; ++k) {
+    const double y = 1 - 2 * (k % kPieces) / static_cast<double>(kPieces), side = k < kPieces ? 1 : -1;
+    mesh.vertices.push_back({1, side * width * y, side * height * (1 - y * y)});
+  }
+  for (Index k = 0; k < 2 * kPieces; ++k) {
+    const Index a = 2 + k, b = 2 + (k + 1) % (2 * kPieces);
+    mesh.triangles.push_back({0, b, a});
+    mesh.triangles.push_back({1, a, b});
+  }
+  return mesh;
+}
+
+// The cell of the tip lies between those of the first seeds of both creases, and these meet on either side, unless a
+// seed on the surface comes between. Nearer to the tip than they are it would cut a crease.
+TEST(TopologyControlTest, TipsGetSeedsBesideTheFirstOfTheirCurves) {
+  for (const double width : {0.1, 0.2, 0.3})
+    for (const std::size_t count : {60, 120, 240}) {
+      SCOPED_TRACE(fmt::format("{} {}", width, count));
+      const TriangleMesh mesh = leaf(width, 0.6 * width);
+      const Surface surface(mesh);
+      CpuBackend backend(surface, NeighbourSource::nearest);
+      const FeatureCurves curves(sharp_graph(mesh), mesh.vertices);
+      const CurveMeasure measure(surface, curves);
+      const FeatureTrace trace(surface, curves);
+      const double scale = measure.scale(count);
+      const Context context;
+      CvtRun run(backend, curves, context);
+      run.seeds = seeds_on_features(curves, measure, scale);
+      run.seeds.add(random_seeds(mesh, count - run.seeds.size(), 3));
+      OptimiseOptions options;
+      options.constrained = true;
+      options.iterations = 30;
+      optimise(run, options);
+      ASSERT_TRUE(recover_features(run, trace, measure, scale, options).broken.empty());
+      const TopologyOutcome outcome = enforce_topology(run, trace, topology_of(mesh), options);
+      EXPECT_TRUE(outcome.ball.holds);
+      const Diagram& diagram = run.diagram(Want::polygons | Want::dual);
+      EXPECT_TRUE(check_features(trace, curves, run.seeds.places(), diagram).broken.empty());
     }
 }
 
