@@ -32,6 +32,7 @@
 #include "remesh/improve.h"
 #include "remesh/mend.h"
 #include "remesh/prepare.h"
+#include "remesh/push_apart.h"
 #include "remesh/sheets.h"
 #include "remesh/slivers.h"
 #include "remesh/topology_control.h"
@@ -684,12 +685,12 @@ class NewCrossings {
     return *of_input_set_apart_;
   }
 
- private:
   std::size_t of_input() {
     if (!of_input_) of_input_ = count_self_intersections(input_.mesh());
     return *of_input_;
   }
 
+ private:
   const Preparation& input_;
   std::optional<std::size_t> of_input_, of_input_set_apart_;
 };
@@ -730,6 +731,19 @@ AnotherRun another_run(Pipeline& pipeline, const JudgedResult& judged, const Cro
 bool has_faults(const JudgedResult& judged) {
   return !judged.result.topology_matches || judged.result.features.broken > 0 || judged.slivers.worth_another_run ||
          judged.slivers.hopeless;
+}
+
+bool asks_for_quality(const RemeshPlan& plan) { return plan.min_angle > 0 && plan.constrained; }
+
+// Not where most of what crosses does so by more than triangles are off the surface.
+void push_sheets_apart(RemeshResult& result, NewCrossings& input, const Context& context) {
+  const std::vector<std::array<Index, 2>> pairs = find_self_intersections(result.mesh, context);
+  if (pairs.empty()) return;
+  std::vector<char> movable(result.mesh.vertices.size());
+  for (std::size_t v = 0; v < movable.size(); ++v) movable[v] = result.places[v].kind == SeedPlace::Kind::surface;
+  std::vector<Vec3> before = result.mesh.vertices;
+  const std::size_t left = push_apart(result.mesh, pairs, movable, context);
+  if (2 * left > pairs.size() && left > input.of_input()) result.mesh.vertices = std::move(before);
 }
 
 std::size_t slivers_of(const JudgedResult& judged) { return judged.slivers.bounds.points.size() / 3; }
@@ -873,6 +887,7 @@ Runs::Run Runs::make_run(bool last) {
     preparation_->apart().move_back(prepared.corners, result);
     if (!prepared.whole.empty()) flip_where_components_cross(result.mesh);
     if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
+    if (asks_for_quality(plan)) push_sheets_apart(result, *new_crossings_, context_);
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
