@@ -22,7 +22,7 @@ constexpr double kTurned = 0.8;    // cosine of the angle by which triangles tur
 constexpr double kFarthest = 0.1;  // of the mean of the edges at a vertex: how far it goes
 constexpr double kGap = 1e-3;      // of the same: what is left between triangles
 constexpr int kRounds = 40, kPatience = 8;
-constexpr std::size_t kVerticesPerPair = 5;  // with fewer it is a soup, or sheets that cross
+constexpr std::size_t kVerticesPerPair = 2;  // with fewer it is a soup
 constexpr int kHalvings = 3;                 // of a step that would spoil a triangle
 
 // Two triangles are on either side of a plane if the first one's corners come down to it along `direction`, and the

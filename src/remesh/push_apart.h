@@ -15,7 +15,7 @@ namespace bisector {
 // surface, by a tenth of the edges around them at most, until fewer pairs cross: each is pushed apart in the direction
 // in which it overlaps the least. `pairs` are all that cross, as find_self_intersections has them. Only the vertices
 // marked in `movable`, one mark for each, move; no angle below 30 degrees gets smaller, no other one less than that,
-// and no triangle turns far. Pairs that overlap by more stay as they are, and all do where there is one for each five
+// and no triangle turns far. Pairs that overlap by more stay as they are, and all do where there is one for every two
 // vertices. Leaves the mesh with the fewest pairs that were found, and returns their number. Throws Cancelled.
 std::size_t push_apart(TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& pairs,
                        const std::vector<char>& movable, const Context& context = {});
