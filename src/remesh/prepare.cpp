@@ -40,6 +40,8 @@ constexpr std::size_t kMostPairs = 100'000;
 constexpr std::size_t kLeastPerEdge = 8;
 // Of the curves in which components cross, by length: where more has no room they cross anyway.
 constexpr double kLeastShared = 0.5;
+// Of those wanted, for each corner that is only there because parts of the surface touch.
+constexpr std::size_t kVerticesPerCorner = 2;
 // Plans without what there is no room for.
 constexpr int kMostRounds = 10;
 // Of the diagonal, from no rounding to that of six digits.
@@ -190,7 +192,6 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   features.given.insert(features.given.end(), keep_edges.begin(), keep_edges.end());
   if (options.energy == Energy::automatic) find_noise(features);
   features_ = detect_features(mesh_, features);
-  add_corners_where_curves_touch();
   std::vector<Index> keep_vertices = options.keep_vertices;
   for (const auto& edge : options.keep_edges) keep_vertices.insert(keep_vertices.end(), edge.begin(), edge.end());
   if (!keep_vertices.empty()) keep(keep_vertices, std::move(keep_edges), separation.originals(vertices));
@@ -205,6 +206,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   if (given_seeds_ > 0 || (branches && options.detail == DetailMode::off)) return;
   std::vector<double> lengths = lay_down_plain();
   if (!branches) apart_ = SetApart(mesh_, lengths, unbounded_->sizing.vertices);
+  add_corners_where_curves_touch();
   if (options.detail == DetailMode::off) return;
   resolves_all_ = options.detail == DetailMode::all;
   if (!plan_with_intersections()) plan(std::move(lengths));
@@ -265,7 +267,8 @@ KeptFeatures Preparation::kept_features(const FeatureGraph& features) const {
   return kept;
 }
 
-// Where a curve passes a point of another part of the surface, an edge across its bend there would cross that part.
+// Where a curve passes a point of another part of the surface, an edge across its bend there would cross that part. Each
+// corner takes a vertex; where they would take most, they cross.
 void Preparation::add_corners_where_curves_touch() {
   if (touching_.empty()) return;
   std::vector<char> is_on_curve(mesh_.vertices.size(), 0);
@@ -274,6 +277,7 @@ void Preparation::add_corners_where_curves_touch() {
   std::vector<Index> corners;
   for (const Index v : touching_)
     if (is_on_curve[v]) corners.push_back(v);
+  if (features_.corners.size() + corners.size() > unbounded_->sizing.vertices / kVerticesPerCorner) return;
   add_corners(features_, corners);
 }
 
