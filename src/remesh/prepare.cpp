@@ -267,8 +267,8 @@ KeptFeatures Preparation::kept_features(const FeatureGraph& features) const {
   return kept;
 }
 
-// Where a curve passes a point of another part of the surface, an edge across its bend there would cross that part. Each
-// corner takes a vertex; where they would take most, they cross.
+// Where a curve passes a point of another part of the surface, an edge across its bend there would cross that part.
+// Each corner takes a vertex; where they would take most, they cross.
 void Preparation::add_corners_where_curves_touch() {
   if (touching_.empty()) return;
   std::vector<char> is_on_curve(mesh_.vertices.size(), 0);
