@@ -367,12 +367,14 @@ class Control {
     for (const Cut& cut : cuts) move_to(cut, points[cut.cell - first].other);
     for (const Cut& cut : cuts_of_new())
       move_to(cut, points[cut.cell - first].farthest_from(run_.curves().point(cut.curve, cut.position)));
-    for (const Cut& cut : cuts_of_new()) move_to(cut, points[cut.cell - first].place.point);
-    for (int round = 0; round < kShells; ++round) {
-      std::map<Index, Cut> left;  // the first of each cell
-      for (const Cut& cut : cuts_of_new()) left.insert({cut.cell, cut});
-      if (left.empty()) return;
-      for (const auto& [cell, cut] : left) move_to(cut, beside_next_on_curve(cut));
+    if (is_sound_) {
+      for (const Cut& cut : cuts_of_new()) move_to(cut, points[cut.cell - first].place.point);
+      for (int round = 0; round < kShells; ++round) {
+        std::map<Index, Cut> left;  // the first of each cell
+        for (const Cut& cut : cuts_of_new()) left.insert({cut.cell, cut});
+        if (left.empty()) return;
+        for (const auto& [cell, cut] : left) move_to(cut, beside_next_on_curve(cut));
+      }
     }
     for (const Cut& cut : cuts_of_new()) put_on_curve(cut.cell, cut);
   }
