@@ -42,6 +42,8 @@ constexpr int kPolishingSteps = 20, kSmoothingRounds = 5, kSmoothingSteps = 4, k
 // Seeds that may be added: a quarter of them and kMostAdded. A surface may need more than were asked for: so many are
 // allowed to grow to, and in the end.
 constexpr std::size_t kMostAdded = 100, kGrown = 300, kAnyway = 5000;
+// Of the seeds that there were, one in so many: how many more stay if the property cannot be had.
+constexpr std::size_t kFewInVain = 100;
 // Of a cell's radius: sheets nearer to each other get a vertex each. More of them if fewer do not help.
 constexpr double kCrossing = 0.01, kTouching = 0.1;
 // Squared distance of points inserted together, over that to the seeds there are.
@@ -274,8 +276,11 @@ class Control {
         polish(before);
         smooth(before);
       } else {
-        // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show.
-        restore(best_has_too_few_ || !is_sound_ ? given : best_);
+        // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show;
+        // and without the property the count is to be met.
+        const std::size_t most = given.seeds.size() + given.seeds.size() / kFewInVain;
+        const bool in_vain = best_has_too_few_ || !is_sound_ || (!control_.branches && best_.seeds.size() > most);
+        restore(in_vain ? given : best_);
       }
       finish();
     }

@@ -699,5 +699,34 @@ TEST(TopologyControlTest, ADenseSoupGetsNoSeedsInVain) {
   EXPECT_EQ(free.seeds().size(), 200u);
 }
 
+// Leaves a fiftieth as thick as they are long, with so few seeds that no number of more beside them mends all.
+TEST(TopologyControlTest, AsManySeedsStayWhereThePropertyIsNotToBeHad) {
+  std::size_t failed = 0;
+  for (const double width : {0.2, 0.3})
+    for (const std::size_t count : {60, 120}) {
+      SCOPED_TRACE(fmt::format("{} {}", width, count));
+      const TriangleMesh mesh = leaf(width, 0.02);
+      const Surface surface(mesh);
+      CpuBackend backend(surface, NeighbourSource::nearest);
+      const FeatureCurves curves(sharp_graph(mesh), mesh.vertices);
+      const CurveMeasure measure(surface, curves);
+      const FeatureTrace trace(surface, curves);
+      const double scale = measure.scale(count);
+      const Context context;
+      CvtRun run(backend, curves, context);
+      run.seeds = seeds_on_features(curves, measure, scale);
+      run.seeds.add(random_seeds(mesh, count - run.seeds.size(), 3));
+      OptimiseOptions options;
+      options.constrained = true;
+      options.iterations = 30;
+      optimise(run, options);
+      const TopologyOutcome outcome = enforce_topology(run, trace, topology_of(mesh), options);
+      if (outcome.ball.holds) continue;
+      ++failed;
+      EXPECT_LE(run.seeds.size(), count + count / 100);
+    }
+  EXPECT_GT(failed, 0u);
+}
+
 }  // namespace
 }  // namespace bisector::test
