@@ -156,6 +156,11 @@ TriangleShape measure_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   return shape;
 }
 
+double least_angle(const TriangleMesh& mesh, const Triangle& t) {
+  const auto theta = measure_triangle(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]).theta;
+  return *std::min_element(theta.begin(), theta.end());
+}
+
 Valences count_neighbours(const EdgeTable& table, std::size_t vertex_count) {
   Valences valences{std::vector<Index>(vertex_count, 0), std::vector<char>(vertex_count, 0)};
   auto& [neighbours, border] = valences;

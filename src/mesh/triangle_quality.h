@@ -19,6 +19,9 @@ struct TriangleShape {
 
 TriangleShape measure_triangle(const Vec3& a, const Vec3& b, const Vec3& c);
 
+// The smallest angle of a triangle with corners among the mesh's vertices, degrees.
+double least_angle(const TriangleMesh& mesh, const Triangle& t);
+
 // Over the longest edge; 0 of a point.
 inline double triangle_height(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double longest = std::sqrt(std::max({norm2(b - a), norm2(c - b), norm2(a - c)}));

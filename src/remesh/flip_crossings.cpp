@@ -23,11 +23,6 @@ using Edge = std::array<Index, 2>;
 constexpr double kGoodAngle = 25;  // degrees
 constexpr int kPasses = 3;
 
-double least_angle(const TriangleMesh& mesh, const Triangle& t) {
-  const auto theta = measure_triangle(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]).theta;
-  return *std::min_element(theta.begin(), theta.end());
-}
-
 Vec3 normal_of(const TriangleMesh& mesh, const Triangle& t) {
   return twice_area_normal(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
 }

@@ -1,5 +1,8 @@
 #include "remesh/push_apart.h"
 
+#include <CGAL/Box_intersection_d/Box_with_info_d.h>
+#include <CGAL/box_intersection_d.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,12 +13,14 @@
 #include "bisector/quality.h"
 #include "core/geometry.h"
 #include "mesh/triangle_quality.h"
+#include "mesh/used_vertices.h"
 
 namespace bisector {
 namespace {
 
 using Pair = std::array<Index, 2>;
 using Corners = std::array<Vec3, 3>;
+using TriangleBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, Index>;
 
 constexpr double kGoodAngle = 30;  // degrees
 constexpr double kTurned = 0.8;    // cosine of the angle by which triangles turn, at least
@@ -76,67 +81,72 @@ Push least_push(const Corners& s, const Corners& t, const std::optional<Vec3>& s
   return best;
 }
 
-bool meet(const Box& a, const Box& b) {
-  for (int k = 0; k < 3; ++k)
-    if (a.hi[k] < b.lo[k] || b.hi[k] < a.lo[k]) return false;
-  return true;
+TriangleBox box_of(const TriangleMesh& mesh, Index t, double around) {
+  const Box box = bounding_box(mesh.vertices, {mesh.triangles[t]});
+  const double by = around * box.diagonal();
+  return {{box.lo.x - by, box.lo.y - by, box.lo.z - by, box.hi.x + by, box.hi.y + by, box.hi.z + by}, t};
 }
 
-// The triangles that meet the boxes of those of the pairs, with as much around these as they are large; their vertices
-// are all of the mesh's.
-TriangleMesh part_around(const TriangleMesh& mesh, const std::vector<Pair>& pairs) {
-  std::vector<Index> crossing;
-  for (const Pair& pair : pairs) crossing.insert(crossing.end(), pair.begin(), pair.end());
-  std::sort(crossing.begin(), crossing.end());
-  crossing.erase(std::unique(crossing.begin(), crossing.end()), crossing.end());
-  std::vector<Box> boxes;
-  for (const Index t : crossing) {
-    Box box = bounding_box(mesh.vertices, {mesh.triangles[t]});
-    const double around = box.diagonal();
-    for (int k = 0; k < 3; ++k) {
-      box.lo[k] -= around;
-      box.hi[k] += around;
-    }
-    boxes.push_back(box);
+// The triangles that meet the boxes of those of the pairs, with as much around these as they are large; ascending.
+std::vector<Index> triangles_around(const TriangleMesh& mesh, const std::vector<Pair>& pairs) {
+  std::vector<TriangleBox> crossing, all;
+  for (const Pair& pair : pairs)
+    for (const Index t : pair) crossing.push_back(box_of(mesh, t, 1));
+  for (Index t = 0; t < mesh.triangles.size(); ++t) all.push_back(box_of(mesh, t, 0));
+  std::vector<char> is_near(mesh.triangles.size(), 0);
+  CGAL::box_intersection_d(crossing.begin(), crossing.end(), all.begin(), all.end(),
+                           [&](const TriangleBox&, const TriangleBox& near) { is_near[near.info()] = 1; });
+  std::vector<Index> near;
+  for (Index t = 0; t < is_near.size(); ++t)
+    if (is_near[t]) near.push_back(t);
+  return near;
+}
+
+// Some triangles of a mesh. Vertices and triangles keep their order.
+struct Part {
+  TriangleMesh mesh;
+  std::vector<Index> vertices;  // of the whole mesh
+  std::vector<char> movable;    // those that are, and have no other triangles
+};
+
+Part part_of(const TriangleMesh& whole, const std::vector<Index>& triangles, const std::vector<char>& movable) {
+  Part part;
+  for (const Index t : triangles) part.mesh.triangles.push_back(whole.triangles[t]);
+  part.vertices = used_vertices(part.mesh.triangles, whole.vertices.size());
+  std::vector<std::ptrdiff_t> others(whole.vertices.size(), 0);
+  for (const Triangle& t : whole.triangles)
+    for (const Index v : t) ++others[v];
+  for (const Triangle& t : part.mesh.triangles)
+    for (const Index v : t) --others[v];
+  std::vector<Index> number(whole.vertices.size(), kNone);
+  for (const Index v : part.vertices) {
+    number[v] = static_cast<Index>(part.mesh.vertices.size());
+    part.mesh.vertices.push_back(whole.vertices[v]);
+    part.movable.push_back(movable[v] && others[v] == 0);
   }
-  TriangleMesh part;
-  part.vertices = mesh.vertices;
-  for (const Triangle& t : mesh.triangles) {
-    const Box own = bounding_box(mesh.vertices, {t});
-    if (std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) { return meet(own, box); }))
-      part.triangles.push_back(t);
-  }
+  for (Triangle& t : part.mesh.triangles)
+    for (Index& v : t) v = number[v];
   return part;
 }
 
 class PushApart {
  public:
-  // Only vertices all of whose triangles are in the part move.
-  PushApart(TriangleMesh part, const TriangleMesh& mesh, std::vector<char> movable, const Context& context)
-      : mesh_(std::move(part)), movable_(std::move(movable)), context_(context), start_(mesh_.vertices),
+  PushApart(TriangleMesh mesh, std::vector<char> movable, const Context& context)
+      : mesh_(std::move(mesh)), movable_(std::move(movable)), context_(context), start_(mesh_.vertices),
         at_(mesh_.vertices.size()), length_(mesh_.vertices.size(), 0) {
-    std::vector<std::size_t> triangles(mesh_.vertices.size(), 0);
-    for (const Triangle& t : mesh.triangles)
-      for (const Index v : t) ++triangles[v];
-    std::vector<double> count(mesh_.vertices.size(), 0);
-    for (Index t = 0; t < mesh_.triangles.size(); ++t)
+    for (Index t = 0; t < mesh_.triangles.size(); ++t) {
+      const Triangle& v = mesh_.triangles[t];
       for (std::size_t k = 0; k < 3; ++k) {
-        const Index a = mesh_.triangles[t][k], b = mesh_.triangles[t][(k + 1) % 3];
-        at_[a].push_back(t);
-        const double length = norm(mesh_.vertices[b] - mesh_.vertices[a]);
-        for (const Index v : {a, b}) {
-          length_[v] += length;
-          ++count[v];
-        }
+        at_[v[k]].push_back(t);
+        const double length = norm(mesh_.vertices[v[(k + 1) % 3]] - mesh_.vertices[v[k]]);
+        length_[v[k]] += length;
+        length_[v[(k + 1) % 3]] += length;
       }
-    for (std::size_t v = 0; v < length_.size(); ++v) {
-      if (count[v] > 0) length_[v] /= count[v];
-      movable_[v] = movable_[v] && at_[v].size() == triangles[v];
+      angle_.push_back(std::min(kGoodAngle, least_angle(mesh_, v)));
+      normal_.push_back(normal_of(v));
     }
-    for (const Triangle& t : mesh_.triangles) {
-      angle_.push_back(std::min(kGoodAngle, least_angle(t)));
-      normal_.push_back(normal_of(t));
-    }
+    // Two edges of each triangle.
+    for (std::size_t v = 0; v < length_.size(); ++v) length_[v] /= 2 * static_cast<double>(at_[v].size());
   }
 
   // The vertices with which the fewest pairs cross.
@@ -158,10 +168,6 @@ class PushApart {
  private:
   Corners corners(const Triangle& t) const {
     return {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]};
-  }
-  double least_angle(const Triangle& t) const {
-    const auto theta = measure_triangle(mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]).theta;
-    return *std::min_element(theta.begin(), theta.end());
   }
   Vec3 normal_of(const Triangle& t) const {
     return unit(twice_area_normal(mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]));
@@ -228,7 +234,7 @@ class PushApart {
 
   bool is_good(Index t) const {
     const Triangle& v = mesh_.triangles[t];
-    return least_angle(v) >= angle_[t] && dot(normal_of(v), normal_[t]) >= kTurned;
+    return least_angle(mesh_, v) >= angle_[t] && dot(normal_of(v), normal_[t]) >= kTurned;
   }
 
   TriangleMesh mesh_;
@@ -243,15 +249,17 @@ class PushApart {
 
 }  // namespace
 
-std::size_t push_apart(TriangleMesh& mesh, const std::vector<Pair>& pairs, const std::vector<char>& movable,
-                       const Context& context) {
-  if (pairs.empty() || pairs.size() > mesh.vertices.size() / kVerticesPerPair) return pairs.size();
+bool push_apart(TriangleMesh& mesh, const std::vector<Pair>& pairs, const std::vector<char>& movable,
+                std::size_t most_left, const Context& context) {
+  if (pairs.empty() || pairs.size() > mesh.vertices.size() / kVerticesPerPair) return false;
+  Part part = part_of(mesh, triangles_around(mesh, pairs), movable);
+  const std::vector<Vec3> pushed = PushApart(std::move(part.mesh), std::move(part.movable), context).run();
   std::vector<Vec3> before = mesh.vertices;
-  mesh.vertices = PushApart(part_around(mesh, pairs), mesh, movable, context).run();
+  for (std::size_t v = 0; v < pushed.size(); ++v) mesh.vertices[part.vertices[v]] = pushed[v];
   const std::size_t left = count_self_intersections(mesh, context);
-  if (left < pairs.size()) return left;
+  if (left < pairs.size() && left <= most_left) return true;
   mesh.vertices = std::move(before);
-  return pairs.size();
+  return false;
 }
 
 }  // namespace bisector

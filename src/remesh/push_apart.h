@@ -16,8 +16,8 @@ namespace bisector {
 // in which it overlaps the least. `pairs` are all that cross, as find_self_intersections has them. Only the vertices
 // marked in `movable`, one mark for each, move; no angle below 30 degrees gets smaller, no other one less than that,
 // and no triangle turns far. Pairs that overlap by more stay as they are, and all do where there is one for every two
-// vertices. Leaves the mesh with the fewest pairs that were found, and returns their number. Throws Cancelled.
-std::size_t push_apart(TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& pairs,
-                       const std::vector<char>& movable, const Context& context = {});
+// vertices. True if fewer cross then, and no more than `most_left`; else the mesh is as it was. Throws Cancelled.
+bool push_apart(TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& pairs, const std::vector<char>& movable,
+                std::size_t most_left, const Context& context = {});
 
 }  // namespace bisector

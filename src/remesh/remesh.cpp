@@ -91,6 +91,8 @@ int share_of(int iterations, double share) { return static_cast<int>(std::ceil(i
 // suffices.
 bool asks_for_disks(const RemeshPlan& plan) { return plan.constrained && !plan.noisy; }
 
+bool asks_for_quality(const RemeshPlan& plan) { return plan.min_angle > 0 && plan.constrained; }
+
 void check_plan(const RemeshPlan& plan) {
   if (!plan.places.empty() && plan.places.size() != plan.seeds.size())
     throw Error(
@@ -475,7 +477,7 @@ void Pipeline::extract() {
   if (!surface_.mesh.labels.empty())
     for (Index t : dual.mesh_triangle) result_.mesh.labels.push_back(surface_.mesh.labels[t]);
   extract_features(vertex_of);
-  const double mending = plan_.min_angle > 0 && plan_.constrained ? mend(diagram, vertex_of) : 0;
+  const double mending = asks_for_quality(plan_) ? mend(diagram, vertex_of) : 0;
   analyse_result();
   report_features();
   result_.ball_property = divided.ball.holds;
@@ -496,7 +498,7 @@ void Pipeline::fit() {
   for (std::size_t v = 0; v < fit.fixed.size(); ++v)
     if (is_held(result_.places[v])) fit.fixed[v] = 1;
   // Without a quality pass any triangle may become like the worst.
-  if (plan_.constrained && plan_.min_angle > 0) {
+  if (asks_for_quality(plan_)) {
     fit.min_angle = plan_.min_angle;
     fit.min_quality = kFitQuality;
   }
@@ -626,7 +628,7 @@ SizeBounds Pipeline::broken_curves() const {
 RemeshResult Pipeline::finish() {
   mend_features_and_topology();
   if (run_.has_features()) complete(run_, plan_.constrained);
-  if (plan_.min_angle > 0 && plan_.constrained) improve_quality();
+  if (asks_for_quality(plan_)) improve_quality();
   extract();
   if (plan_.fit || plan_.noisy) fit();
   result_.iterations = run_.totals.iterations;
@@ -733,17 +735,15 @@ bool has_faults(const JudgedResult& judged) {
          judged.slivers.hopeless;
 }
 
-bool asks_for_quality(const RemeshPlan& plan) { return plan.min_angle > 0 && plan.constrained; }
-
-// Not where most of what crosses does so by more than triangles are off the surface.
-void push_sheets_apart(RemeshResult& result, NewCrossings& input, const Context& context) {
+// Not where most of what crosses does so by more than triangles are off the surface, unless the input does so as much.
+// Whether anything crosses.
+bool push_sheets_apart(RemeshResult& result, NewCrossings& input, const Context& context) {
   const std::vector<std::array<Index, 2>> pairs = find_self_intersections(result.mesh, context);
-  if (pairs.empty()) return;
+  if (pairs.empty()) return false;
   std::vector<char> movable(result.mesh.vertices.size());
   for (std::size_t v = 0; v < movable.size(); ++v) movable[v] = result.places[v].kind == SeedPlace::Kind::surface;
-  std::vector<Vec3> before = result.mesh.vertices;
-  const std::size_t left = push_apart(result.mesh, pairs, movable, context);
-  if (2 * left > pairs.size() && left > input.of_input()) result.mesh.vertices = std::move(before);
+  push_apart(result.mesh, pairs, movable, std::max(pairs.size() / 2, input.of_input()), context);
+  return true;
 }
 
 std::size_t slivers_of(const JudgedResult& judged) { return judged.slivers.bounds.points.size() / 3; }
@@ -887,14 +887,15 @@ Runs::Run Runs::make_run(bool last) {
     preparation_->apart().move_back(prepared.corners, result);
     if (!prepared.whole.empty()) flip_where_components_cross(result.mesh);
     if (!prepared.kept.empty()) restore_kept(prepared.kept, prepared.features, input_, result);
-    if (asks_for_quality(plan)) push_sheets_apart(result, *new_crossings_, context_);
+    const bool may_cross = !asks_for_quality(plan) || push_sheets_apart(result, *new_crossings_, context_);
     result.edge_length = prepared.unit_edge;
     result.noisy = prepared.noisy;
     result.detail = prepared.detail;
     spent_ = {pipeline.spent().totals, result.seconds};
     Run run{judge(std::move(result)), {}};
     last = last || !asks_for_disks(plan) || plan.min_angle == 0;
-    const Crossings crossings = last && !best_ ? Crossings{} : new_crossings_->of(run.judged.result.mesh);
+    const bool asks = may_cross && (best_ || !last);
+    const Crossings crossings = asks ? new_crossings_->of(run.judged.result.mesh) : Crossings{};
     run.judged.crossings = crossings.pairs;
     if (!last && (!best_ || is_better(run.judged, *best_))) run.next = another_run(pipeline, run.judged, crossings);
     run.next.bounds.add(divided);

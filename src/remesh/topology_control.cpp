@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "core/parallel.h"
 #include "cvt/optimise_around.h"
 #include "remesh/sheets.h"
+#include "spatial/nearest.h"
 #include "voronoi/dual.h"
 #include "voronoi/polygons.h"
 
@@ -276,11 +278,10 @@ class Control {
         polish(before);
         smooth(before);
       } else {
-        // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show;
-        // and without the property the count is to be met.
-        const std::size_t most = given.seeds.size() + given.seeds.size() / kFewInVain;
-        const bool in_vain = best_has_too_few_ || !is_sound_ || (!control_.branches && best_.seeds.size() > most);
-        restore(in_vain ? given : best_);
+        // More seeds are worth nothing where too many cells fail in any case, or sheets are joined as none can show.
+        const bool in_vain = best_has_too_few_ || !is_sound_;
+        restore(in_vain || is_surplus(best_.seeds.size(), given.seeds.size()) ? given : best_);
+        if (!in_vain && !spans_surface()) restore(best_);
       }
       finish();
     }
@@ -333,6 +334,16 @@ class Control {
   }
 
   bool has_worked_enough() const { return run_.totals.work > most_work_; }
+
+  // Without the property the count is to be met, for what is inserted is not evened out. Walls of solids are finished
+  // by others.
+  bool is_surplus(std::size_t seeds, std::size_t given) const {
+    return !control_.branches && seeds > given + given / kFewInVain;
+  }
+
+  // A strip has about as many triangles as vertices. Along a needle the cells of too few seeds are rings in a row,
+  // which have none.
+  bool spans_surface() { return run_.diagram(Want::dual).dual.triangles.size() >= run_.seeds.size(); }
 
   // Whether so many cells fail that they are not to be mended one by one.
   bool too_few_seeds() const { return kTooFew * outcome_.ball.cells.size() > run_.seeds.size(); }
@@ -387,7 +398,7 @@ class Control {
   // For a seed whose cell cuts a curve between a corner and the curve's next seed: the point in its direction that is
   // as far from the corner as that seed. From there it leaves a straight curve alone at whatever angle; at the tip of a
   // needle no nearer point does. Elsewhere where the seed is.
-  Vec3 beside_next_on_curve(const Cut& cut) const {
+  Vec3 beside_next_on_curve(const Cut& cut) {
     const Vec3 p = run_.seeds.position(cut.cell);
     const FeatureCurves& curves = run_.curves();
     if (curves.closed(cut.curve)) return p;
@@ -406,9 +417,8 @@ class Control {
     if (from_end(cut.position) > least) return p;
     const Vec3 corner = curves.corner(at_start ? start : end), along = p - corner;
     if (!(norm2(along) > 0)) return p;
-    std::vector<Index> all(run_.surface().mesh.triangles.size());
-    std::iota(all.begin(), all.end(), Index{0});
-    return nearest_on_triangles(run_.surface(), all, corner + (norm(next - corner) / norm(along)) * along).at;
+    if (!nearest_) nearest_ = std::make_unique<NearestOnMesh>(run_.surface().mesh);
+    return nearest_->nearest(corner + (norm(next - corner) / norm(along)) * along).point;
   }
 
   void put_on_curve(std::size_t seed, const Cut& cut) {
@@ -631,6 +641,7 @@ class Control {
   std::vector<Cut> cuts_;
   std::vector<char> lost_;                        // by curve: cut at the beginning, and so left as it is
   Want parts_ = Want::labels;                     // of a diagram
+  std::unique_ptr<NearestOnMesh> nearest_;        // once asked for
   const RestrictedPolygons* polygons_ = nullptr;  // of the run's diagram, or divided_
   RestrictedPolygons divided_;
   std::vector<Vec3> vertices_;  // the seeds, and the points of sheets of divided cells

@@ -593,32 +593,48 @@ TriangleMesh double_cone(double height) {
   return mesh;
 }
 
+// Seeds on the creases of a mesh, and others at random, after 30 steps.
+struct CreasedRun {
+  CreasedRun(const TriangleMesh& mesh, std::size_t count)
+      : surface(mesh), backend(surface, NeighbourSource::nearest), curves(sharp_graph(mesh), mesh.vertices),
+        measure(surface, curves), trace(surface, curves), scale(measure.scale(count)), run(backend, curves, context) {
+    run.seeds = seeds_on_features(curves, measure, scale);
+    run.seeds.add(random_seeds(mesh, count - run.seeds.size(), 3));
+    options.constrained = true;
+    options.iterations = 30;
+    optimise(run, options);
+  }
+
+  bool recover() { return recover_features(run, trace, measure, scale, options).broken.empty(); }
+  TopologyOutcome enforce() { return enforce_topology(run, trace, topology_of(surface.mesh), options); }
+  bool has_all_curves() {
+    const Diagram& diagram = run.diagram(Want::polygons | Want::dual);
+    return check_features(trace, curves, run.seeds.places(), diagram).broken.empty();
+  }
+
+  const Surface surface;
+  CpuBackend backend;
+  const FeatureCurves curves;
+  const CurveMeasure measure;
+  const FeatureTrace trace;
+  const double scale;
+  const Context context;
+  CvtRun run;
+  OptimiseOptions options;
+};
+
 // Near a rim the seeds of one side own pieces of the other. Those put there for that must not cut the rim.
 TEST(TopologyControlTest, CurvesStay) {
   for (const double height : {0.05, 0.1, 0.2})
     for (const std::size_t count : {60, 120, 240}) {
-      const TriangleMesh mesh = double_cone(height);
-      const Surface surface(mesh);
-      CpuBackend backend(surface, NeighbourSource::nearest);
-      const FeatureCurves curves(sharp_graph(mesh), mesh.vertices);
-      ASSERT_EQ(curves.size(), 1u);
-      const CurveMeasure measure(surface, curves);
-      const FeatureTrace trace(surface, curves);
-      const double scale = measure.scale(count);
-      const Context context;
-      CvtRun run(backend, curves, context);
-      run.seeds = seeds_on_features(curves, measure, scale);
-      run.seeds.add(random_seeds(mesh, count - run.seeds.size(), 3));
-      OptimiseOptions options;
-      options.constrained = true;
-      options.iterations = 30;
-      optimise(run, options);
-      ASSERT_TRUE(recover_features(run, trace, measure, scale, options).broken.empty());
-      const TopologyOutcome outcome = enforce_topology(run, trace, topology_of(mesh), options);
-      EXPECT_TRUE(outcome.ball.holds) << height << ' ' << count;
-      EXPECT_GT(outcome.inserted, 0u) << height << ' ' << count;
-      const Diagram& diagram = run.diagram(Want::polygons | Want::dual);
-      EXPECT_TRUE(check_features(trace, curves, run.seeds.places(), diagram).broken.empty()) << height << ' ' << count;
+      SCOPED_TRACE(fmt::format("{} {}", height, count));
+      CreasedRun creased(double_cone(height), count);
+      ASSERT_EQ(creased.curves.size(), 1u);
+      ASSERT_TRUE(creased.recover());
+      const TopologyOutcome outcome = creased.enforce();
+      EXPECT_TRUE(outcome.ball.holds);
+      EXPECT_GT(outcome.inserted, 0u);
+      EXPECT_TRUE(creased.has_all_curves());
     }
 }
 
@@ -645,26 +661,10 @@ TEST(TopologyControlTest, TipsGetSeedsBesideTheFirstOfTheirCurves) {
   for (const double width : {0.1, 0.2, 0.3})
     for (const std::size_t count : {60, 120, 240}) {
       SCOPED_TRACE(fmt::format("{} {}", width, count));
-      const TriangleMesh mesh = leaf(width, 0.6 * width);
-      const Surface surface(mesh);
-      CpuBackend backend(surface, NeighbourSource::nearest);
-      const FeatureCurves curves(sharp_graph(mesh), mesh.vertices);
-      const CurveMeasure measure(surface, curves);
-      const FeatureTrace trace(surface, curves);
-      const double scale = measure.scale(count);
-      const Context context;
-      CvtRun run(backend, curves, context);
-      run.seeds = seeds_on_features(curves, measure, scale);
-      run.seeds.add(random_seeds(mesh, count - run.seeds.size(), 3));
-      OptimiseOptions options;
-      options.constrained = true;
-      options.iterations = 30;
-      optimise(run, options);
-      ASSERT_TRUE(recover_features(run, trace, measure, scale, options).broken.empty());
-      const TopologyOutcome outcome = enforce_topology(run, trace, topology_of(mesh), options);
-      EXPECT_TRUE(outcome.ball.holds);
-      const Diagram& diagram = run.diagram(Want::polygons | Want::dual);
-      EXPECT_TRUE(check_features(trace, curves, run.seeds.places(), diagram).broken.empty());
+      CreasedRun creased(leaf(width, 0.6 * width), count);
+      ASSERT_TRUE(creased.recover());
+      EXPECT_TRUE(creased.enforce().ball.holds);
+      EXPECT_TRUE(creased.has_all_curves());
     }
 }
 
@@ -705,25 +705,10 @@ TEST(TopologyControlTest, AsManySeedsStayWhereThePropertyIsNotToBeHad) {
   for (const double width : {0.2, 0.3})
     for (const std::size_t count : {60, 120}) {
       SCOPED_TRACE(fmt::format("{} {}", width, count));
-      const TriangleMesh mesh = leaf(width, 0.02);
-      const Surface surface(mesh);
-      CpuBackend backend(surface, NeighbourSource::nearest);
-      const FeatureCurves curves(sharp_graph(mesh), mesh.vertices);
-      const CurveMeasure measure(surface, curves);
-      const FeatureTrace trace(surface, curves);
-      const double scale = measure.scale(count);
-      const Context context;
-      CvtRun run(backend, curves, context);
-      run.seeds = seeds_on_features(curves, measure, scale);
-      run.seeds.add(random_seeds(mesh, count - run.seeds.size(), 3));
-      OptimiseOptions options;
-      options.constrained = true;
-      options.iterations = 30;
-      optimise(run, options);
-      const TopologyOutcome outcome = enforce_topology(run, trace, topology_of(mesh), options);
-      if (outcome.ball.holds) continue;
+      CreasedRun creased(leaf(width, 0.02), count);
+      if (creased.enforce().ball.holds) continue;
       ++failed;
-      EXPECT_LE(run.seeds.size(), count + count / 100);
+      EXPECT_LE(creased.run.seeds.size(), count + count / 100);
     }
   EXPECT_GT(failed, 0u);
 }
