@@ -158,9 +158,9 @@ struct FeatureResult {
 
 struct RemeshResult {
   // The restricted Delaunay triangulation of the seeds that own a cell, but for kept triangles, what surrounds kept
-  // edges that seeds had divided, and what was mended. Where sheets would cross by less, vertices lie up to a tenth of an
-  // edge off the surface. Its feature_edges are the edges along the input's features; labels are those of the input's
-  // triangles in which its dual vertices lie.
+  // edges that seeds had divided, and what was mended. Where sheets would cross by less, vertices lie up to a tenth of
+  // an edge off the surface. Its feature_edges are the edges along the input's features; labels are those of the
+  // input's triangles in which its dual vertices lie.
   TriangleMesh mesh;
   std::vector<SeedPlace> places;   // of mesh's vertices
   std::vector<Index> kept;         // of each of mesh's vertices, the input's that it is, or kNone; empty: none is kept
