@@ -64,7 +64,12 @@ class Corefiner {
   Corefiner(const TriangleMesh& mesh, std::vector<Index> component)
       : input_(mesh), component_(std::move(component)), cuts_(mesh.triangles.size()) {}
 
-  // What two triangles of different components have in common.
+  // Points at corners of this triangle are these corners, on other triangles of the component as well.
+  void share_corners(Index t) {
+    for (const Index v : input_.triangles[t]) vertex_at_.try_emplace(key(component_[v], input_.vertices[v]), v);
+  }
+
+  // What two triangles have in common.
   void add(Index s, Index t) {
     const std::array<Point, 3> a = corners_of(s), b = corners_of(t);
     const auto common = CGAL::intersection(Kernel::Triangle_3(a[0], a[1], a[2]), Kernel::Triangle_3(b[0], b[1], b[2]));
@@ -72,7 +77,8 @@ class Corefiner {
     if (const Point* p = boost::get<Point>(&*common)) found_.push_back({{s, t}, {*p, *p}});
     else if (const Kernel::Segment_3* segment = boost::get<Kernel::Segment_3>(&*common))
       found_.push_back({{s, t}, {segment->source(), segment->target()}});
-    else overlapping_.insert(components_of({s, t}));
+    else if (const std::array<Index, 2> components = components_of({s, t}); components[0] != components[1])
+      overlapping_.insert(components);
   }
 
   Corefinement run() {
@@ -98,6 +104,9 @@ class Corefiner {
 
  private:
   using Cut = std::array<Point, 2>;
+  using Key = std::tuple<Index, double, double, double>;
+
+  static Key key(Index component, const Vec3& p) { return {component, p.x, p.y, p.z}; }
 
   std::array<Index, 2> components_of(const std::array<Index, 2>& pair) const {
     return sorted_edge(component_[input_.triangles[pair[0]][0]], component_[input_.triangles[pair[1]][0]]);
@@ -161,8 +170,8 @@ class Corefiner {
     const Triangle& v = input_.triangles[t];
     for (const Index corner : v)
       if (input_.vertices[corner] == p) return corner;
-    const auto [at, is_new] = vertex_at_.try_emplace(std::tuple(component_[v[0]], p.x, p.y, p.z),
-                                                     static_cast<Index>(result_.mesh.vertices.size()));
+    const auto [at, is_new] =
+        vertex_at_.try_emplace(key(component_[v[0]], p), static_cast<Index>(result_.mesh.vertices.size()));
     if (is_new) {
       result_.mesh.vertices.push_back(p);
       const auto [a, b, c] = v;
@@ -180,8 +189,7 @@ class Corefiner {
               [&](const Point& a, const Point& b) { return CGAL::has_smaller_distance_to_point(from, a, b); });
     Index last = edge[0];
     for (const Point& p : points) {
-      const Vec3 at = rounded(p);
-      const auto found = vertex_at_.find(std::tuple(component_[edge[0]], at.x, at.y, at.z));
+      const auto found = vertex_at_.find(key(component_[edge[0]], rounded(p)));
       if (found == vertex_at_.end() || found->second == last) continue;
       const Edge rest = sorted_edge(last, edge[1]);
       result_.splits.push_back({rest[0], rest[1], found->second});
@@ -195,22 +203,34 @@ class Corefiner {
   std::set<std::array<Index, 2>> overlapping_;  // components
   std::vector<std::vector<Cut>> cuts_;          // of each triangle
   std::map<Edge, std::vector<Point>> on_edge_;  // between its ends
-  std::map<std::tuple<Index, double, double, double>, Index> vertex_at_;
+  std::map<Key, Index> vertex_at_;              // of each component
   Corefinement result_;
 };
+
+// Of the pairs of triangles that intersect, those of one component, or those of different ones.
+std::optional<Corefinement> corefine(const TriangleMesh& mesh, bool of_one_component, std::size_t most_pairs) {
+  std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
+  std::vector<std::array<Index, 2>> pairs = find_self_intersections(mesh);
+  std::erase_if(pairs, [&](const std::array<Index, 2>& pair) {
+    return of_one_component != (component[mesh.triangles[pair[0]][0]] == component[mesh.triangles[pair[1]][0]]);
+  });
+  if (pairs.empty() || pairs.size() > most_pairs) return std::nullopt;
+  Corefiner corefiner(mesh, std::move(component));
+  for (const auto& pair : pairs)
+    for (const Index t : pair)
+      if (of_one_component) corefiner.share_corners(t);
+  for (const auto& [s, t] : pairs) corefiner.add(s, t);
+  return corefiner.run();
+}
 
 }  // namespace
 
 std::optional<Corefinement> corefine_components(const TriangleMesh& mesh, std::size_t most_pairs) {
-  std::vector<Index> component = label_components(mesh.triangles, mesh.vertices.size());
-  std::vector<std::array<Index, 2>> pairs = find_self_intersections(mesh);
-  std::erase_if(pairs, [&](const std::array<Index, 2>& pair) {
-    return component[mesh.triangles[pair[0]][0]] == component[mesh.triangles[pair[1]][0]];
-  });
-  if (pairs.empty() || pairs.size() > most_pairs) return std::nullopt;
-  Corefiner corefiner(mesh, std::move(component));
-  for (const auto& [s, t] : pairs) corefiner.add(s, t);
-  return corefiner.run();
+  return corefine(mesh, false, most_pairs);
+}
+
+std::optional<Corefinement> corefine_sheets(const TriangleMesh& mesh, std::size_t most_pairs) {
+  return corefine(mesh, true, most_pairs);
 }
 
 CommonParts find_common_parts(const TriangleMesh& mesh, const std::vector<std::array<Index, 2>>& overlapping) {

@@ -1,4 +1,4 @@
-// Components of a surface that cross each other, cut along the lines where they do.
+// Components and sheets of a surface that cross each other, cut along the lines where they do.
 #pragma once
 
 #include <array>
@@ -31,6 +31,10 @@ struct Corefinement {
 // triangles that lie on each other in a plane are not cut along each other: they would have areas in common still.
 // Nothing if no triangles of different components intersect, or more than `most_pairs` do.
 std::optional<Corefinement> corefine_components(const TriangleMesh& mesh, std::size_t most_pairs);
+
+// The same for triangles of one component, whose sheets get the same vertices where they cross: edges there have four
+// triangles. Pairs that lie on each other in a plane are not cut along each other.
+std::optional<Corefinement> corefine_sheets(const TriangleMesh& mesh, std::size_t most_pairs);
 
 // What components have in common.
 struct CommonParts {

@@ -95,7 +95,7 @@ std::vector<HalfEdgePair> pairs_across_solids(const TriangleMesh& mesh, const Ed
 // The edges where solids touch, each with its pairs of triangles.
 using Contacts = std::unordered_map<std::size_t, std::vector<HalfEdgePair>>;
 
-Contacts find_contacts(const TriangleMesh& mesh, const EdgeTable& table) {
+Contacts find_contacts(const TriangleMesh& mesh, const EdgeTable& table, Touching touching) {
   const double rounding = kRounding * bounding_box(mesh).diagonal();
   Contacts contacts;
   const std::vector<Index> part = label_components(mesh.triangles, mesh.vertices.size());
@@ -104,11 +104,11 @@ Contacts find_contacts(const TriangleMesh& mesh, const EdgeTable& table) {
     const std::size_t count = table.half_edges.size(e), *sides = table.half_edges.begin(e);
     const Index of = part[table.edges[e][0]];
     if (count == 2 && origin(mesh.triangles, sides[0]) != origin(mesh.triangles, sides[1])) continue;
-    if (no_solids.contains(of)) continue;
+    if (no_solids.contains(of) || (touching == Touching::sheets && count < 3)) continue;
     std::vector<HalfEdgePair> pairs;
     if (count > 2) pairs = pairs_across_solids(mesh, table, e, rounding);
-    if (pairs.empty()) no_solids.insert(of);
-    else contacts.emplace(e, std::move(pairs));
+    if (!pairs.empty()) contacts.emplace(e, std::move(pairs));
+    else if (touching == Touching::solids) no_solids.insert(of);
   }
   std::erase_if(contacts, [&](const auto& c) { return no_solids.contains(part[table.edges[c.first][0]]); });
   return contacts;
@@ -134,9 +134,9 @@ DisjointSets<> find_fans(const TriangleMesh& mesh, const EdgeTable& table, const
 
 }  // namespace
 
-std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh) {
+std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh, Touching touching) {
   const EdgeTable table = edge_table(mesh.triangles, mesh.vertices.size());
-  const Contacts contacts = find_contacts(mesh, table);
+  const Contacts contacts = find_contacts(mesh, table, touching);
   if (contacts.empty()) return {};
   DisjointSets<> fans = find_fans(mesh, table, contacts);
   std::vector<std::size_t> held;  // edges
@@ -160,12 +160,12 @@ std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh) {
   return halved;
 }
 
-std::vector<Index> separate_touching(TriangleMesh& mesh) {
+std::vector<Index> separate_touching(TriangleMesh& mesh, Touching touching) {
   const std::size_t count = mesh.vertices.size();
   std::vector<Index> original(count);
   std::iota(original.begin(), original.end(), Index{0});
   const EdgeTable table = edge_table(mesh.triangles, count);
-  DisjointSets<> fans = find_fans(mesh, table, find_contacts(mesh, table));
+  DisjointSets<> fans = find_fans(mesh, table, find_contacts(mesh, table, touching));
   constexpr std::size_t kUnseen = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> first(count, kUnseen);  // fan of each vertex
   std::unordered_map<std::size_t, Index> copies;   // of the other fans

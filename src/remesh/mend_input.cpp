@@ -14,7 +14,6 @@
 #include "mesh/joining.h"
 #include "mesh/short_edges.h"
 #include "mesh/topology.h"
-#include "mesh/touching.h"
 
 namespace bisector {
 namespace {
@@ -109,17 +108,17 @@ void mend_rounding(WeldResult& welded, std::vector<std::array<Index, 2>> given, 
                              plural(flipped, "edge"), length, fold));
 }
 
-void Separation::separate(TriangleMesh& mesh, const Context& context) {
-  const MeshTopology touching = topology_of(mesh);
-  if (touching.manifold) return;
-  halved_ = halve_touching_edges(mesh);
+void Separation::separate(TriangleMesh& mesh, Touching touching, const Context& context) {
+  const MeshTopology before = topology_of(mesh);
+  if (before.manifold) return;
+  halved_ = halve_touching_edges(mesh, touching);
   vertices_ = mesh.vertices.size();
-  original_ = separate_touching(mesh);
+  original_ = separate_touching(mesh, touching);
   if (original_.size() == vertices_) return;
   part_fans(mesh, original_);
-  const std::size_t edges = touching.non_manifold_edges - topology_of(mesh).non_manifold_edges;
+  const std::size_t edges = before.non_manifold_edges - topology_of(mesh).non_manifold_edges;
   std::vector<std::string> where;
-  if (touching.non_manifold_vertices > 0) where.push_back("in " + plural(touching.non_manifold_vertices, "point"));
+  if (before.non_manifold_vertices > 0) where.push_back("in " + plural(before.non_manifold_vertices, "point"));
   if (edges > 0) where.push_back("along " + plural(edges, "edge"));
   context.warn(
       fmt::format("parts of the surface touch {}; they are meshed as if they did not", fmt::join(where, " and ")));

@@ -9,6 +9,7 @@
 #include "bisector/context.h"
 #include "bisector/mesh.h"
 #include "bisector/repair.h"
+#include "mesh/touching.h"
 
 namespace bisector {
 
@@ -25,7 +26,7 @@ class Separation {
   // Nothing is separated yet.
   explicit Separation(const TriangleMesh& mesh) : given_(mesh.vertices.size()), vertices_(given_) {}
   // Separates the parts of that mesh, with a warning.
-  void separate(TriangleMesh& mesh, const Context& context);
+  void separate(TriangleMesh& mesh, Touching touching, const Context& context);
 
   // Edges of the separated mesh that were `given` before.
   std::vector<std::array<Index, 2>> edges(const TriangleMesh& mesh,

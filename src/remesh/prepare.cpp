@@ -92,20 +92,6 @@ void check_kept(const TriangleMesh& mesh, const RemeshOptions& options) {
                               v < used.size() ? "on no triangle" : "none of the mesh's"));
 }
 
-SizingTarget target_of(const RemeshOptions& options) {
-  if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
-  return {options.vertices, options.edge_length};
-}
-
-WeldResult weld_and_mend(const OrderedInput& input, const Context& context) {
-  const RemeshOptions& options = input.options;
-  WeldResult welded = weld_and_orient(input.mesh, options.weld, context);
-  if (!options.weld && options.keep_vertices.empty() && options.keep_edges.empty())
-    mend_rounding(welded, options.features.given, compute_sizing(welded.mesh, {}, target_of(options)).unit_edge,
-                  context);
-  return welded;
-}
-
 WeldResult as_it_is(const TriangleMesh& input) {
   WeldResult welded;
   welded.mesh = input;
@@ -168,6 +154,20 @@ WeldResult weld_and_orient(const TriangleMesh& input, const std::optional<double
   return welded;
 }
 
+SizingTarget target_of(const RemeshOptions& options) {
+  if (!options.seeds.empty()) return {std::max(options.seeds.size(), kLeastForDensity), 0};
+  return {options.vertices, options.edge_length};
+}
+
+WeldResult weld_and_mend(const OrderedInput& input, const Context& context) {
+  const RemeshOptions& options = input.options;
+  WeldResult welded = weld_and_orient(input.mesh, options.weld, context);
+  if (!options.weld && options.keep_vertices.empty() && options.keep_edges.empty())
+    mend_rounding(welded, options.features.given, compute_sizing(welded.mesh, {}, target_of(options)).unit_edge,
+                  context);
+  return welded;
+}
+
 Preparation::Preparation(OrderedInput ordered, const Context& context, bool branches)
     : welded_(weld_and_mend(ordered, context)), mesh_(std::exchange(welded_.mesh, {})), sizing_(ordered.options.sizing),
       target_(target_of(ordered.options)), given_seeds_(ordered.options.seeds.size()) {
@@ -181,7 +181,7 @@ Preparation::Preparation(OrderedInput ordered, const Context& context, bool bran
   const std::size_t vertices = mesh_.vertices.size();
   Separation separation(mesh_);
   if (!branches) {
-    separation.separate(mesh_, context);
+    separation.separate(mesh_, ordered.touching, context);
     touching_ = separation.parted();
     const std::vector<Index> equal = part_equal_points(mesh_, false, context);
     touching_.insert(touching_.end(), equal.begin(), equal.end());

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "mesh/touching.h"
 #include "remesh/intersection_curves.h"
 #include "remesh/kept.h"
 #include "remesh/remesh.h"
@@ -44,7 +45,13 @@ struct OrderedInput {
   TriangleMesh mesh;
   RemeshOptions options;         // with what they say of vertices by those of `mesh`
   std::vector<Index> vertex_of;  // of each vertex of the input; kNone: no triangle uses it
+  Touching touching = Touching::solids;
 };
+
+// Welded, oriented, and mended where rounding spoilt it, unless that is told or parts are to be kept.
+WeldResult weld_and_mend(const OrderedInput& input, const Context& context);
+
+SizingTarget target_of(const RemeshOptions& options);
 
 // What is done to an input before seeds are placed.
 class Preparation {

@@ -25,6 +25,7 @@
 #include "mesh/topology.h"
 #include "remesh/around_kept.h"
 #include "remesh/coarse_surface.h"
+#include "remesh/cut_sheets.h"
 #include "remesh/deviation.h"
 #include "remesh/feature_recovery.h"
 #include "remesh/fit.h"
@@ -804,6 +805,7 @@ class Runs {
   RemeshResult run() {
     settle();
     if (!preparation_->intersections().empty()) settle_intersections();
+    settle_crossings();
     if (options_.distance_max > 0) come_near();
     return take_best();
   }
@@ -820,6 +822,7 @@ class Runs {
   Run make_run(bool last);
   void settle();
   void settle_intersections();
+  void settle_crossings();
   void come_near();
   RemeshResult take_best();
 
@@ -840,6 +843,7 @@ class Runs {
   std::optional<PlacedSeeds> earlier_;
   double work_before_ = 0;  // of runs in which components shared vertices
   std::optional<JudgedResult> best_;
+  std::optional<CutSheets> cut_;  // whose parts the best result is of
 };
 
 // In the runs to come. Components that share intersections get other corners there, which seeds do not fit any more.
@@ -944,6 +948,42 @@ void Runs::settle_intersections() {
       preparation_->lets_cross() ? "; elsewhere they cross, since edges are too long for it" : ""));
 }
 
+// Where more triangles cross than in the input, a surface that goes through itself is remeshed as if its parts only
+// touched where they cross, too.
+void Runs::settle_crossings() {
+  if (!refines() || options_.min_angle == 0 || branches_ || !options_.keep_vertices.empty() ||
+      !options_.keep_edges.empty())
+    return;
+  const std::size_t allowed = new_crossings_->of_input();
+  if (allowed == 0 || count_self_intersections(best_->result.mesh) <= allowed) return;
+  std::optional<CutSheets> cut = cut_sheets(OrderedInput(input_, options_));
+  if (!cut) return;
+  std::vector<Index> vertex_of = std::exchange(cut->input.vertex_of, {});
+  Context quiet = context_;
+  quiet.warning = nullptr;
+  Preparation whole = std::exchange(*preparation_, Preparation(std::move(cut->input), quiet));
+  new_crossings_.emplace(*preparation_);
+  may_shorten_ = true;
+  std::optional<PlacedSeeds> seeds = std::exchange(earlier_, std::nullopt);
+  std::optional<JudgedResult> crossing = std::exchange(best_, std::nullopt);
+  work_before_ = spent_.totals.work;
+  progress_.start_again("sheets that cross");
+  settle();
+  if ((best_->result.topology_matches || !crossing->result.topology_matches) && !has_slivers(*best_, kFewSlivers) &&
+      count_self_intersections(best_->result.mesh) <= allowed) {
+    vertex_of_ = std::move(vertex_of);
+    cut_ = std::move(cut);
+    context_.warn(fmt::format("the surface goes through itself along {} edges; its parts are meshed as if they only "
+                              "touched there",
+                              cut_->edges));
+    return;
+  }
+  preparation_ = std::move(whole);
+  new_crossings_.emplace(*preparation_);
+  earlier_ = std::move(seeds);
+  best_ = std::move(crossing);
+}
+
 // With shorter edges, and as many vertices as that takes, where the result is too far from the input.
 void Runs::come_near() {
   const double most = options_.distance_max;
@@ -981,7 +1021,7 @@ RemeshResult Runs::take_best() {
   chosen.seconds = spent_.seconds;
   chosen.seconds.prepare = preparing_;
   chosen.seconds.total = watch_.seconds();
-  chosen.welded = preparation_->welded();
+  chosen.welded = cut_ ? cut_->welded : preparation_->welded();
   chosen.welded.vertex_of = std::move(vertex_of_);
   for (Index& v : chosen.welded.vertex_of)
     if (v != kNone) v = preparation_->welded().vertex_of[v];

@@ -267,11 +267,11 @@ class Control {
         restore(start);
         gap_ = gap;
         if (gap == kInfinity) most_ = std::max(budget(), kAnyway);
-        has_parts_ = has_most_ = false;
+        has_most_ = false;
         check();
         keep_best();
         if (refine() || has_worked_enough() || !is_sound_) break;
-        if (!has_parts_ && !has_most_) break;  // there is nothing to divide, whatever the gap
+        if (!best_.has_parts && !has_most_) break;  // there is nothing to divide, whatever the gap
       }
       if (holds()) {
         trim();
@@ -294,6 +294,7 @@ class Control {
     PlacedSeeds seeds;
     std::size_t given = 0;
     double gap = kCrossing;
+    bool has_parts = false;  // a cell that fails has several components
   };
 
   // Where the cell of a seed on the surface cuts a curve.
@@ -319,7 +320,6 @@ class Control {
     if (!holds()) parts_ = Want::polygons;
     polygons_ = &run_.diagram(parts_).polygons;
     vertices_ = run_.seeds.positions();
-    for (const BallReport::Cell& cell : outcome_.ball.cells) has_parts_ |= cell.components > 1;
     if (!outcome_.ball.holds && (!too_few_seeds() || gap_ == kInfinity)) divide();
     outcome_.gap = gap_;
     outcome_.sheets.assign(vertices_.begin() + static_cast<std::ptrdiff_t>(run_.seeds.size()), vertices_.end());
@@ -389,7 +389,13 @@ class Control {
         std::map<Index, Cut> left;  // the first of each cell
         for (const Cut& cut : cuts_of_new()) left.insert({cut.cell, cut});
         if (left.empty()) return;
-        for (const auto& [cell, cut] : left) move_to(cut, beside_next_on_curve(cut));
+        for (const auto& [cell, cut] : left) {
+          const Place& place = points[cell - first].place;
+          const Vec3 p = beside_next_on_curve(cut);
+          // Too far away, it would not own the place for which it is.
+          if (norm2(p - place.point) < place.squared) move_to(cut, p);
+          else put_on_curve(cell, cut);
+        }
       }
     }
     for (const Cut& cut : cuts_of_new()) put_on_curve(cut.cell, cut);
@@ -526,7 +532,9 @@ class Control {
     best_has_too_few_ = too_few_seeds();
     fewest_ = count;
     least_surplus_ = surplus;
-    best_ = {run_.seeds, given_, gap_};
+    const bool has_parts = std::any_of(outcome_.ball.cells.begin(), outcome_.ball.cells.end(),
+                                       [](const BallReport::Cell& cell) { return cell.components > 1; });
+    best_ = {run_.seeds, given_, gap_, has_parts};
   }
 
   void restore(const SavedSeeds& saved) {
@@ -635,7 +643,6 @@ class Control {
   std::size_t given_;       // seeds before those inserted by refining
   std::size_t most_;        // seeds
   double gap_ = kCrossing;  // see divide_cells
-  bool has_parts_ = false;  // a cell that failed had several components
   bool has_most_ = false;   // as many seeds as may be were not enough
   TopologyOutcome outcome_;
   std::vector<Cut> cuts_;

@@ -313,7 +313,7 @@ TetOptions follow_vertices(const TetOptions& options, const WeldResult& welded) 
 // Solids that touch, or lie on each other with faces.
 void separate(TriangleMesh& mesh, TetOptions& options, const Context& context) {
   Separation separation(mesh);
-  separation.separate(mesh, context);
+  separation.separate(mesh, Touching::solids, context);
   options.features.given = separation.edges(mesh, options.features.given);
   std::vector<double>& attribute = options.sizing.field.attribute;
   if (!attribute.empty()) attribute = separation.values(std::move(attribute));
