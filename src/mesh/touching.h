@@ -18,8 +18,7 @@ enum class Touching { solids, sheets };
 // Halves the edges where solids touch that would still be one edge after separate_touching, because the surface around
 // both ends hangs together. Labels, face_of_triangle and feature edges follow. Returns the ends of the edge that each
 // new vertex is in the middle of; these come after the old ones.
-std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh,
-                                                       Touching touching = Touching::solids);
+std::vector<std::array<Index, 2>> halve_touching_edges(TriangleMesh& mesh, Touching touching = Touching::solids);
 
 // Gives each but the first of the fans of triangles around a vertex that share no edge there, or only edges where
 // solids touch, a copy of the vertex. Feature edges are renamed with their triangles. Returns the vertex that each was,

@@ -11,8 +11,8 @@
 #include "core/geometry.h"
 #include "features/edge_splits.h"
 #include "mesh/corefine.h"
-#include "mesh/touching.h"
 #include "mesh/topology.h"
+#include "mesh/touching.h"
 #include "remesh/mend_input.h"
 #include "remesh/sizing.h"
 

@@ -32,6 +32,7 @@
 #include "remesh/flip_crossings.h"
 #include "remesh/improve.h"
 #include "remesh/mend.h"
+#include "remesh/mend_input.h"
 #include "remesh/prepare.h"
 #include "remesh/push_apart.h"
 #include "remesh/sheets.h"
@@ -973,9 +974,10 @@ void Runs::settle_crossings() {
       count_self_intersections(best_->result.mesh) <= allowed) {
     vertex_of_ = std::move(vertex_of);
     cut_ = std::move(cut);
-    context_.warn(fmt::format("the surface goes through itself along {} edges; its parts are meshed as if they only "
-                              "touched there",
-                              cut_->edges));
+    context_.warn(
+        fmt::format("the surface goes through itself along {}; its parts are meshed as if they only "
+                    "touched there",
+                    plural(cut_->edges, "edge")));
     return;
   }
   preparation_ = std::move(whole);

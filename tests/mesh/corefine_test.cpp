@@ -14,6 +14,8 @@
 #include "core/degenerate.h"
 #include "core/geometry.h"
 #include "mesh/topology.h"
+#include "mesh/touching.h"
+#include "support/figure_of_eight.h"
 #include "support/models.h"
 
 namespace bisector::test {
@@ -125,6 +127,67 @@ TEST(Corefine, CutsNothingWhereAreasAreCommonOrNothingMeets) {
   EXPECT_FALSE(corefine_components(box(2), kAnyPairs).has_value());
   EXPECT_FALSE(corefine_components(joined(box(2), box(2), {0.625, 0.75, 0.375}), 1).has_value());
 }
+
+// A figure of eight around an axis: a torus that goes through itself along a circle, the two halves of which bound
+// volumes of opposite signs. With an open one some triangles are missing.
+class Eight : public testing::TestWithParam<bool> {
+ protected:
+  static TriangleMesh input() {
+    TriangleMesh mesh = figure_of_eight(24, 17);
+    if (GetParam()) mesh.triangles.resize(mesh.triangles.size() - 4);
+    return mesh;
+  }
+};
+
+TEST_P(Eight, IsCutIntoTwoThatTouch) {
+  const TriangleMesh mesh = input();
+  const std::size_t pairs = count_self_intersections(mesh);
+  ASSERT_GT(pairs, 20u);
+  EXPECT_FALSE(corefine_components(mesh, kAnyPairs).has_value());
+  EXPECT_FALSE(corefine_sheets(mesh, 1).has_value());
+  const auto cut = corefine_sheets(mesh, kAnyPairs);
+  ASSERT_TRUE(cut.has_value());
+  TriangleMesh parts = cut->mesh;
+  EXPECT_LT(count_self_intersections(parts), pairs / 10);
+  const auto whole_area = [](const TriangleMesh& m) {
+    double area = 0;
+    for (const auto& [a, b, c] : m.triangles) area += triangle_area(m.vertices[a], m.vertices[b], m.vertices[c]);
+    return area;
+  };
+  EXPECT_NEAR(whole_area(parts), whole_area(mesh), 1e-12 * whole_area(mesh));
+
+  // Edges of four triangles are those of one circle.
+  const EdgeTable table = edge_table(parts.triangles, parts.vertices.size());
+  std::map<Index, int> on_circle;
+  std::size_t edges = 0;
+  for (std::size_t e = 0; e < table.edges.size(); ++e) {
+    if (table.half_edges.size(e) <= 2) continue;
+    EXPECT_EQ(table.half_edges.size(e), 4u);
+    ++edges;
+    for (const Index v : table.edges[e]) ++on_circle[v];
+  }
+  EXPECT_EQ(edges, on_circle.size());
+  for (const auto& [v, count] : on_circle) {
+    EXPECT_EQ(count, 2);
+    EXPECT_NEAR(std::hypot(parts.vertices[v].x, parts.vertices[v].y), 3, 0.1);
+    EXPECT_NEAR(parts.vertices[v].z, 0, 0.1);
+  }
+
+  const Touching touching = GetParam() ? Touching::sheets : Touching::solids;
+  EXPECT_TRUE(halve_touching_edges(parts, touching).empty());
+  separate_touching(parts, touching);
+  const MeshTopology now = analyse_topology(parts.triangles, parts.vertices.size());
+  EXPECT_TRUE(now.manifold && now.oriented);
+  EXPECT_EQ(now.components, 2u);
+  EXPECT_EQ(now.euler, analyse_topology(mesh.triangles, mesh.vertices.size()).euler);
+  const std::vector<Index> component = label_components(parts.triangles, parts.vertices.size());
+  std::map<Index, double> volumes;
+  for (const auto& [a, b, c] : parts.triangles)
+    volumes[component[a]] += rounded_six_volume({}, parts.vertices[a], parts.vertices[b], parts.vertices[c]) / 6;
+  EXPECT_LT(volumes.begin()->second * volumes.rbegin()->second, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Eight, testing::Bool(), [](const auto& p) { return p.param ? "open" : "closed"; });
 
 TEST(Corefine, FindsNoEdgesInsideOfCommonFaces) {
   // The outline of the common face, but not the diagonals in it.

@@ -21,6 +21,7 @@
 #include "remesh/slivers.h"
 #include "remesh/topology_control.h"
 #include "support/diagram.h"
+#include "support/figure_of_eight.h"
 #include "support/models.h"
 #include "support/shuffled.h"
 
@@ -385,6 +386,31 @@ TEST(RemeshHard, ThereIsNothingToFitWithoutTriangles) {
   options.topology = TopologyControl::check;
   const RemeshResult result = remesh(torus(24, 16), options);
   EXPECT_TRUE(result.mesh.triangles.empty());
+}
+
+// Else the sheets of the result cross in more pairs than those of the input. The open one lacks triangles where nothing
+// crosses.
+TEST(RemeshHard, ASurfaceThatGoesThroughItselfHasPartsThatTouch) {
+  for (const bool open : {false, true}) {
+    TriangleMesh input = figure_of_eight(12, 9);
+    if (open) input.triangles.resize(input.triangles.size() - 4);
+    const std::size_t before = count_self_intersections(input);
+    ASSERT_GT(before, 0u);
+    std::vector<std::string> warnings;
+    Context context;
+    context.warning = [&](const std::string& line) { warnings.push_back(line); };
+    RemeshOptions options;
+    options.vertices = 1500;
+    const RemeshResult result = remesh(input, options, context);
+    EXPECT_LE(count_self_intersections(result.mesh), before);
+    EXPECT_TRUE(result.topology_matches);
+    EXPECT_EQ(result.topology.components, 2u);
+    EXPECT_EQ(result.features.broken, 0u);
+    EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),
+                            [](const std::string& line) { return line.find("goes through itself") != line.npos; }),
+              1);
+    ASSERT_EQ(result.welded.vertex_of.size(), input.vertices.size());
+  }
 }
 
 TEST(RemeshOptionsTest, GivenSeedsAreTheStart) {
