@@ -211,6 +211,33 @@ TEST(RemeshThin, AnAngularPlateHasGoodTrianglesAtItsCorners) {
 }
 
 // A hollow ball whose wall is a tenth of the edges: each side is meshed as if the other were not there.
+// There a seed that is put beside the corner, as far from it as the first seeds of its curves, is too far away to own
+// the places where cells of both sides meet.
+TEST(RemeshThin, APlateWithABevelledCornerKeepsItsTopology) {
+  const std::vector<std::array<double, 2>> outline = {{0, 3.525}, {1.575, 1.95}, {4.675, 1.95}, {4.675, 8},
+                                                      {6.2, 8},   {6.2, 20},     {0, 20}};
+  const auto count = static_cast<Index>(outline.size());
+  TriangleMesh plate;
+  for (const double y : {0.0, 0.1})
+    for (const auto& [x, z] : outline) plate.vertices.push_back({x, y, z});
+  for (Index k = 0; k < count; ++k) {
+    const Index next = (k + 1) % count;
+    plate.triangles.push_back({k, next, count + next});
+    plate.triangles.push_back({k, count + next, count + k});
+  }
+  for (Index k = 1; k + 1 < count; ++k) {
+    plate.triangles.push_back({0, k + 1, k});
+    plate.triangles.push_back({count, count + k, count + k + 1});
+  }
+  for (const std::size_t vertices : {16, 20, 24, 28}) {
+    RemeshOptions options;
+    options.vertices = vertices;
+    const RemeshResult result = remesh(plate, options);
+    EXPECT_TRUE(result.topology_matches) << vertices;
+    EXPECT_EQ(result.features.broken, 0u) << vertices;
+  }
+}
+
 TEST(RemeshThin, AShellHasGoodTrianglesOnBothSides) {
   TriangleMesh shell = icosphere(3);
   TriangleMesh inside = shell;
